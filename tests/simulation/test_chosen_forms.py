@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import servotwin as st
-from servotwin.models.engine.motions.motion import may_depend
+from servotwin.models.engine.motions.choice import may_depend
 from servotwin.models.state.records import mapped
 from servotwin.models.terms.chip import NO_CHIP
 from servotwin.models.terms.firmware import NO_FIRMWARE

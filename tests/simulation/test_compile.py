@@ -101,9 +101,9 @@ def test_two_processes_at_once(tmp_path):
 def test_what_no_term_asks_for_is_left_out():
     plain, calm, loose, everything = (
         derive(one).text for one in (PLAIN_RUNS, parts_of(PLAIN_RUNS)[1][0], BY_LEGS, ALL_RUNS))
-    assert not any(f"motions_motion__{name}" in calm for name in FLAGGED)
-    assert "motions_motion___long_step" in plain
-    assert all(f"motions_motion__{name}" in everything for name in FLAGGED)
+    assert not any(f"motions_choice__{name}" in calm for name in FLAGGED)
+    assert "motions_choice___long_step" in plain
+    assert all(f"motions_choice__{name}" in everything for name in FLAGGED)
     assert "terms_heat__warming_rates" in everything
     assert "terms_heat__warming_rates" not in plain + calm + loose
     assert "dynamics_contacts__apart(" in loose

@@ -8,7 +8,7 @@ import pytest
 
 import servotwin as st
 from servotwin.models.engine import demands
-from servotwin.models.engine.motions import motion
+from servotwin.models.engine.motions import choice, motion
 from servotwin.models.state import modes
 from servotwin.models.state.modes import Mode, Vector
 from servotwin.models.state.records import mapped
@@ -110,7 +110,7 @@ def test_motions_of_a_kind_come_up_only_where_it_is_said(servo, behind):
             never = demands.impossible(asked | dependence.STRAIGHT)
             for mode in modes_of(numbers, behind):
                 y = Vector(0.3, 0.5 * way(mode), 0.1, 300.0, 299.0, 0.301, 0.4 * way(mode))
-                found = motion.begin(numbers, mode, Piece(value=4.0), Piece(slope=told), 0.0, y, 1e-3, 0.1, 1e-9)
+                found = choice.begin(numbers, mode, Piece(value=4.0), Piece(slope=told), 0.0, y, 1e-3, 0.1, 1e-9)
                 word = kinds.get(found.kind)
                 seen.add(word)
                 assert word is None or word not in never, (names, told, mode, word)

@@ -14,7 +14,7 @@ from servotwin.models.engine.bus import event_log
 from servotwin.models.engine.bus.shared_source import on_stiff_source
 from servotwin.models.engine.dynamics.rates import jacobian
 from servotwin.models.engine.events import guards
-from servotwin.models.engine.motions import motion, rodas
+from servotwin.models.engine.motions import choice, motion, rodas
 from servotwin.models.engine.motions.motion import Motion
 from servotwin.models.engine.step import at_pulses
 from servotwin.models.state.modes import Mode, Vector
@@ -120,7 +120,7 @@ class _Maker:
 def _alone(m: Motion, step: float, accuracy: float) -> Motion:
     """Return the motion of a servo on its own; of a step, length and end are known."""
     if not motion.is_step(m):
-        return motion.begin(m.numbers, m.mode, m.u, m.tau, m.t0, m.start, step, math.inf, accuracy)
+        return choice.begin(m.numbers, m.mode, m.u, m.tau, m.t0, m.start, step, math.inf, accuracy)
     if m.kind != motion.STEP:
         return m
     jac = jacobian(m.numbers, m.mode, piece_value(m.u, m.t0), piece_rate(m.u, m.t0), piece_rate(m.tau, m.t0),

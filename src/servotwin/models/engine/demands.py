@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from servotwin.models.engine.motions.motion import may_depend
+from servotwin.models.engine.motions.choice import may_depend
 from servotwin.models.terms import bridge, chip, elastic, firmware, motor, play, sensor, source
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.dependence import (

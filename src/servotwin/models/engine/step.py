@@ -11,9 +11,9 @@ import math
 
 from servotwin.models.engine import controller
 from servotwin.models.engine.dynamics import currents
-from servotwin.models.engine.events import first_event, guards
+from servotwin.models.engine.events import crossings, first_event, guards
 from servotwin.models.engine.memory import SAME, Inputs, Memory, Point, edge_of, in_force, origin_of, since
-from servotwin.models.engine.motions import motion
+from servotwin.models.engine.motions import choice, motion
 from servotwin.models.engine.motions.motion import Motion
 from servotwin.models.state.modes import CORE, Vector
 from servotwin.models.terms import bridge, duty, firmware, frame
@@ -94,7 +94,7 @@ def onward(numbers: Numbers, point: Point, u: Piece, tau: Piece, m: Motion, new:
     """
     if new or motion.is_step(m) or not (
             m.t0 == point.anchor_time and m.mode == point.mode and m.start == point.anchor):
-        m = motion.begin(numbers, point.mode, u, tau, point.anchor_time, point.anchor, point.step,
+        m = choice.begin(numbers, point.mode, u, tau, point.anchor_time, point.anchor, point.step,
                          limit - point.anchor_time, accuracy)
     if m.kind == motion.IMPOSSIBLE:
         return point, m, -1, STEP_TOO_SMALL
@@ -150,7 +150,7 @@ def follow(m: Motion, point: Point, horizon: float) -> tuple[Point, int, int]:
     if kind < 0:
         wiper = wiper_at(m.numbers.sensor, point.wiper, y.q)
         if integrated and end == step_end and m.ends_by >= 0:
-            after, y = guards.cross(m.numbers, m.mode, m.ends_by, piece_value(m.u, end), piece_value(m.tau, end), y)
+            after, y = crossings.cross(m.numbers, m.mode, m.ends_by, piece_value(m.u, end), piece_value(m.tau, end), y)
             return Point(end, y, after, end, y, point.step, wiper), m.ends_by, status_of(y)
         if integrated and end == step_end:
             return Point(end, y, m.mode, end, y, m.next_step, wiper), -1, status_of(y)
@@ -160,7 +160,7 @@ def follow(m: Motion, point: Point, horizon: float) -> tuple[Point, int, int]:
         m = motion.prepared(m)
     y = motion.ended(m, s)
     wiper = wiper_at(m.numbers.sensor, point.wiper, y.q)
-    after, y = guards.cross(m.numbers, m.mode, kind, piece_value(m.u, t), piece_value(m.tau, t), y)
+    after, y = crossings.cross(m.numbers, m.mode, kind, piece_value(m.u, t), piece_value(m.tau, t), y)
     return Point(t, y, after, t, y, point.step, wiper), kind, status_of(y)
 
 

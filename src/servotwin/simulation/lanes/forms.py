@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from servotwin.models.engine.batch import tiles
 from servotwin.models.engine.demands import needed
-from servotwin.models.engine.motions.motion import may_depend
+from servotwin.models.engine.motions.choice import may_depend
 from servotwin.models.state.records import numbers_in
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.dependence import FADING, PLAY, PWM, RECORDED, SLACK, SPRING, STEEP_W, TABLE

@@ -19,7 +19,7 @@ from servotwin.models.engine.memory import (
     put_memory,
     resumed,
 )
-from servotwin.models.engine.motions.motion import may_depend
+from servotwin.models.engine.motions.choice import may_depend
 from servotwin.models.engine.runs import UNDERWAY, inputs_of
 from servotwin.models.state.modes import BACKWARD, FORWARD, RIGID, Mode, one_body
 from servotwin.models.state.records import reader, room, rows_of, tile_of, writer

@@ -1,9 +1,9 @@
 """A band: a range of speeds within which the acceleration is a straight line, for any law that is made of such.
 
 With a regulator a source follows its resistance, gives its most, or has broken down; with load friction the share of
-the torques has one sign or the other. Within a band a shaft slides on an arc, as in `linear_segments`; below all bands, where
-static friction fades, it creeps. Everything here asks the laws of the general engine, so that a servo needs no numbers
-but its own.
+the torques has one sign or the other. Within a band a shaft slides on an arc, as in `linear_segments`; below all bands,
+where static friction fades, it creeps. Everything here asks the laws of the general engine, so that a servo needs no
+numbers but its own.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ from servotwin.models.engine.batch.rk_slots import (
 )
 from servotwin.models.engine.batch.rk_steps import State
 from servotwin.models.engine.batch.tiles import More
-from servotwin.models.engine.events import guards
+from servotwin.models.engine.events import crossings
 from servotwin.models.terms import heat
 from servotwin.models.terms.friction import fades
 from servotwin.models.terms.numbers import Numbers
@@ -201,7 +201,7 @@ def _goes_on(slack: bool, tile: Any, plan: Any, slots: Any, k: int) -> bool:
     if found.crossed >= 0:
         if slack:
             tiles.drag(tile, to.q, j)
-        mode, y = guards.cross(numbers, mode, found.crossed, u, tau, rk_steps.vector_of(to))
+        mode, y = crossings.cross(numbers, mode, found.crossed, u, tau, rk_steps.vector_of(to))
         to = State(y.q, y.w, y.T_w, y.T_h)
         _put_mode(busy, k, mode)
     put_before_in(slots.before, k, to)

@@ -12,7 +12,7 @@ from servotwin.models.engine.batch.rk_steps import cooled
 from servotwin.models.engine.batch.warm_segments import LONGEST, MARGIN, NEAR
 from servotwin.models.engine.dynamics import coefficients
 from servotwin.models.engine.dynamics.coefficients import Apart
-from servotwin.models.engine.events import guards
+from servotwin.models.engine.events import crossings, guards
 from servotwin.models.engine.legs import legs
 from servotwin.models.engine.legs.legs import MOST_LEGS, MOST_SHORT, SHORT, Gone, stands
 from servotwin.models.engine.motions import first_order, warm_exponential
@@ -70,7 +70,7 @@ def go(numbers: Numbers, torque: float, u: float, y: Vector, mesh: int, wiper: f
             return Gone(y, mode, wiper, 0.0)
         wiper = wiper_at(numbers.sensor, wiper, y.q)
         if end.kind >= 0:
-            mode, y = guards.cross(numbers, mode, end.kind, u, torque, y)
+            mode, y = crossings.cross(numbers, mode, end.kind, u, torque, y)
             short = short + 1 if took <= SHORT * time else 0
             if short >= MOST_SHORT:
                 _, mode, y = legs.together(warm(numbers, y), mode, u, torque, y)

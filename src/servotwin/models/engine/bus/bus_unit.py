@@ -31,7 +31,7 @@ from servotwin.models.engine.bus.bus_records import (
     vector_of,
 )
 from servotwin.models.engine.memory import Inputs, Memory, Point, since
-from servotwin.models.engine.motions import motion
+from servotwin.models.engine.motions import choice, motion
 from servotwin.models.state.modes import Mode
 from servotwin.models.terms import duty, firmware, frame
 from servotwin.models.terms.chip import Chip
@@ -195,7 +195,7 @@ def point_now(seat: Any, shared: Any, mates: Any, time: float) -> Point:
     else:
         numbers = numbers_now(seat)
         u = source(seat, numbers)
-        m = motion.prepared(motion.begin(numbers, p.mode, u, tau_by(seat, seat.origin), p.anchor_time, p.anchor,
+        m = motion.prepared(choice.begin(numbers, p.mode, u, tau_by(seat, seat.origin), p.anchor_time, p.anchor,
                                          p.step, seat.limit - p.anchor_time, seat.accuracy))
         y = motion.ended(m, t - m.t0)
     return Point(t, y, p.mode, p.anchor_time, p.anchor, p.step, wiper_of(seat, y.q))

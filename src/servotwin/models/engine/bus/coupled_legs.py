@@ -24,7 +24,7 @@ from servotwin.models.engine.bus.coupled_units import (
 )
 from servotwin.models.engine.bus.shared_source import driven, part_on_bus
 from servotwin.models.engine.dynamics import contacts, currents
-from servotwin.models.engine.events import guards
+from servotwin.models.engine.events import crossings, guards
 from servotwin.models.engine.legs import legs
 from servotwin.models.engine.legs.legs import MOST_SHORT, SHORT
 from servotwin.models.state.modes import (
@@ -223,7 +223,7 @@ def _arrive(units: Any, count: int, common: Any) -> None:
 def _cross(unit: Any, kind: int, V: float, end: float, time: float) -> None:
     """Let an event of a servo have happened, at the end of a leg."""
     numbers, mode, u = unit_numbers(unit.numbers), unit_mode(unit.mode), unit.sign * V
-    mode, y = guards.cross(numbers, mode, kind, u, unit.torque, unit_state(unit.y))
+    mode, y = crossings.cross(numbers, mode, kind, u, unit.torque, unit_state(unit.y))
     unit.short = unit.short + 1 if end <= SHORT * time else 0
     if unit.short >= MOST_SHORT and play.present(numbers.play):
         _, mode, y = legs.together(warm(numbers, y), mode, u, unit.torque, y)

@@ -21,7 +21,7 @@ from servotwin.models.engine.bus.bus_records import (
 )
 from servotwin.models.engine.bus.coupled_step import turns
 from servotwin.models.engine.dynamics import contacts
-from servotwin.models.engine.events import guards
+from servotwin.models.engine.events import crossings, guards
 from servotwin.models.engine.memory import FIRST_STEP
 from servotwin.models.engine.motions import stribeck
 from servotwin.models.engine.motions.motion import LONG_STEP
@@ -320,7 +320,7 @@ def arrive(shared: Any, mates: Any) -> Mode:
     numbers = numbers_of(mate.numbers)
     if mate.returns > 0 and mate.mode.zone == NO_CURRENT:  # teeth that meet would part by a torque that there is not
         numbers = shared_source.blocked(numbers)
-    mode, y = guards.cross(numbers, mode_of(mate.mode), kind, shared_source.behind(mate, V),
+    mode, y = crossings.cross(numbers, mode_of(mate.mode), kind, shared_source.behind(mate, V),
                            piece_value(piece_of(mate.tau), shared.end), vector_of(mate.y))
     put_vector(mate.y, y)
     return Mode(shared_source.let_through(mate, mode.zone), mode.contact, mode.mesh, mode.motor, mode.share)

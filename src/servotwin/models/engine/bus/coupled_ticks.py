@@ -14,7 +14,7 @@ from servotwin.models.engine.bus.bus_inputs import inputs_at
 from servotwin.models.engine.bus.coupled_legs import DONE, LEFT, current_of, is_plain, put_duty, settle
 from servotwin.models.engine.bus.coupled_units import put_unit_state, unit_numbers, unit_state
 from servotwin.models.engine.memory import FRAMES, SAME, Inputs, Memory, origin_of
-from servotwin.models.engine.motions.motion import may_depend
+from servotwin.models.engine.motions.choice import may_depend
 from servotwin.models.terms import control, duty, elastic, firmware, sensor
 from servotwin.models.terms.control import NOTHING_SENSED, Sensed
 from servotwin.models.terms.dependence import BY_SHARE, ON_HEAT, TWO_BODIES

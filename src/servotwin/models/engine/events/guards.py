@@ -1,4 +1,4 @@
-"""What can end a mode, and what comes after it.
+"""What can end a mode.
 
 A guard is at least zero as long as its mode lasts.
 """
@@ -15,7 +15,6 @@ from servotwin.models.state.modes import (
     FREE,
     INSIDE,
     LOOSE,
-    ON_BACKWARD,
     ON_FORWARD,
     ON_LOWER,
     ON_UPPER,
@@ -30,8 +29,8 @@ from servotwin.models.state.modes import (
     moving,
     slides,
 )
-from servotwin.models.terms import elastic, friction, heat, play, shaft, source
-from servotwin.models.terms.friction import core_speed, creeping_speed, fades, smoothed, varying
+from servotwin.models.terms import elastic, friction, heat, play, shaft
+from servotwin.models.terms.friction import core_speed, creeping_speed, fades, varying
 from servotwin.models.terms.load import external_torque, stiffness_at
 from servotwin.models.terms.motor import inductive
 from servotwin.models.terms.numbers import Numbers, warm
@@ -328,109 +327,3 @@ def _pressing_rate(numbers: Numbers, mode: Mode, u: float, dtau: float, y: Vecto
     gain = (shaft.motor_acceleration(numbers.shaft, (1.0 - taken) * more, dy.w, 0.0)
             - shaft.output_acceleration(numbers.shaft, dy.w, 0.0, dtau + stiffness_at(numbers.load, y.q) * y.w))
     return gain if mode.mesh == ON_FORWARD else -gain
-
-
-def cross(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:
-    """Return mode and state just after the guard `kind` of `mode` has reached zero."""
-    if heat.present(numbers.heat):
-        return _crossed(warm(numbers, y), mode, kind, u, tau, y)
-    return _crossed(numbers, mode, kind, u, tau, y)
-
-
-def _crossed(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:
-    zone, shaft, mesh, motor, share = mode
-    if kind == ZONE_UP or kind == ZONE_DOWN:
-        if currents.by_current(numbers, zone):
-            y = _with_current_at_edge(numbers, zone, kind, u, y)
-            w_m = elastic.turning(numbers.elastic, y)
-            return Mode(currents.zone_of(numbers, u, 0.0, y.q, w_m, y.i), shaft, mesh, motor, share), y
-        zone = currents.neighbour(numbers, zone, kind == ZONE_UP)
-        if share != 0 and not elastic.present(numbers.elastic):
-            share = contacts.share_sign(numbers, zone, geared(numbers, mode), mesh, u, tau, y)
-        return Mode(zone, shaft, mesh, motor, share), y
-    if kind == SHARE:
-        return Mode(zone, shaft, mesh, motor, -share), y
-    if kind == CREEPS:
-        slow = creeping_speed(numbers.friction)
-        w = slow if geared(numbers, mode) == FORWARD else -slow
-        after = moving(y, y.q, y.w if turns_alone(numbers, mode) else w,
-                       y.w_m if elastic.behind(numbers.elastic) else w)
-        return mode, after
-    if elastic.present(numbers.elastic):
-        return _cross_spring(numbers, mode, kind, u, tau, y)
-    if kind == SPEED and smoothed(numbers.friction):
-        return Mode(zone, CORE, mesh, motor, 0), y
-    if kind == CORE_FORWARD or kind == CORE_BACKWARD:
-        return Mode(zone, FORWARD if kind == CORE_FORWARD else BACKWARD, mesh, motor, 0), y
-    if kind == UPPER or kind == LOWER:
-        return contacts.rebound(numbers, mode, kind == UPPER, u, tau, y)
-    if kind == RELEASE_FORWARD or kind == RELEASE_BACKWARD:
-        if kind == RELEASE_FORWARD and y.q >= numbers.stops.upper:
-            return Mode(zone, ON_UPPER, mesh, motor, 0), y
-        if kind == RELEASE_BACKWARD and y.q <= numbers.stops.lower:
-            return Mode(zone, ON_LOWER, mesh, motor, 0), y
-        shaft = FORWARD if kind == RELEASE_FORWARD else BACKWARD
-        dry = contacts.holds(numbers) if mesh == INSIDE else contacts.has_friction(numbers)
-        shaft = shaft if dry else FREE
-        share = share if mesh == INSIDE else contacts.share_sign(numbers, zone, shaft, mesh, u, tau, y)
-        return Mode(zone, shaft, mesh, motor, share), y
-    if kind == MOTOR_RELEASE_FORWARD or kind == MOTOR_RELEASE_BACKWARD:
-        motor = FORWARD if kind == MOTOR_RELEASE_FORWARD else BACKWARD
-        return Mode(zone, shaft, mesh, motor, contacts.share_sign(numbers, zone, motor, mesh, u, tau, y)), y
-    if play.present(numbers.play) and (kind == PART or kind == PART_OUTPUT or kind == PART_MOTOR):
-        return contacts.apart(numbers, zone, u, tau, y), y
-    q, w, i = y.q, y.w, y.i
-    if play.present(numbers.play) and (kind == MEET_FORWARD or kind == MEET_BACKWARD):
-        y = play.met(numbers.play, numbers.shaft, kind == MEET_FORWARD, y)
-        mesh = ON_FORWARD if kind == MEET_FORWARD else ON_BACKWARD
-        upper = q >= numbers.stops.upper and y.w > 0.0
-        hits = upper or (q <= numbers.stops.lower and y.w < 0.0)
-        if hits and w != 0.0:  # it goes to and fro between motor and stop without any way to go: in the end both stand
-            y = moving(y, q, 0.0, 0.0)
-        if source.present(numbers.source):
-            zone = currents.zone_of(numbers, u, 0.0, q, y.w_m, i)
-        if hits and w == 0.0:  # it rests on a stop: both hit it at once
-            return contacts.rebound(numbers, Mode(zone, shaft, mesh, motor, 0), upper, u, tau, y)
-    elif kind == MOTOR_SPEED:
-        y = moving(y, q, w, 0.0)
-    else:
-        y = moving(y, q, 0.0, y.w_m if mesh == INSIDE else 0.0)
-    return contacts.settled(numbers, zone, u, tau, y, mesh, False), y
-
-
-def _cross_spring(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:
-    """Return mode and state of two bodies with a spring between them after a guard has reached zero."""
-    zone, contact, mesh, motor, _ = mode
-    if kind == UPPER or kind == LOWER:
-        return spring_contact.rebound(numbers, mode, kind == UPPER, u, tau, y)
-    if kind == RELEASE_FORWARD or kind == RELEASE_BACKWARD:
-        forward = kind == RELEASE_FORWARD
-        contact = FREE if not spring_contact.is_dry(numbers) else FORWARD if forward else BACKWARD
-        if forward and y.q >= numbers.stops.upper:
-            contact = ON_UPPER
-        if not forward and y.q <= numbers.stops.lower:
-            contact = ON_LOWER
-        return spring_contact.with_share(numbers, Mode(zone, contact, mesh, motor, 0), u, tau, y), y
-    if kind == MOTOR_RELEASE_FORWARD or kind == MOTOR_RELEASE_BACKWARD:
-        motor = FORWARD if kind == MOTOR_RELEASE_FORWARD else BACKWARD
-        return spring_contact.with_share(numbers, Mode(zone, contact, mesh, motor, 0), u, tau, y), y
-    if kind == MOTOR_SPEED:
-        y = moving(y, y.q, y.w, 0.0)
-    elif kind == SPEED:
-        y = moving(y, y.q, 0.0, y.w_m)
-    elif kind == MEET_FORWARD or kind == MEET_BACKWARD:
-        mesh = PUSH_FORWARD if kind == MEET_FORWARD else PUSH_BACKWARD
-    elif mesh == PUSH_FORWARD and spring_contact.twist_rate(numbers, y) < 0.0 and numbers.elastic.c > 0.0:
-        mesh = TRAIL_FORWARD
-    elif mesh == PUSH_BACKWARD and spring_contact.twist_rate(numbers, y) > 0.0 and numbers.elastic.c > 0.0:
-        mesh = TRAIL_BACKWARD
-    else:
-        mesh = LOOSE
-    return spring_contact.settled(numbers, zone, u, tau, y, mesh), y
-
-
-def _with_current_at_edge(numbers: Numbers, zone: int, kind: int, u: float, y: Vector) -> Vector:
-    """Return the state with the current where a zone of the current ends."""
-    low, high = currents.zone_limits(numbers, zone, u)
-    i = high if kind == ZONE_UP else low
-    return Vector(y.q, y.w, 0.0 if i == 0.0 else i, y.T_w, y.T_h, y.q_m, y.w_m)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from servotwin.models.engine.dynamics import contacts, currents
 from servotwin.models.engine.dynamics.coefficients import Apart, apart_coefficients, linear_coefficients
-from servotwin.models.engine.events import guards
+from servotwin.models.engine.events import crossings, guards
 from servotwin.models.engine.events.event_times import first_end
 from servotwin.models.engine.motions import first_order
 from servotwin.models.engine.motions.relative_motion import Course, both
@@ -93,7 +93,7 @@ def go(numbers: Numbers, torque: float, u: float, y: Vector, mode: Mode, wiper: 
             return Gone(end.after, mode, wiper, 1.0 if math.isfinite(end.after.q + end.after.q_m) else 0.0)
         y = moved(numbers, mode, laws, y, end.time)
         wiper = wiper_at(numbers.sensor, wiper, y.q)
-        mode, y = guards.cross(numbers, mode, end.kind, u, torque, y)
+        mode, y = crossings.cross(numbers, mode, end.kind, u, torque, y)
         short = short + 1 if end.time <= SHORT * time else 0
         if short >= MOST_SHORT and play.present(numbers.play):
             _, mode, y = together(numbers, mode, u, torque, y)

@@ -23,7 +23,7 @@ from servotwin.physics.pieces import Piece
 
 
 class Law(NamedTuple):
-    """The law of two bodies, as `two_mass_series.law` has it; in which mode, driven or not, at which resistance; how long."""
+    """The law of two bodies, as in `two_mass_series`; in which mode, driven or not, at which resistance; how long."""
 
     A: tuple[Vector, ...]
     mode: Mode

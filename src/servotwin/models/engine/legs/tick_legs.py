@@ -17,8 +17,8 @@ from servotwin.models.engine.legs import legs, spring_legs
 from servotwin.models.engine.legs.spring_legs import Law
 from servotwin.models.engine.memory import FRAMES, SAME, Inputs, Memory, Point, origin_of
 from servotwin.models.engine.motions import two_mass_series
+from servotwin.models.engine.motions.choice import may_depend
 from servotwin.models.engine.motions.elementary import decay, fma
-from servotwin.models.engine.motions.motion import may_depend
 from servotwin.models.state.modes import CONDUCTING, INSIDE, Mode, Vector, at_rest
 from servotwin.models.terms import control, duty, elastic, friction, play, sensor, source
 from servotwin.models.terms.control import NOTHING_SENSED, NOWHERE

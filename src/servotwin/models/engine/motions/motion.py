@@ -9,15 +9,10 @@ import math
 from typing import NamedTuple
 
 from servotwin.models.engine.dynamics.coefficients import (
-    against_of,
     apart_coefficients,
     current_of,
-    fading_coefficients,
-    linear_coefficients,
-    speed_coefficients,
 )
-from servotwin.models.engine.dynamics.rates import jacobian, rates_of
-from servotwin.models.engine.events.guards import creeping
+from servotwin.models.engine.dynamics.rates import rates_of
 from servotwin.models.engine.motions import (
     dormand_prince,
     first_order,
@@ -28,56 +23,30 @@ from servotwin.models.engine.motions import (
     warm_linear,
 )
 from servotwin.models.engine.motions.relative_motion import Course, both
-from servotwin.models.engine.motions.rodas import Triple, not_constant
+from servotwin.models.engine.motions.rodas import Triple
 from servotwin.models.state.modes import (
-    BACKWARD,
-    CONDUCTING,
-    CORE,
-    CURRENT_BACKWARD,
-    CURRENT_FORWARD,
-    FORWARD,
-    FREE,
     INSIDE,
-    LINEAR,
-    NO_CURRENT,
     NOWHERE,
     RIGID,
     Mode,
     Vector,
-    at_rest,
-    constant_current,
-    in_linear_zone,
 )
-from servotwin.models.terms import elastic, follower, friction, heat, load, motor, play, sensor, source
-from servotwin.models.terms.dependence import (
-    BY_SHARE,
-    CURVED_Q,
-    CURVED_T,
-    CURVED_W,
-    FADING,
-    ON_HEAT,
-    ON_I,
-    ON_Q,
-    STEEP_W,
-    TWO_BODIES,
-)
+from servotwin.models.terms import elastic, play
 from servotwin.models.terms.numbers import Numbers
-from servotwin.physics.pieces import Piece, piece_rate, piece_value
+from servotwin.physics.pieces import Piece, piece_value
 
 # Kinds of motion. IMPOSSIBLE: no step is short enough for the tolerance.
 (REST, FIRST_ORDER, SECOND_ORDER, WITH_CURRENT, HELD, SERIES, STEP, LONG_STEP, CREEP, APART, PAIR,
  WARMING, IMPOSSIBLE) = range(13)
 
-_WITH_HEAT = ON_HEAT | ON_I | BY_SHARE | TWO_BODIES | FADING  # what a servo that is followed as it warms may ask for
 _TURN = 2.0 * math.pi
 _GONE = 2.0  # times that of what fades fast: most of it is over
-# Error of one implicit step, relative to 1 + |state|, and of an explicit one: parts of the accuracy asked for
-_TOLERANCE, FINE = 0.3, 1e-3
+FINE = 1e-3  # error of one explicit step, relative to 1 + |state|: a part of the accuracy asked for
 _ORIGIN = (0.0, 0.0, 0.0)
-_NO_STAGES = (_ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN)
-_NO_DENSE = (_ORIGIN, _ORIGIN, _ORIGIN)
-_NO_LONG_DENSE = (NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE)
-_NO_COEFFICIENTS = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_STAGES = (_ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN)
+NO_DENSE = (_ORIGIN, _ORIGIN, _ORIGIN)
+NO_LONG_DENSE = (NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE)
+NO_COEFFICIENTS = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Motion(NamedTuple):
@@ -105,7 +74,7 @@ class Motion(NamedTuple):
 def nothing(numbers: Numbers, u: Piece, tau: Piece) -> Motion:
     """Return a motion that is none yet."""
     nowhere = Mode(0, 0, 0, 0, 0)
-    return _closed(IMPOSSIBLE, numbers, nowhere, u, tau, math.inf, NOWHERE, _NO_COEFFICIENTS, (0.0, 0.0), 0.0)
+    return closed(IMPOSSIBLE, numbers, nowhere, u, tau, math.inf, NOWHERE, NO_COEFFICIENTS, (0.0, 0.0), 0.0)
 
 
 def is_step(motion: Motion) -> bool:
@@ -114,173 +83,28 @@ def is_step(motion: Motion) -> bool:
         motion.kind == WARMING)
 
 
-def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
-          limit: float, accuracy: float) -> Motion:
-    """Return the motion from y at t0 [s]: exact, or one step of at most `limit` [s] that is accurate enough [rad]."""
-    still = at_rest(mode.contact) and (
-        (mode.mesh != INSIDE and not elastic.present(numbers.elastic)) or at_rest(mode.motor))
-    on, behind = dependence(numbers, mode, u, still), source.present(numbers.source)
-    if still and not on & ON_HEAT and (not on & ON_I or constant_current(mode.zone)):
-        return _closed(REST, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
-    if on & ~BY_SHARE == TWO_BODIES and behind and not not_constant(tau):
-        output_rate, output_pull, motor_rate, motor_pull = apart_coefficients(numbers, mode, u.value, tau.value)
-        laws = (output_rate, output_pull, motor_rate, motor_pull, 0.0, 0.0, 0.0, 0.0, 0.0)
-        return _closed(APART, numbers, mode, u, tau, t0, y, laws, (0.0, 0.0), step)
-    if two_mass_series.linear(numbers, on, u, tau):
-        return _pair(numbers, mode, u, tau, t0, y, step, limit)
-    if heat.present(numbers.heat) and behind and not on & ~_WITH_HEAT and not not_constant(tau) and not elastic.present(
-            numbers.elastic) and not (on & FADING and creeping(numbers, mode, y)):
-        m = _warming(numbers, mode, u, tau, t0, y, step, limit, accuracy)
-        if m.kind == WARMING:
-            return m
-    if on & (ON_HEAT | CURVED_W | TWO_BODIES) or (behind and (on & CURVED_Q or (on & ON_I and on & ON_Q))):
-        return _long_step(numbers, mode, u, tau, t0, y, step, limit, accuracy)
-    if on & FADING:
-        steady = not (on & (ON_Q | ON_I | CURVED_T) or not_constant(tau))
-        if not steady or stribeck.creeps(numbers, mode, u.value, tau.value, y):
-            if steady:
-                m = _creep(numbers, mode, u, tau, t0, y, step, limit, accuracy)
-                if m.kind == CREEP:
-                    return m
-            return _long_step(numbers, mode, u, tau, t0, y, step, limit, accuracy)
-    if on & ON_I and still and mode.zone >= CONDUCTING:
-        rate, final = fading_coefficients(numbers, mode, u.value)
-        return _closed(HELD, numbers, mode, u, tau, t0, y, (rate, final, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0),
-                       step)
-    if on & (CURVED_Q | STEEP_W | CURVED_T) or (on & ON_I and (still or (not behind and on & ON_Q))):
-        return _integrated(numbers, mode, u, tau, t0, y, step, limit, accuracy)
-    follows = in_linear_zone(mode.zone)
-    wave = (u.value + u.slope * (t0 - u.start), u.slope, 0.0, 0.0, 0.0)
-    if follows:
-        wave = (wave[0], u.slope, u.amplitude, u.frequency, u.phase + u.frequency * (t0 - u.start))
-    torque = (tau.value + tau.slope * (t0 - tau.start), tau.slope)
-    if on & ON_I and not constant_current(mode.zone):
-        against = against_of(numbers, mode, y.w, torque)
-        coefficients = speed_coefficients(numbers, mode, wave, against, y.w, y.i)
-        return _closed(WITH_CURRENT, numbers, mode, u, tau, t0, y, coefficients, against, step)
-    coefficients = linear_coefficients(numbers, mode, wave, torque, y.q, y.w)
-    _, c, _, f1, fs, _, _, _, _ = coefficients
-    kind = FIRST_ORDER if c == 0.0 and f1 == 0.0 and fs == 0.0 else SECOND_ORDER
-    return _closed(kind, numbers, mode, u, tau, t0, y, coefficients, (0.0, 0.0), step)
-
-
-def dependence(numbers: Numbers, mode: Mode, u: Piece, still: bool) -> int:
-    """Return on what the acceleration depends in a mode, as the terms have it; `still` where nothing moves."""
-    alone = mode.mesh == INSIDE or elastic.geared(numbers.elastic)  # it is the motor that moves against the gear
-    return (motor.depends(numbers.motor) | heat.depends(numbers.heat) | load.depends(numbers.load)
-            | friction.depends(numbers.friction, mode.motor if alone else mode.contact)
-            | play.depends(mode.mesh, still)
-            | elastic.depends(numbers.elastic, still) | sensor.depends(numbers.sensor, numbers.source)
-            | follower.depends(mode.zone, u))
-
-
-def may_depend(numbers: Numbers, u: Piece) -> int:
-    """Return on what the acceleration may depend while a servo moves, whichever way it slides and wherever it is."""
-    forward, backward = (CORE, CORE) if friction.smoothed(numbers.friction) else (FORWARD, BACKWARD)
-    mesh = INSIDE if play.present(numbers.play) else RIGID
-    return (dependence(numbers, Mode(LINEAR, forward, mesh, FREE, 0), u, False)
-            | dependence(numbers, Mode(CURRENT_FORWARD, forward, mesh, FREE, 0), u, False)
-            | dependence(numbers, Mode(CURRENT_BACKWARD, backward, mesh, FREE, 0), u, False)
-            | dependence(numbers, Mode(NO_CURRENT, backward, mesh, FREE, 0), u, False))
-
-
-def _closed(kind: int, numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector,
-            coefficients: tuple[float, ...], against: tuple[float, ...], step: float) -> Motion:
-    return Motion(kind, numbers, mode, u, tau, t0, y, math.inf, coefficients, against, y, step, -1, False, _NO_STAGES,
-                  _NO_DENSE, _NO_LONG_DENSE)
+def closed(kind: int, numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector,
+           coefficients: tuple[float, ...], against: tuple[float, ...], step: float) -> Motion:
+    """Return a motion without an end, by its coefficients."""
+    return Motion(kind, numbers, mode, u, tau, t0, y, math.inf, coefficients, against, y, step, -1, False, NO_STAGES,
+                  NO_DENSE, NO_LONG_DENSE)
 
 
 def by_series(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, length: float,
               speed: tuple[float, ...], current: tuple[float, ...]) -> Motion:
     """Return a motion whose speed and current are given as powers of time."""
-    return Motion(SERIES, numbers, mode, u, tau, t0, y, length, speed, current, y, 0.0, -1, False, _NO_STAGES,
-                  _NO_DENSE, _NO_LONG_DENSE)
+    return Motion(SERIES, numbers, mode, u, tau, t0, y, length, speed, current, y, 0.0, -1, False, NO_STAGES,
+                  NO_DENSE, NO_LONG_DENSE)
 
 
 def by_step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, length: float,
             dense: tuple[Vector, ...], end: Vector) -> Motion:
     """Return a motion whose dense output is given."""
-    return Motion(LONG_STEP, numbers, mode, u, tau, t0, y, length, _NO_COEFFICIENTS, (0.0, 0.0), end, 0.0, -1, True,
-                  _NO_STAGES, _NO_DENSE, dense)
+    return Motion(LONG_STEP, numbers, mode, u, tau, t0, y, length, NO_COEFFICIENTS, (0.0, 0.0), end, 0.0, -1, True,
+                  NO_STAGES, NO_DENSE, dense)
 
 
-def _integrated(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
-                limit: float, accuracy: float) -> Motion:
-    jac = jacobian(numbers, mode, piece_value(u, t0), piece_rate(u, t0), piece_rate(tau, t0), y.q, y.w)
-    h = min(step, limit)
-    h = min(h, period(u, tau, t0, t0 + h) / 6.0)
-    for _ in range(60):
-        y1, error, stages = rodas.step(numbers, mode, u, tau, jac, t0, y, h)
-        size = max(abs(error[0]) / (1.0 + abs(y1.q)), abs(error[1]) / (1.0 + abs(y1.w)),
-                   abs(error[2]) / (1.0 + abs(y1.i))) / (_TOLERANCE * accuracy)
-        if not size < 1e6:
-            size = 1e6
-        factor = min(5.0, max(0.1, 0.85 * size**-0.2)) if size > 0.0 else 5.0
-        if size <= 1.0:
-            return Motion(STEP, numbers, mode, u, tau, t0, y, h, _NO_COEFFICIENTS, (0.0, 0.0), y1, h * factor, -1,
-                          False,
-                          stages, _NO_DENSE, _NO_LONG_DENSE)
-        h *= factor
-        if t0 + h == t0:
-            break
-    return _closed(IMPOSSIBLE, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
-
-
-def _long_step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
-               limit: float, accuracy: float) -> Motion:
-    most = min(limit, stribeck.longest_step(numbers, mode, piece_value(u, t0), piece_value(tau, t0), y))
-    h = min(step, most)
-    h = min(h, period(u, tau, t0, t0 + h) / 3.0)
-    if elastic.present(numbers.elastic):
-        h = min(h, elastic.longest_step(numbers.elastic, numbers.shaft))
-    for _ in range(60):
-        y1, error = dormand_prince.step(numbers, mode, u, tau, t0, y, h)
-        size = error / (FINE * accuracy)
-        if not size < 1e12:
-            size = 1e12
-        factor = min(6.0, max(0.15, 0.9 * size**-0.125)) if size > 0.0 else 6.0
-        part = stribeck.part_before(numbers, mode, y, y1) if size <= 1.0 else factor
-        if part == 1.0:
-            following = max(step, h * factor) if h == most else h * factor  # a step that was cut short tells little
-            return Motion(LONG_STEP, numbers, mode, u, tau, t0, y, h, _NO_COEFFICIENTS, (0.0, 0.0), y1, following,
-                          -1, False, _NO_STAGES, _NO_DENSE, _NO_LONG_DENSE)
-        h *= part
-        most = h if size <= 1.0 else most
-        if t0 + h == t0:
-            break
-    return _closed(IMPOSSIBLE, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
-
-
-def _creep(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float, limit: float,
-           accuracy: float) -> Motion:
-    """Return a creep, or a motion that is none where its end cannot be told."""
-    time, q, w, ends_by, done = stribeck.creep(numbers, mode, u.value, tau.value, y, limit, FINE * accuracy)
-    none = _closed(IMPOSSIBLE, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
-    if done == 0.0 or (t0 + time == t0 and ends_by < 0):
-        return none
-    tolerance = (FINE * accuracy, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    return Motion(CREEP, numbers, mode, u, tau, t0, y, time, tolerance, (0.0, 0.0),
-                  _moved(none, q, w, 0.0), step, ends_by, True, _NO_STAGES, _NO_DENSE, _NO_LONG_DENSE)
-
-
-def _warming(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float, limit: float,
-             accuracy: float) -> Motion:
-    """Return a step of a servo that warms up, or a motion that is none where its rates are not apart."""
-    law = warm_linear.law_of(numbers, mode, u.value, tau.value, y)
-    none = _closed(IMPOSSIBLE, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
-    if not warm_linear.suits(law):
-        return none
-    h, found = warm_linear.follow(law, numbers.heat, y, limit, FINE * accuracy)
-    if t0 + h == t0:
-        return none
-    output = _output_apart(numbers, mode, u, tau)
-    end = warm_linear.state(numbers, mode, y, output, found.dense, h, h)
-    following = min(step, 0.2 / law.fast) if law.fast > 0.0 else step
-    return Motion(WARMING, numbers, mode, u, tau, t0, y, h, _NO_COEFFICIENTS, output, end, following, -1, True,
-                  _NO_STAGES, _NO_DENSE, found.dense)
-
-
-def _output_apart(numbers: Numbers, mode: Mode, u: Piece, tau: Piece) -> tuple[float, float]:
+def output_apart(numbers: Numbers, mode: Mode, u: Piece, tau: Piece) -> tuple[float, float]:
     """Return the law of an output that moves apart from the motor, (λ, f)."""
     if mode.mesh != INSIDE:
         return 0.0, 0.0
@@ -294,18 +118,6 @@ def _warm_step(motion: Motion, s: float) -> warm_linear.Step:
     return warm_linear.step(law, motion.numbers.heat, motion.start, s)
 
 
-def _pair(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
-          limit: float) -> Motion:
-    """Return the series of two bodies, as long as it holds."""
-    law = two_mass_series.law(numbers, mode, u.value, tau.value)
-    h = min(limit, two_mass_series.longest(law), elastic.longest_step(numbers.elastic, numbers.shaft))
-    return Motion(PAIR, numbers, mode, u, tau, t0, y, h, _NO_COEFFICIENTS, (0.0, 0.0), two_mass_series.propagate(law,
-                                                                                                                 y,
-                                                                                                                 h),
-                                                                                                                 step,
-                  -1, True, _NO_STAGES, _NO_DENSE, law)
-
-
 def prepared(motion: Motion) -> Motion:
     """Return the motion ready to be evaluated between the ends of a step."""
     if motion.has_dense or not is_step(motion):
@@ -314,7 +126,7 @@ def prepared(motion: Motion) -> Motion:
     if motion.kind == WARMING:
         found = _warm_step(motion, motion.length)
         long_dense = found.dense
-        against = _output_apart(motion.numbers, motion.mode, motion.u, motion.tau)
+        against = output_apart(motion.numbers, motion.mode, motion.u, motion.tau)
     elif motion.kind == STEP:
         dense = rodas.dense_coefficients(motion.stages)
     elif motion.kind == LONG_STEP:
@@ -333,20 +145,20 @@ def state(motion: Motion, s: float) -> Vector:
     if kind == FIRST_ORDER:
         c = motion.coefficients
         q, w = first_order.propagate(2.0 * c[0], c[2], c[7], c[8], s)
-        return _moved(motion, q, w, start.i)
+        return moved(motion, q, w, start.i)
     if kind == SECOND_ORDER:
         q, w = second_order.propagate(motion.coefficients, s)
-        return _moved(motion, q, w, start.i)
+        return moved(motion, q, w, start.i)
     if kind == APART:
         c = motion.coefficients
         return both(Course(c[0], c[1], start.q, start.w), Course(c[2], c[3], start.q_m, start.w_m), start, s)
     if kind == WITH_CURRENT:
         w, dw, way = second_order.propagate_with_integral(motion.coefficients, s)
         against = motion.against[0] + motion.against[1] * s
-        return _moved(motion, start.q + way, w, current_of(motion.numbers, motion.mode, dw, w, against))
+        return moved(motion, start.q + way, w, current_of(motion.numbers, motion.mode, dw, w, against))
     if kind == HELD:
         rate, final = motion.coefficients[0], motion.coefficients[1]
-        return _moved(motion, start.q, start.w, start.i + (start.i - final) * math.expm1(-rate * s))
+        return moved(motion, start.q, start.w, start.i + (start.i - final) * math.expm1(-rate * s))
     if kind == SERIES:
         q = w = i = 0.0
         for n in range(len(motion.coefficients) - 1, -1, -1):
@@ -354,7 +166,7 @@ def state(motion: Motion, s: float) -> Vector:
             q = q * s + motion.coefficients[n] / (n + 1)
         for n in range(len(motion.against) - 1, -1, -1):
             i = i * s + motion.against[n]
-        return _moved(motion, start.q + q * s, w, i)
+        return moved(motion, start.q + q * s, w, i)
     if motion.t0 + s >= motion.t0 + motion.length:  # the end, reached as a difference of two times
         return motion.end
     if s == 0.0:
@@ -367,7 +179,7 @@ def state(motion: Motion, s: float) -> Vector:
     if kind == CREEP:
         q, w = stribeck.at_time(motion.numbers, motion.mode, motion.u.value, motion.tau.value, start, motion.end,
                                 motion.coefficients[0], s)
-        return _moved(motion, q, w, start.i)
+        return moved(motion, q, w, start.i)
     x = s / motion.length
     if kind == STEP:
         return rodas.interpolate(start, motion.end, motion.dense, x)
@@ -385,7 +197,7 @@ def ended(motion: Motion, s: float) -> Vector:
                              found.dense, s, s)
 
 
-def _moved(motion: Motion, q: float, w: float, i: float) -> Vector:
+def moved(motion: Motion, q: float, w: float, i: float) -> Vector:
     """Return the state of one body, at rest inside the play the motor's own."""
     y, mesh = motion.start, motion.mode.mesh
     if mesh == INSIDE or elastic.present(motion.numbers.elastic):
@@ -426,7 +238,7 @@ def state_and_rates(motion: Motion, s: float) -> tuple[Vector, Vector]:
         w, dw, way = second_order.propagate_with_integral(motion.coefficients, s)
         ddw = second_order.acceleration(motion.coefficients, s, w, dw)
         i = current_of(numbers, motion.mode, dw, w, against[0] + against[1] * s)
-        y = _moved(motion, motion.start.q + way, w, i)
+        y = moved(motion, motion.start.q + way, w, i)
         return y, Vector(w, dw, current_of(numbers, motion.mode, ddw, dw, against[1]), 0.0, 0.0, y.w_m, dw)
     y = state(motion, s)
     return y, rates(motion, s, y)
