@@ -34,7 +34,7 @@ _COMES_UP: dict[str, tuple[int, ...]] = {
     "LIMITED_FORWARD": (REGULATED,), "LIMITED_BACKWARD": (REGULATED,), "SHORT_FORWARD": (REGULATED,),
     "SHORT_BACKWARD": (REGULATED,),
     "WITH_CURRENT": (ON_I,), "HELD": (ON_I,), "CREEP": (FADING,), "APART": (PLAY,), "PAIR": (SPRING,),
-    "WARMING": (ON_HEAT,),
+    "WARMING": (ON_HEAT | ON_I,),
     "SERIES": (),  # of servos on a bus, where they are looked at afterwards
     "STEP": (STEEP_W, CURVED_Q, CURVED_T, ON_I),
     "LONG_STEP": (ON_HEAT, CURVED_W, CURVED_Q, FADING, SPRING, ON_I | ON_Q, *(

@@ -77,7 +77,7 @@ from servotwin.models.terms.dependence import (
 from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
 
-_WITH_HEAT = ON_HEAT | ON_I | BY_SHARE | TWO_BODIES | FADING  # what a servo that is followed as it warms may ask for
+_WITH_HEAT = ON_HEAT | ON_I | BY_SHARE | TWO_BODIES | FADING  # what may be asked of a step beside the straight law
 _TOLERANCE = 0.3  # error of one implicit step, relative to 1 + |state|: a part of the accuracy asked for
 
 
@@ -95,8 +95,10 @@ def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vect
         return closed(APART, numbers, mode, u, tau, t0, y, laws, (0.0, 0.0), step)
     if two_mass_series.linear(numbers, on, u, tau):
         return _pair(numbers, mode, u, tau, t0, y, step, limit)
-    if heat.present(numbers.heat) and behind and not on & ~_WITH_HEAT and not not_constant(tau) and not elastic.present(
-            numbers.elastic) and not (on & FADING and creeping(numbers, mode, y)):
+    # Without inductance nothing is stiff: explicit steps are as long, and longer where a small winding warms fast
+    if (heat.present(numbers.heat) and motor.inductive(numbers.motor) and behind and not on & ~_WITH_HEAT
+            and not not_constant(tau) and not elastic.present(numbers.elastic)
+            and not (on & FADING and creeping(numbers, mode, y))):
         m = _warming(numbers, mode, u, tau, t0, y, step, limit, accuracy)
         if m.kind == WARMING:
             return m

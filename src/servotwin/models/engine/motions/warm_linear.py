@@ -170,7 +170,7 @@ def _rough(c: float, heats: float, warms: float, i: float, F: float) -> Rough:
 
 def suits(law: Law) -> bool:
     """Tell whether a law can be followed: where both move, their rates have to be apart."""
-    return law.L == 0.0 or law.per_ampere == 0.0 or law.apart > 0.0
+    return law.per_ampere == 0.0 or law.apart > 0.0
 
 
 def length(law: Law, heat: Heat, y: Vector, limit: float, tolerance: float) -> float:
