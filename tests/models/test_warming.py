@@ -13,7 +13,7 @@ from servotwin.models.engine.dynamics import coefficients
 from servotwin.models.engine.dynamics.rates import rates_of
 from servotwin.models.engine.events import guards
 from servotwin.models.engine.legs import legs
-from servotwin.models.engine.motions import warm_exponential, warm_linear
+from servotwin.models.engine.motions import warm_exponential, warm_law, warm_linear
 from servotwin.models.state.modes import (
     BACKWARD,
     CONDUCTING,
@@ -106,7 +106,7 @@ def test_a_step_of_shaft_and_current_follows_the_law(servo, name, tolerance, off
     want = followed(numbers, mode, u, y, 0.012)
     left = 0.012
     for _ in range(60):
-        law = warm_linear.law_of(numbers, mode, u, TORQUE, y)
+        law = warm_law.law_of(numbers, mode, u, TORQUE, y)
         h, found = warm_linear.follow(law, numbers.heat, y, left, tolerance)
         assert 0.0 < h <= left
         assert found.error <= tolerance * (1.0 + abs(y.w_m))
@@ -123,7 +123,7 @@ def test_a_step_without_inductance_is_the_limit_of_a_small_one(servo):
     ends = []
     for kind, L in ((st.PulseServo, 1e-9), (st.PulseServoInductive, 1e-9), (st.PulseServoInductive, 1e-7)):
         numbers = numbers_of(servo, kind, **{"motor.armature_inductance": L})
-        law = warm_linear.law_of(numbers, mode, 6.0, TORQUE, y)
+        law = warm_law.law_of(numbers, mode, 6.0, TORQUE, y)
         ends.append(warm_linear.state(numbers, mode, y, (0.0, 0.0), warm_linear.step(law, numbers.heat, y, 5e-3).dense,
                                       5e-3,
                                       5e-3).w)

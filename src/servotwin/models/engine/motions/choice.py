@@ -16,6 +16,7 @@ from servotwin.models.engine.motions import (
     rodas,
     stribeck,
     two_mass_series,
+    warm_law,
     warm_linear,
 )
 from servotwin.models.engine.motions.motion import (
@@ -214,9 +215,9 @@ def _creep(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vec
 def _warming(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float, limit: float,
              accuracy: float) -> Motion:
     """Return a step of a servo that warms up, or a motion that is none where its rates are not apart."""
-    law = warm_linear.law_of(numbers, mode, u.value, tau.value, y)
+    law = warm_law.law_of(numbers, mode, u.value, tau.value, y)
     none = closed(IMPOSSIBLE, numbers, mode, u, tau, t0, y, NO_COEFFICIENTS, (0.0, 0.0), step)
-    if not warm_linear.suits(law):
+    if not warm_law.suits(law):
         return none
     h, found = warm_linear.follow(law, numbers.heat, y, limit, FINE * accuracy)
     if t0 + h == t0:
