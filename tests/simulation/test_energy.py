@@ -52,3 +52,13 @@ def test_a_rotor_without_inertia_is_the_limit_of_light_ones(kind):
 def test_energy_ends_where_speed_does_not_tell_the_current(kind, resistance):
     result = st.simulate(kind(SERVO.replace({"motor.armature_resistance": resistance})), STEP, duration=0.2)
     assert result.energy.friction > 0.0
+
+
+@pytest.mark.parametrize("inductance", [3e-7, 2e-6, 1.6e-4, 5e-3])
+def test_energy_balances_while_a_winding_warms(inductance):
+    """However fast the current fades within a step that follows the warming."""
+    heat = {"thermal.winding_capacity": 20.0, "thermal.housing_capacity": 5.0, "thermal.winding_to_housing": 10.0,
+            "thermal.housing_to_ambient": 3.0, "thermal.magnet_coefficient": -1e-3}
+    model = st.PulseServoInductive(SERVO.replace(heat | {"motor.armature_inductance": inductance}))
+    energy = st.simulate(model, STEP, load=st.loads.Inertia(1e-3), duration=0.3).energy
+    assert abs(energy.residual) <= 1e-11 * energy.supply

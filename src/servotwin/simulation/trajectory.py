@@ -21,6 +21,7 @@ _LATE = 1e-12  # of an instant
 _AT_ONCE = 1000  # segments
 _GRADES = 0.25 ** np.arange(1.0, 4.0)  # of an interval that ends at rest
 _SETTLING, _FADING = 4.0, 3.0  # times in which a creep settles, or friction fades, that an interval may last
+_NOTHING, _TIMES = 1e-15, 3.0  # A, what is left of a current; of 1/rate: an interval in which it fades
 _SHORTEST = 1e-307  # s: what is over in less has no time of its own
 
 
@@ -134,8 +135,15 @@ class Trajectory:
 
 
 def _scales(m: motion.Motion) -> tuple[float, float]:
-    """Return `motion.scales`; of a creep, which may be long, the time in which its speed would change at most."""
+    """Return `motion.scales`; of a creep, which may be long, the time in which its speed would change at most.
+
+    Of a step of a servo that warms up, those of the current that fades, as long as anything is left of it.
+    """
     fine, settled = motion.scales(m)
+    if m.kind == motion.WARMING:
+        *_, of, by = motion.prepared(m).long_dense
+        fast, left = of.w, abs(by.q_m) / _NOTHING
+        return (_TIMES / fast, math.log(left) / fast) if fast > 0.0 and left > 1.0 else (fine, settled)
     if m.kind != motion.CREEP:
         return fine, settled
     most = max(abs(motion.rates(m, 0.0, m.start).w), abs(motion.rates(m, m.length, m.end).w))
