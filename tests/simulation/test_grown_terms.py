@@ -87,8 +87,10 @@ FORMS = {  # of servos that resist between drives: what they have anyway, by the
     "by_bands_and_creep": ("pulse", {"friction.breakaway_ratio": 1.4, "friction.stribeck_speed": 5.0}),
     "by_strides_in_bands": ("pulse", HEATS | {"friction.load_friction": 0.05}),
     "by_coils": ("inductive", {"motor.armature_inductance": 5e-4}), "by_strides": ("pulse", HEATS),
-    "by_gaps": ("pulse", PLAYS), "plain_runs": ("pulse", {"potentiometer.quantisation": 1e-3}),
-    "runs": ("pulse", PLAYS | HEATS)}
+    "by_coils_and_shares": ("inductive", {"motor.armature_inductance": 5e-4, "friction.load_friction": 0.05}),
+    "by_gaps": ("pulse", PLAYS), "by_gaps_and_heat": ("pulse", PLAYS | HEATS),
+    "plain_runs": ("pulse", {"potentiometer.quantisation": 1e-3}),
+    "runs": ("inductive", HEATS | {"motor.armature_inductance": 5e-4})}
 # A number in each room, and of friction one of which `depends` says nothing
 NUMBERS = {
     FRICTION: [("    K_eq: float\n", "    K_eq: float\n    new: float = 0.0\n"),

@@ -305,8 +305,9 @@ def set_numbers(lanes: Lanes, form: int, first: int, size: int, tile: Any, place
     for j in range(size):
         put_arc_numbers(tile.arc, place + j, linear_segments.arc_numbers(numbers_of(lanes, first + j),
                                                                          lanes.torque[first + j]))
-        put_chip(tile.chip, place + j, chip_of(lanes, first + j))
-        tile.clock.period[place + j] = tile.chip.frame_period[place + j]
+        chip = chip_of(lanes, first + j)
+        put_chip(tile.chip, place + j, chip)
+        tile.clock.period[place + j] = chip.frame_period
     for j in range(size):
         numbers = numbers_of(lanes, first + j)
         path, motor, source, sensor = numbers.bridge, numbers.motor, numbers.source, numbers.sensor
