@@ -1,8 +1,9 @@
 """Angles are as accurate as asked: servos with every term at once, at three accuracies, against the reference.
 
-Measured over 200 servos by `python -m validation.test_drivetrain_accuracy` in tests/: at least 98.5 % below. Of the
-three others two have an output that goes to and fro between motor and stop, where the reference's rounding takes 12 ns
-until both stand, and one is as far from the reference, 6e-11 rad, as that is from itself with shorter steps.
+Measured over 200 servos by `python -m validation.test_drivetrain_accuracy` in tests/: all are below 1e-7, 99.5 % below
+1e-9, and 97 % below 1e-11. Of the six others two have an output that goes to and fro between motor and stop, where the
+reference's rounding takes 12 ns until both stand, and one is as far from the reference, 6e-11 rad, as that is from
+itself with shorter steps; what an explicit step interpolates at an event within it leaves 2e-11 rad in two.
 """
 
 import sys
@@ -18,7 +19,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::UserWarning"
 
 EVERY = TERMS - {"m3", "m4", "m5"}  # of the friction laws the one that holds the others
 ACCURACIES = (1e-7, 1e-9, 1e-11)
-MANY = 30
+MANY = 60
 
 
 def drawn(many: int) -> list[tuple[Case, Trace]]:
@@ -50,7 +51,7 @@ def servos() -> list[tuple[Case, Trace]]:
 @pytest.mark.parametrize("accuracy", ACCURACIES)
 def test_angles_are_as_accurate_as_asked(servos: list[tuple[Case, Trace]], accuracy: float) -> None:
     found = errors(servos, accuracy)
-    assert np.mean(found < accuracy) >= 0.96  # one of 30
+    assert np.mean(found < accuracy) >= 0.96  # two of 60
     assert np.median(found) < 0.01 * accuracy  # the median servo is far better than asked
 
 
