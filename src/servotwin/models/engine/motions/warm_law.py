@@ -114,5 +114,5 @@ def _rough(c: float, heats: float, warms: float, i: float, F: float) -> Rough:
 
 
 def suits(law: Law) -> bool:
-    """Tell whether a law can be followed: where both move, their rates have to be apart."""
+    """Tell whether a law can be followed: the rates of a shaft and a current that both move have to be apart."""
     return law.per_ampere == 0.0 or law.apart > 0.0
