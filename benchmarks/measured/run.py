@@ -1,7 +1,8 @@
 """Fits to measured servos: errors on runs that were not fitted, beside simpler models, and what each physics earns.
 
 Needs the measurements, which are not part of the repository: give their folder, or have it at ../shared/data.
-    python benchmarks/measured/run.py [--data FOLDER] [miuzei] [bam] [xl330] [maccepa] [ladder [RUNS [SECONDS]]]
+    python benchmarks/measured/run.py [--data FOLDER] [miuzei] [bam] [xl330] [maccepa] [feetech]
+                                        [ladder [RUNS [SECONDS]]]
 The ladder of friction laws takes far longer than the others, and only runs where it is named.
 """
 
@@ -9,12 +10,14 @@ import sys
 from pathlib import Path
 
 import bam
+import feetech
 import ladder
 import maccepa
 import miuzei
 import xl330
 
-USUAL = {"miuzei": miuzei.main, "bam": bam.main, "xl330": xl330.main, "maccepa": maccepa.main}
+USUAL = {"miuzei": miuzei.main, "bam": bam.main, "xl330": xl330.main, "maccepa": maccepa.main,
+         "feetech": feetech.main}
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
 
 

@@ -1,6 +1,7 @@
 """The friction laws one after the other: the simplest that predicts, and what happens beyond."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from servotwin.identification.fitting.ladder import Rung, _choice, _told
 FREE = ["motor.armature_resistance", "output_inertia", "electronics.stretcher_gain"]
 PLAIN = {"starts": 1, "priors": None, "nuisance": ("delay", "angle_offset", "initial_state")}
 LOADED = TRUTH.replace({"friction.load_friction": 0.35})
+SOFT = TRUTH.replace({"supply.internal_resistance": 0.8})
 
 
 def logs(servo, std=1e-3, count=12, noise=0, duration=1.0):
@@ -33,6 +35,11 @@ def plain():
 
 
 @pytest.fixture(scope="module")
+def soft():
+    return friction_ladder(logs(SOFT), TRUTH, free=FREE, rungs=("M1", "M3"), soft_supply=True, **PLAIN)
+
+
+@pytest.fixture(scope="module")
 def loaded():
     return friction_ladder(logs(LOADED), TRUTH, free=FREE, rungs=("M1", "M3"), **PLAIN)
 
@@ -49,6 +56,30 @@ def test_load_friction_is_found_where_there_is_some(loaded):
     interval = loaded["M3"].fit.intervals()["friction.load_friction"]
     assert interval.lower < 0.35 < interval.upper or abs(
         loaded["M3"].fit.estimates["friction.load_friction"] - 0.35) < 0.02
+
+
+def test_a_supply_that_gives_way_is_found_on_the_best_law(soft):
+    """Stands behind its law, and is searched where the law is chosen; the reason says what it gains, and where."""
+    names = [rung.name for rung in soft.rungs]
+    assert soft.chosen in ("M1, soft supply", "M3, soft supply")
+    assert names.index(soft.chosen) == names.index(soft.chosen[:2]) + 1
+    assert soft["M1"].holdout > 1.3 * soft[soft.chosen].holdout
+    assert soft.fit.estimates["supply.internal_resistance"] == pytest.approx(0.8, rel=0.1)
+    assert "% less off than M" in soft.reason
+    assert "held out" in soft.reason
+
+
+def test_a_supply_is_tried_only_where_nobody_knows_it():
+    from servotwin.identification.fitting.ladder import may_give_way
+
+    model, some = st.PulseServo(TRUTH), logs(TRUTH, count=2)
+    assert may_give_way(model, some, FREE)
+    assert not may_give_way(st.BoundedServo(TRUTH), some, FREE)
+    assert not may_give_way(model, some, [*FREE, "supply.internal_resistance"])
+    known = replace(some[0], parameters={"supply.internal_resistance": 0.1})
+    seen = replace(some[0], measured={**some[0].measured, "bus_voltage": np.full(len(some[0].time), 6.0)})
+    assert not may_give_way(model, [some[1], known], FREE)
+    assert not may_give_way(model, [some[1], seen], FREE)
 
 
 @pytest.mark.slow
@@ -88,7 +119,7 @@ def test_errors_are_those_of_the_fits(plain):
 def test_all_rungs_on_few_logs():
     """Six laws on four short logs: each begins where a simpler one ended, and the noise is all that is left to fit."""
     ladder = friction_ladder(logs(LOADED, count=6, duration=0.6), TRUTH, free=FREE, intervals=False,
-                             holdout=["4", "5"], **PLAIN)
+                             holdout=["4", "5"], soft_supply=False, **PLAIN)
     assert [rung.name for rung in ladder.rungs] == list(RUNGS)
     for rung in ladder.rungs:
         assert set(rung.fit.names) == {*FREE, *RUNGS[rung.name], "delay", "angle_offset"}

@@ -1,7 +1,8 @@
 """The friction laws M1 to M6 one after the other on the same logs, and which of them the data pay for.
 
 Each rung begins where a simpler one ended. More terms always fit the logs that are fitted at least as well; whether
-they predict others better is what decides.
+they predict others better is what decides. A supply that gives way bends speeds and torques as friction does, so the
+law that was chosen is fitted once more with one; where that is chosen, so are the richer laws on it.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from servotwin.errors import InputError
 from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.fit import Fit
 from servotwin.identification.fitting.free import nominal
+from servotwin.identification.fitting.gains import gained
 from servotwin.identification.fitting.holdout import LogError, pooled
 from servotwin.identification.fitting.identify import identify
 from servotwin.logs.log import Log
@@ -47,6 +49,10 @@ _FIRST = {  # where a term begins that the rung before does not have: little of 
     "friction.load_friction_motor_quad": 0.01, "friction.load_friction_external_quad": 0.01,
 }
 _ALIKE = {"friction.load_friction": _DIRECTED, "friction.load_friction_stribeck": _DIRECTED_STRIBECK}
+SUPPLY = "supply.internal_resistance"
+SOFT = ", soft supply"
+"""What the name of a rung with a supply that gives way ends with."""
+_SOFT_SHARE = 0.05  # of the armature's resistance, where that of the supply begins
 _FEWEST = 3  # held out logs, whose scatter is believed
 _STRIBECK_SPEED = 0.2  # rad/s at the output, where Stribeck friction begins to fade
 
@@ -116,7 +122,8 @@ class Ladder:
 
 def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] | None = None,
                     free: Sequence[str] | None = None, *, rungs: Sequence[str] = tuple(RUNGS),
-                    select: str = "holdout", progress: Any = False, **options: Any) -> Ladder:
+                    select: str = "holdout", soft_supply: bool | None = None, progress: Any = False,
+                    **options: Any) -> Ladder:
     """Fit friction laws of growing complexity, and choose one.
 
     Parameters
@@ -133,6 +140,10 @@ def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] | None
     select : {"holdout", "criterion"}
         "holdout": the simplest law whose error on the logs that were held out is within one standard error of the
         smallest; "criterion": the smallest information criterion. Without held out logs it is the latter.
+    soft_supply : bool, optional
+        Whether the law that is chosen is fitted once more with an internal resistance of the supply, and where that is
+        chosen the richer laws too: "M4, soft supply". Unless given, where all laws are tried, the model reads one and
+        neither logs nor `free` know of it already.
     progress : bool or callable
         As of `identify`, over all rungs.
     **options
@@ -153,21 +164,58 @@ def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] | None
     plain = checks.checked_servo(servo, model)
     others = [name for name in (free or checks.usual_free(plain, given))
               if name not in _TERMS and name not in _BASE and not name.startswith("friction.")]
-    options = {"compare_with": (), **options, "diagnose": False}  # the ladder is the trial
-    found: list[Rung] = []
+    climb = _Climb(given, servo, type(plain), others, {"compare_with": (), **options, "diagnose": False}, [])
     ordered = [name for name in RUNGS if name in rungs]
+    soft = (len(ordered) == len(RUNGS) and may_give_way(plain, given, others)) if soft_supply is None else soft_supply
     with checks.shown(progress) as show:
-        for k, name in enumerate(ordered):
-            start = _start(servo, name, found)
-            more = dict(options)
-            if found:
-                more["starts"] = 1  # it begins at what a simpler law found
-            fit = identify(given, start, type(plain), [*others, *RUNGS[name]],
-                           progress=_share(show, k, len(ordered), name), **more)
-            found.append(rung_of(name, fit))
-            if fit.interrupted:
-                break
-    return ladder_of(found, select)
+        count = len(ordered) + soft
+        ended = all(climb.fitted(name, _share(show, k, count, name)) for k, name in enumerate(ordered))
+        if ended and soft:
+            best = _choice(sorted(climb.found, key=_place), select)[0]
+            if climb.fitted(best + SOFT, _share(show, count - 1, count, best + SOFT)) and (
+                    _choice(climb.found, select)[0].endswith(SOFT)):
+                for name in ordered[ordered.index(best) + 1:]:
+                    if not climb.fitted(name + SOFT, _share(show, count - 1, count, name + SOFT)):
+                        break
+    return ladder_of(sorted(climb.found, key=_place), select)
+
+
+def _place(rung: Rung) -> tuple[int, bool]:
+    """Return where a rung stands: a law with a supply that gives way stands behind the law."""
+    return list(RUNGS).index(rung.name.removesuffix(SOFT)), rung.name.endswith(SOFT)
+
+
+class _Climb(NamedTuple):
+    """What all rungs have in common, and those that were fitted."""
+
+    logs: Sequence[Log]
+    servo: Servo
+    kind: type[Model]
+    others: Sequence[str]
+    options: dict[str, Any]
+    found: list[Rung]
+
+    def fitted(self, name: str, tell: Any) -> bool:
+        """Fit a rung, and tell whether that came to its end."""
+        law = name.removesuffix(SOFT)
+        more = {**self.options, **({"starts": 1} if self.found else {})}  # it begins at what a simpler law found
+        names = [*self.others, *RUNGS[law], *([SUPPLY] if name != law else [])]
+        fit = identify(self.logs, _start(self.servo, name, self.found), self.kind, names, progress=tell, **more)
+        self.found.append(rung_of(name, fit))
+        return not fit.interrupted
+
+
+def may_give_way(model: Model, logs: Sequence[Log], free: Sequence[str]) -> bool:
+    """Return whether a supply that gives way is worth a trial: the model reads it, and nobody knows how much it does.
+
+    Parameters
+    ----------
+    model : Model
+    logs : sequence of Log
+    free : sequence of str
+    """
+    known = SUPPLY in free or any(SUPPLY in log.parameters or "bus_voltage" in log.measured for log in logs)
+    return not known and SUPPLY in (*model.requires, *model.optional)
 
 
 def ladder_of(rungs: Sequence[Rung], select: str) -> Ladder:
@@ -181,7 +229,18 @@ def ladder_of(rungs: Sequence[Rung], select: str) -> Ladder:
     """
     chosen, reason = _choice(rungs, select)
     told = _told(rungs, select)
+    before = _simpler(rungs, chosen)
+    if before is not None:
+        words = gained(before.fit, next(rung for rung in rungs if rung.name == chosen).fit, before.name)
+        reason += f"; {words}" if words else ""
     return Ladder(tuple(rungs), chosen, reason, told.error, told.choices)
+
+
+def _simpler(rungs: Sequence[Rung], chosen: str) -> Rung | None:
+    """Return the best of the rungs with fewer parameters than the one that is chosen; None where there is none."""
+    own = len(next(rung for rung in rungs if rung.name == chosen).fit.names)
+    fewer = [rung for rung in rungs if len(rung.fit.names) < own]
+    return min(fewer, key=lambda rung: rung.training if math.isnan(rung.holdout) else rung.holdout, default=None)
 
 
 def _share(show: Any, k: int, count: int, name: str) -> Any:
@@ -189,25 +248,33 @@ def _share(show: Any, k: int, count: int, name: str) -> Any:
 
 
 def _start(servo: Servo, name: str, before: Sequence[Rung]) -> Servo:
-    """Return where a rung begins: at the best simpler law that it contains, its further terms small.
+    """Return where a rung begins: at the best simpler one that it contains, its further terms small.
 
     M5 and M6 contain M3 and M4 too: there motor and load outside count alike.
     """
-    alike = {"M5": ("M1", "M2", "M3", "M4", "M5"), "M6": tuple(RUNGS)}.get(name, ())
-    inner = [rung for rung in before if math.isfinite(rung.fit.cost)
-             and (rung.name in alike or set(RUNGS[rung.name]) <= set(RUNGS[name]))]
+    law, soft = name.removesuffix(SOFT), name.endswith(SOFT)
+    alike = {"M5": ("M1", "M2", "M3", "M4", "M5"), "M6": tuple(RUNGS)}.get(law, ())
+
+    def within(rung: Rung) -> bool:
+        other = rung.name.removesuffix(SOFT)
+        inside = other in alike or set(RUNGS[other]) <= set(RUNGS[law])
+        return inside and math.isfinite(rung.fit.cost) and (soft or not rung.name.endswith(SOFT))
+
+    inner = [rung for rung in before if within(rung)]
     base = min(inner, key=lambda rung: rung.training).fit.servo if inner else servo
     values: dict[str, Any] = {}
     for share, both in _ALIKE.items():
-        if base.get(share) is not None and share not in RUNGS[name]:
-            values |= {term: base.get(share) for term in both if term in RUNGS[name]}
-    values |= {term: None for term in _TERMS if base.get(term) is not None and term not in RUNGS[name]}
+        if base.get(share) is not None and share not in RUNGS[law]:
+            values |= {term: base.get(share) for term in both if term in RUNGS[law]}
+    values |= {term: None for term in _TERMS if base.get(term) is not None and term not in RUNGS[law]}
     reduction = float(nominal(servo, "gear.gear_reduction") or 1.0)
     own = {**_FIRST, "friction.stribeck_speed": _STRIBECK_SPEED * reduction}
-    values |= {term: own[term] for term in RUNGS[name]
+    values |= {term: own[term] for term in RUNGS[law]
                if term in own and not base.get(term) and not values.get(term)}
-    if base.get("friction.breakaway_ratio") == 1.0 and "friction.breakaway_ratio" in RUNGS[name]:
+    if base.get("friction.breakaway_ratio") == 1.0 and "friction.breakaway_ratio" in RUNGS[law]:
         values["friction.breakaway_ratio"] = own["friction.breakaway_ratio"]
+    if soft and not base.get(SUPPLY):
+        values[SUPPLY] = _SOFT_SHARE * float(nominal(base, "motor.armature_resistance") or 1.0)
     return base.replace(values, source="where a rung of the friction ladder begins")
 
 

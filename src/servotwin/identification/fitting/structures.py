@@ -1,8 +1,8 @@
 """Structures of a servo one after the other on the same logs: analog or digital, its bridge, its spring, its friction.
 
 The kind of loop and the bridge are compared first, with Coulomb and viscous friction; an elastic gear or arm where they
-are asked for, and the friction laws M2 to M6, follow on what these leave. A structure with fewer parts is simpler, and
-the simplest that predicts no worse is chosen.
+are asked for, and the friction laws M2 to M6 with a supply that gives way, follow on what these leave. A structure with
+fewer parts is simpler, and the simplest that predicts no worse is chosen.
 """
 
 from __future__ import annotations
@@ -16,7 +16,15 @@ from servotwin.errors import InputError
 from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.fit import Fit
 from servotwin.identification.fitting.free import LUMPED
-from servotwin.identification.fitting.ladder import RUNGS, Ladder, Rung, friction_ladder, ladder_of, rung_of
+from servotwin.identification.fitting.ladder import (
+    RUNGS,
+    Ladder,
+    Rung,
+    friction_ladder,
+    ladder_of,
+    may_give_way,
+    rung_of,
+)
 from servotwin.loads import Flexible, Load
 from servotwin.logs.log import Log
 from servotwin.models import DigitalServo, Model, PulseServo, PulseServoInductive
@@ -61,8 +69,8 @@ class Structure(NamedTuple):
 def compare_structures(logs: Sequence[Log], servo: Servo, model: type[Model] | None = None,
                        free: Sequence[str] | None = None, *, kinds: Sequence[str] = KINDS,
                        bridges: Sequence[str] | None = None, springs: Sequence[str] = (),
-                       rungs: Sequence[str] = tuple(RUNGS), select: str = "holdout", progress: Any = False,
-                       **options: Any) -> Ladder:
+                       rungs: Sequence[str] = tuple(RUNGS), select: str = "holdout", soft_supply: bool | None = None,
+                       progress: Any = False, **options: Any) -> Ladder:
     """Fit structures of a servo to the same logs, and choose the simplest that predicts no worse.
 
     Parameters
@@ -87,6 +95,8 @@ def compare_structures(logs: Sequence[Log], servo: Servo, model: type[Model] | N
         Friction laws of the chosen loop, bridge and spring, "M1" among them or not: of `RUNGS`.
     select : {"holdout", "criterion"}
         As of `friction_ladder`.
+    soft_supply : bool, optional
+        As of `friction_ladder`, on the best law.
     progress : bool or callable
         As of `identify`, over all structures.
     **options
@@ -138,7 +148,10 @@ def compare_structures(logs: Sequence[Log], servo: Servo, model: type[Model] | N
         if not ended or not further:
             return ladder_of(tuple(found.values()), select)
         best = _best(found, select)
-        climbed = _climbed(logs_of[best.spring], found[best].fit, further, options,
+        fit = found[best].fit
+        if soft_supply is None:
+            soft_supply = len(laws) == len(RUNGS) and may_give_way(fit.model, given, fit.space.names)
+        climbed = _climbed(logs_of[best.spring], fit, further, {**options, "soft_supply": soft_supply},
                            lambda share, text: show((before + share * len(further)) / count, text))
     laws_of_best = [rung_of(best.named(rung.name), rung.fit) for rung in climbed.rungs]
     return ladder_of((*found.values(), *laws_of_best), select)

@@ -1,0 +1,35 @@
+"""Profile, droop and play of a real STS3215 as its registers and the catalogue predict them: how far off."""
+
+import pytest
+
+from validation import feetech_pulled
+
+
+@pytest.fixture(scope="module")
+def told(data_folder):
+    file = data_folder / "feetech_backlash_robonine" / "motor_telemetry_single.csv"
+    return feetech_pulled.told(feetech_pulled.read(file), feetech_pulled.servo())
+
+
+def test_moves_are_predicted(told):
+    """100 counts at 1000 counts/s and acceleration 20: to 3.4 counts, 0.3 degrees."""
+    assert 1.0 < told.moving < 4.0
+    assert all(0.03 <= late <= 0.12 for late in told.late)
+
+
+def test_rest_is_predicted(told):
+    assert 1.0 < told.resting < 3.5
+
+
+def test_play_shows_where_the_pull_changes_sides(told):
+    """Left alone after a pull 7 counts apart, predicted 8.4: the play of 0.87 degrees less what the loop corrects."""
+    assert told.play(told.measured, pulled=False) == pytest.approx(7.0, abs=0.1)
+    assert told.play(told.predicted, pulled=False) == pytest.approx(7.0, abs=2.0)
+
+
+def test_droop_under_a_pull_is_underestimated(told):
+    """14.8 counts apart, predicted 7.8: friction of the catalogue holds the pull alone, that of this servo does not."""
+    assert told.play(told.measured) == pytest.approx(14.8, abs=0.1)
+    assert 6.0 < told.play(told.predicted) < told.play(told.measured)
+    for word in ("pulled up", "pulled down", "after up", "after down"):
+        assert told.predicted[word] == pytest.approx(told.measured[word], abs=4.5)
