@@ -42,6 +42,9 @@ class Servo(NamedTuple):
     motor_share: float = 0.0  # K_m of M5
     external_share: float = 0.0  # K_e of M5
     V_oc: float = 6.0
+    fall: float = 0.0  # 1/s, the share of it that is lost from the start of a log on
+    drop: float = 0.0  # the share of it that is lost at once, 40 % through a log
+    warms: float = 0.0  # 1/s, by which share R rises from the start of a log on
     R_b: float = 0.0  # of the source
     V_ce0: float = 0.4
     r_c: float = 0.0
@@ -51,6 +54,7 @@ class Servo(NamedTuple):
     wheel: float = 0.0  # kg m², of what is behind the play
     bearing: float = 0.06  # of the smaller dry friction: what of it acts on the output inside the play
     wiper_play: float = 0.0  # rad, output to potentiometer
+    bend: float = 0.0  # rad: what the potentiometer reads too much 0.6 rad beside the middle; it grows with the square
     zero: float = 0.64e-3  # s, length of the one-shot at q = 0
     slope: float = 573e-6  # s/rad, s_µ
     gain: float = 120.0  # of the stretcher
@@ -89,27 +93,43 @@ def _external(load: Load, q: float, w: float) -> float:
     return -load.torque - pull - load.viscous * w
 
 
-def _current(s: Servo, w: float, sign: float) -> float:
+class Supplied(NamedTuple):
+    """What changes in the course of a log: the voltage without load, and how many times as high R is."""
+
+    V: float
+    warm: float
+
+
+def _supplied(s: Servo, t: float, half: float) -> Supplied:
+    """Return supply and warmth at a time; `half` is when a supply that drops does so."""
+    V = s.V_oc * (1.0 - s.fall * max(t, 0.0))
+    if t > half:
+        V *= 1.0 - s.drop
+    return Supplied(V, 1.0 + s.warms * max(t, 0.0))
+
+
+def _current(s: Servo, now: Supplied, w: float, sign: float) -> float:
     """Armature current while driven (sign ±1) or off (0); none where the voltage does not exceed what is lost."""
+    R_a = s.R * now.warm
     if sign != 0.0:
-        source, lost, R = sign * s.V_oc, s.V_ce0 + s.V_br, s.R + s.r_c + s.R_b
+        source, lost, R = sign * now.V, s.V_ce0 + s.V_br, R_a + s.r_c + s.R_b
     elif s.coasts != 0.0:
-        source, lost, R = 0.0, s.V_oc + s.V_ce0 + s.V_br, s.R + s.R_b
+        source, lost, R = 0.0, now.V + s.V_ce0 + s.V_br, R_a + s.R_b
     else:
-        source, lost, R = 0.0, s.V_br, s.R
+        source, lost, R = 0.0, s.V_br, R_a
     x = source - s.K * w
     return 0.0 if abs(x) <= lost else (x - math.copysign(lost, x)) / R
 
 
-def _motor(s: Servo, w: float, forth: float, back: float) -> float:
+def _motor(s: Servo, now: Supplied, w: float, forth: float, back: float) -> float:
     """Mean motor torque of a step of which shares are driven forward and backward; beyond 1 `forth` is a duty + 10."""
     if forth > 1.5:
-        return s.K * ((forth - 10.0) * (s.V_oc - s.V_ce0) - s.K * w) / (s.R + s.r_c + s.R_b)
-    i = (1.0 - forth - back) * _current(s, w, 0.0)
+        return s.K * ((forth - 10.0) * (now.V - s.V_ce0) - s.K * w) / (s.R * now.warm + s.r_c + s.R_b)
+    i = (1.0 - forth - back) * _current(s, now, w, 0.0)
     if forth > 0.0:
-        i += forth * _current(s, w, 1.0)
+        i += forth * _current(s, now, w, 1.0)
     if back > 0.0:
-        i += back * _current(s, w, -1.0)
+        i += back * _current(s, now, w, -1.0)
     return s.K * i
 
 
@@ -122,29 +142,29 @@ def _budget(s: Servo, side: float, at_rest: bool, motor: float, external: float)
             + abs(s.motor_share * motor - s.external_share * external))
 
 
-def _rate(s: Servo, load: Load, J: float, q: float, w: float, side: float, forth: float, back: float,
+def _rate(s: Servo, now: Supplied, load: Load, J: float, q: float, w: float, side: float, forth: float, back: float,
           carries: bool, less: float) -> float:
     """Acceleration of motor and what it carries, sliding towards `side`; `less` of the friction is elsewhere."""
-    motor = _motor(s, w, forth, back)
+    motor = _motor(s, now, w, forth, back)
     external = _external(load, q, w) if carries else 0.0
     return (motor + external - s.B * w - side * (_budget(s, side, False, motor, external) - less)) / J
 
 
-def _slide(s: Servo, load: Load, J: float, q: float, w: float, forth: float, back: float, carries: bool, h: float,
-           less: float = 0.0):
+def _slide(s: Servo, now: Supplied, load: Load, J: float, q: float, w: float, forth: float, back: float,
+           carries: bool, h: float, less: float = 0.0):
     """Angle and speed after a step of the motor and what it carries; it sticks where friction holds it."""
     side = math.copysign(1.0, w)
     if w == 0.0:
-        motor = _motor(s, 0.0, forth, back)
+        motor = _motor(s, now, 0.0, forth, back)
         external = _external(load, q, 0.0) if carries else 0.0
         push = motor + external
         side = math.copysign(1.0, push)
         if abs(push) <= _budget(s, side, True, motor, external) - less:
             return q, 0.0
-    first = _rate(s, load, J, q, w, side, forth, back, carries, less)
+    first = _rate(s, now, load, J, q, w, side, forth, back, carries, less)
     if w == 0.0 and first * side <= 0.0:
         return q, 0.0
-    second = _rate(s, load, J, q + h * w, w + h * first, side, forth, back, carries, less)
+    second = _rate(s, now, load, J, q + h * w, w + h * first, side, forth, back, carries, less)
     end = w + 0.5 * h * (first + second)
     if end * side <= 0.0:
         return q + 0.5 * h * w * abs(w) / max(abs(w - end), 1e-300), 0.0
@@ -167,14 +187,14 @@ def _fall(load: Load, J: float, q: float, w: float, h: float, dry: float):
     return q + 0.5 * h * (w + end), end
 
 
-def _two_bodies(s: Servo, load: Load, body: Array, forth: float, back: float, h: float) -> None:
+def _two_bodies(s: Servo, now: Supplied, load: Load, body: Array, forth: float, back: float, h: float) -> None:
     """Advance motor (0, 1) and output (2, 3), which touch at side `body[4]` of the play, or do not (0)."""
     J_o = s.wheel + load.inertia
     behind = s.bearing * min(s.forward, s.backward)
-    apart_m, w_m = _slide(s, load, s.J, body[0], body[1], forth, back, False, h, behind)
+    apart_m, w_m = _slide(s, now, load, s.J, body[0], body[1], forth, back, False, h, behind)
     apart_o, w_o = _fall(load, J_o, body[2], body[3], h, behind)
     if body[4] != 0.0 and body[4] * (w_m - w_o) >= 0.0:  # left to themselves they would not draw apart
-        body[0], body[1] = _slide(s, load, s.J + J_o, body[0], body[1], forth, back, True, h)
+        body[0], body[1] = _slide(s, now, load, s.J + J_o, body[0], body[1], forth, back, True, h)
         body[2], body[3] = body[0] - 0.5 * body[4] * s.play, body[1]
         return
     body[0], body[1], body[2], body[3], body[4] = apart_m, w_m, apart_o, w_o, 0.0
@@ -206,6 +226,7 @@ def _run(s: Servo, load: Load, edges: Array, widths: Array, times: Array, start:
     pending, next_sign, next_length = 1e300, 0.0, 0.0
     limp = 1e300
     seen, tick, duty = math.nan, 0, 0.0
+    half = 0.4 * times[times.size - 1]
     n = 0
     while done < times.size:
         t = start + n * h
@@ -216,7 +237,7 @@ def _run(s: Servo, load: Load, edges: Array, widths: Array, times: Array, start:
             width = widths[frame]
             if not math.isnan(width):
                 angle = wiper + (w * (edges[frame] - t) if s.wiper_play == 0.0 else 0.0)
-                shot = max(0.0, s.zero + s.slope * angle)
+                shot = max(0.0, s.zero + s.slope * (angle + s.bend * ((angle - 1.5) / 0.6) ** 2))
                 error = width - shot
                 over = abs(error) - 0.5 * s.deadband
                 pending = edges[frame] + max(width, shot)
@@ -224,6 +245,7 @@ def _run(s: Servo, load: Load, edges: Array, widths: Array, times: Array, start:
                 next_length = s.t_min + s.gain * over if over > 0.0 else 0.0
                 limp = edges[frame] + s.timeout
             frame += 1
+        now = _supplied(s, t, half)
         forth = back = 0.0
         if s.digital_rate > 0.0:
             if pending < end:
@@ -245,9 +267,9 @@ def _run(s: Servo, load: Load, edges: Array, widths: Array, times: Array, start:
                 t = max(t, pending)
                 sign, until, pending = next_sign, pending + next_length, 1e300
         if s.play > 0.0:
-            _two_bodies(s, load, body, forth, back, h)
+            _two_bodies(s, now, load, body, forth, back, h)
         else:
-            body[2], body[3] = _slide(s, load, carried, q, w, forth, back, True, h)
+            body[2], body[3] = _slide(s, now, load, carried, q, w, forth, back, True, h)
         wiper = min(max(wiper, body[2] - 0.5 * s.wiper_play), body[2] + 0.5 * s.wiper_play)
         while done < times.size and times[done] < end:
             share = max(times[done] - (end - h), 0.0) / h  # before the start it rests

@@ -1,4 +1,4 @@
-"""Fourteen things that are wrong with a bench or with what is said of it, as strong as one likes.
+"""Nineteen things that are wrong with a bench or with what is said of it, as strong as one likes.
 
 Nothing of the package. A defect gives the logs of a bench and what they claim (stamps, angles, load); the file says
 nothing of it: it is `file_of` the plain servo. A strength from 0 to 1 runs from hardly to be seen to gross.
@@ -60,6 +60,36 @@ def digital_p(truth: Truth, strength: float, rng: Rng) -> list[Run]:
     """A processor at 1 to 3 kHz that multiplies its error: full voltage from 15 down to 4 degrees on."""
     return _by(truth, truth.servo._replace(digital_rate=_between(1e3, 3e3, float(rng.random())),
                                            digital_gain=1.0 / math.radians(_between(15.0, 4.0, strength))))
+
+
+def bent(truth: Truth, strength: float, rng: Rng) -> list[Run]:
+    """A potentiometer that reads 0.8 to 5 degrees too much at the ends of the travel, by a parabola."""
+    return _by(truth, truth.servo._replace(bend=math.radians(_between(0.8, 5.0, strength))))
+
+
+def falling(truth: Truth, strength: float, rng: Rng) -> list[Run]:
+    """A supply that falls by 2 to 12 % a second in each log."""
+    return _by(truth, truth.servo._replace(fall=_between(0.02, 0.12, strength)))
+
+
+def dropping(truth: Truth, strength: float, rng: Rng) -> list[Run]:
+    """A supply that drops by 5 to 35 % at once in each log."""
+    return _by(truth, truth.servo._replace(drop=_between(0.05, 0.35, strength)))
+
+
+def warming(truth: Truth, strength: float, rng: Rng) -> list[Run]:
+    """A winding that is 10 to 60 % over its first resistance after the last log."""
+    share, found = _between(0.1, 0.6, strength), []
+    for k in range(4):
+        servo = truth.servo._replace(R=truth.servo.R * (1.0 + 0.25 * k * share), warms=0.08 * share)
+        found.append(_by(truth, servo)[k])
+    return found
+
+
+def rounded(truth: Truth, strength: float, rng: Rng) -> list[Run]:
+    """Pulses in steps of 1 to 12 us (1.2 degrees) where the logs say what was asked for."""
+    step = _between(1e-6, 1.2e-5, strength)
+    return runs(truth, lambda rng: {"rounds": step})
 
 
 def lost_pulses(truth: Truth, strength: float, rng: Rng) -> list[Run]:
@@ -153,7 +183,8 @@ DEFECTS: dict[str, Defect] = {
     "digital P servo": digital_p, "lost pulses": lost_pulses, "5 % wrong stamps": stamps, "stamps fast": clock,
     "reversed sign": reversed_sign, "wrapped angle": wrapped, "two servos": two_servos,
     "wrong voltage": wrong_voltage, "wrong load": wrong_load, "outliers 5 %": outliers,
-    "dropped samples": dropped_samples,
+    "dropped samples": dropped_samples, "bent potentiometer": bent, "falling supply": falling,
+    "dropping supply": dropping, "warming": warming, "rounded commands": rounded,
 }
 
 

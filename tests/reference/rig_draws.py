@@ -96,7 +96,9 @@ def runs(truth: Truth, taking: Callable[[np.random.Generator], Taking], *, durat
         told = {"delay": truth.delay, "angle_offset": truth.angle_offset, **taking(rng)}
         if "clock" in told:
             told["clock"] *= truth.crystal
-        said = record(truth.servo, truth.load, widths, **told, seed=int(rng.integers(2**31)))
+        step = told.pop("rounds", 0.0)  # s: what is sent is a multiple of it, and the log says what was asked for
+        sent = step * np.round(widths / step) if step else widths
+        said = record(truth.servo, truth.load, sent, **told, seed=int(rng.integers(2**31)))._replace(command=widths)
         found.append(Run(kind, truth.load, said))
     return found
 

@@ -23,7 +23,9 @@ RIGHT = {  # names of causes that are right for a defect
     "digital P servo": ("digital",), "lost pulses": ("lost pulses",), "5 % wrong stamps": ("stamps",),
     "stamps fast": ("stamps", "frame period"), "reversed sign": ("sign",), "wrapped angle": ("wrap",),
     "two servos": ("two servos",), "wrong voltage": ("voltage",), "wrong load": ("load",),
-    "dropped samples": ("dropped samples", "stamps"),
+    "dropped samples": ("dropped samples", "stamps"), "bent potentiometer": ("bent potentiometer",),
+    "falling supply": ("supply that changes",), "dropping supply": ("supply that changes",),
+    "warming": ("warming", "supply that changes"), "rounded commands": ("rounded commands",),
 }
 SAID = {  # what names a defect in the sentence or the warnings, before anything is tried
     "reversed sign": "turns against the command", "wrapped angle": "wrap", "outliers 5 %": "lie far off alone",

@@ -19,7 +19,7 @@ from servotwin.logs.log import ANGLES
 Array = NDArray[np.float64]
 
 
-def trace_of(forecast: Forecast, point: Point, k: int, part: LogPart, *, held_out: bool) -> Trace:
+def trace_of(forecast: Forecast, point: Point, k: int, part: LogPart, *, held_out: bool, whole: bool = False) -> Trace:
     """Return a log beside its simulation; where pulses have a phase, the second half of one that was not fitted judges.
 
     Parameters
@@ -31,11 +31,13 @@ def trace_of(forecast: Forecast, point: Point, k: int, part: LogPart, *, held_ou
         What it says at that point.
     held_out : bool
         Whether it was not fitted.
+    whole : bool
+        Whether all samples judge nevertheless.
     """
     case = forecast.cases[k]
     name = next(name for name in ANGLES if name in case.places)
     times, measured = case.times[case.places[name]], case.values[name]
-    late = held_out and forecast.phased
+    late = held_out and forecast.phased and not whole
     own = dict(zip(forecast.names_of_own(case), point.own[k], strict=True))
     return Trace(
         log=case.log, held_out=held_out, signal=name, time=case.log.time[0] + times, measured=measured,
@@ -78,4 +80,8 @@ def with_pulses_of(forecast: Forecast, loss: Loss, point: Point, held_out: Seque
         return np.concatenate([case.times[place] < 0.5 * case.log.duration for place in case.places.values()])
 
     begun = Scan(forecast, loss, there.moved(choices), mask=first_half)
-    return settled(begun, [k for k in held_out if first_half(k).any()])
+    told = [k for k in held_out if first_half(k).any()]
+    if not told:
+        return begun.point
+    there = Scan(forecast, loss, settled(begun, told), mask=first_half)  # to first order so far
+    return there.moved({k: trials[0].choice for k, trials in there.best({k: [there.now(k)] for k in told}).items()})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, ServoFileError
 from servotwin.identification.fitting import checks
-from servotwin.identification.fitting.arrow import Loss, Prior, Search
+from servotwin.identification.fitting.arrow import Loss
 from servotwin.identification.fitting.batches import Running
 from servotwin.identification.fitting.findings import explained, first_looks
 from servotwin.identification.fitting.fit import Trace
@@ -21,9 +22,10 @@ from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.held_out import trace_of, with_pulses_of
 from servotwin.identification.fitting.holdout import ErrorTable
 from servotwin.identification.fitting.point import NUISANCES, SHARED, LogPart, Point
+from servotwin.identification.fitting.rig import fitted_rig, has_unknown_phase, with_known
 from servotwin.identification.fitting.robot_registers import as_logs_say
 from servotwin.identification.fitting.scatter import scatter_of
-from servotwin.identification.fitting.task import HUBER, Task
+from servotwin.identification.fitting.task import HUBER
 from servotwin.logs.log import Log
 from servotwin.models import MODELS, Model
 from servotwin.models.engine.memory import ACCURACY
@@ -34,7 +36,6 @@ from servotwin.units import is_finite
 Array = NDArray[np.float64]
 Progress = bool | Callable[[float, str], object]
 
-_ROUNDS = 3  # of noise and search
 _ANY = ("motor.armature_resistance", "motor.rotor_inertia", "motor.torque_constant", "gear.gear_reduction")
 
 
@@ -94,8 +95,9 @@ def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] 
 
     Of logs of an SO-100 or SO-101 (datasets of LeRobot) a servo with the factory's registers is taken with those that
     LeRobot writes, and a warning says so. Every log starts at the angle and speed that it shows. Delay and angle offset
-    are those that the servo file's [fit] recorded, where it has any. Where pulses have a phase, the first half of each
-    log says when they come, and the errors are those of the second.
+    are those that the servo file's [fit] recorded, where it has any. When pulses come is unknown where the samples of a
+    log are not in step with the frames, and where the file's fit or `nuisance` say so: then the first half of each log
+    tells it. The errors are those of the second half where the fit or `nuisance` say so, else of all samples.
 
     Parameters
     ----------
@@ -107,7 +109,8 @@ def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] 
     mend : sequence of str
         What is put right in the logs first, as of `identify`.
     nuisance : sequence of str
-        What belongs to the rig and is fitted to these logs: as of `identify`.
+        What belongs to the rig and is fitted to these logs: as of `identify`. Where that is no nearer than no rig at
+        all, there is none.
     sensors : sequence of str, optional
         Measured signals that are compared; the angle and all currents unless given. The errors are those of the angle.
     progress : bool or callable
@@ -138,21 +141,62 @@ def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] 
         if name not in NUISANCES:
             raise InputError("nuisance", got=name, allowed=", ".join(NUISANCES))
     known = recorded_nuisance(servo)
-    always = ("initial_state", *(name for name in ("frame_phase", "control_phase") if name in servo.fit))
-    used = [name for name in NUISANCES if name in known or name in nuisance or name in always]
+    used = [name for name in NUISANCES if name in known or name in nuisance or name in _always(plain, given)]
     forecast = Forecast(given, plain, _space(plain, given), used, seen, Running(accuracy=ACCURACY))
+    whole = "frame_phase" not in (*nuisance, *servo.fit)
     with explained(noticed), checks.shown(progress) as show:
         show(0.0, "simulating")
-        point = with_pulses_of(forecast, Loss(HUBER), _point(forecast, known, nuisance, show), range(len(given)))
-        parts = forecast.at(point, derivatives=False)
-    _failures(forecast, parts)
-    traces = tuple(trace_of(forecast, point, k, part, held_out=True) for k, part in enumerate(parts))
+        point, parts = _placed(forecast, known, nuisance, show, whole=whole)
+    traces = _traces(forecast, point, parts, whole=whole)
     own = type(plain).__name__
     return Validation(
         servo=plain.servo, model=plain, traces=traces, fitted=tuple(name for name in NUISANCES if name in nuisance),
         errors=ErrorTable((own,), {own: tuple(trace.error for trace in traces)}),
         nuisance={name: forecast.nuisance_of(point.shared, name) for name in forecast.extra},
         noise=_noise(forecast, parts), warnings=(*assumed, *noticed))
+
+
+def _always(model: Model, logs: Sequence[Log]) -> tuple[str, ...]:
+    """Return the nuisances that are used unasked: each log's start, and when pulses come and which ticks take them.
+
+    A servo file's fit says it, and pulses come at any time where samples are not in step with the frames.
+    """
+    found = [name for name in ("frame_phase", "control_phase") if name in model.servo.fit]
+    if any(has_unknown_phase(log, model) for log in logs):
+        found.append("frame_phase")
+    return ("initial_state", *found)
+
+
+def _placed(forecast: Forecast, known: Mapping[str, float], nuisance: Sequence[str],
+            show: Callable[[float, str], None], *, whole: bool) -> tuple[Point, list[LogPart]]:
+    """Return where the servo stands: as known, or with the nuisances that are fitted if these bring it nearer.
+
+    Where pulses have a phase, the first half of each log tells it.
+    """
+    everything = range(len(forecast.cases))
+    start, nothing = with_known(forecast, known), with_known(forecast, {})
+    before = forecast.at(start, derivatives=False)
+    _failures(forecast, before)
+    forecast.noise, forecast.strict = _noise(forecast, before), False  # on the way, what no servo does counts as failed
+    tried = [with_pulses_of(forecast, Loss(HUBER), start, everything)]
+    if nuisance:
+        found = fitted_rig(forecast, start, nuisance, show)
+        tried = [with_pulses_of(forecast, Loss(HUBER), found, everything, everything), *tried,
+                 with_pulses_of(forecast, Loss(HUBER), nothing, everything), nothing]
+    every = forecast.at_all(tried)
+    best = min(range(len(tried)), key=lambda k: _total(_traces(forecast, tried[k], every[k], whole=whole)))
+    _failures(forecast, every[best])
+    return tried[best], every[best]
+
+
+def _traces(forecast: Forecast, point: Point, parts: Sequence[LogPart], *, whole: bool) -> tuple[Trace, ...]:
+    return tuple(trace_of(forecast, point, k, part, held_out=True, whole=whole) for k, part in enumerate(parts))
+
+
+def _total(traces: Sequence[Trace]) -> float:
+    """Return the rms error over all samples that judge; inf where a simulation failed."""
+    every = np.concatenate([trace.residual[trace.judged] for trace in traces])
+    return float(np.sqrt(np.mean(every**2))) if np.isfinite(every).all() else math.inf
 
 
 def recorded_model(servo: Any) -> type[Model] | None:
@@ -189,40 +233,6 @@ def _space(model: Model, logs: Sequence[Log]) -> Space:
     taken = {name for log in logs for name in log.parameters}
     free = list(load) or [next(name for name in _ANY if name not in taken)]
     return Space(model, free, load=load)
-
-
-def _point(forecast: Forecast, known: Mapping[str, float], nuisance: Sequence[str],
-           show: Callable[[float, str], None]) -> Point:
-    """Return where the servo stands: as recorded, or with the nuisances that are fitted."""
-    everything = list(range(len(forecast.cases)))
-    task = Task(forecast, Loss(HUBER), everything, 0, 1, None)
-    start = task.nominal()
-    size = len(forecast.space)
-    shared = start.shared.copy()
-    for k, name in enumerate(forecast.extra):
-        shared[size + k] = known[name] / SHARED[name][0] if name in known else shared[size + k]
-    point = start._replace(shared=shared)
-    if not nuisance:
-        return point
-    held = np.array([True] * size + [name not in nuisance for name in forecast.extra])
-    lower, upper = np.minimum(task.lower, shared), np.maximum(task.upper, shared)
-    nothing = Prior(np.zeros(len(shared)), np.zeros(len(shared)))
-    search = Search(forecast, Loss(HUBER), nothing, lower, upper, everything, held)
-    for k in range(_ROUNDS):
-        show(k / (_ROUNDS + 1.0), "fitting " + ", ".join(nuisance))
-        parts = forecast.at(point, derivatives=False)
-        _failures(forecast, parts)
-        forecast.noise = _noise(forecast, parts)
-        point = search.run(point, most=20).point
-    return _as_measured(forecast, point, start) if "initial_state" not in nuisance else point
-
-
-def _as_measured(forecast: Forecast, point: Point, start: Point) -> Point:
-    """Return a point whose logs begin where they were measured, though they keep their own delays."""
-    own = []
-    for case, found, first in zip(forecast.cases, point.own, start.own, strict=True):
-        own.append(np.where([name == "log_delay" for name in forecast.names_of_own(case)], found, first))
-    return point._replace(own=tuple(own))
 
 
 def _failures(forecast: Forecast, parts: Sequence[LogPart]) -> None:

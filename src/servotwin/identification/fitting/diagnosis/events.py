@@ -1,7 +1,7 @@
 """Single events in logs, pulses that never came and rows that were not written: tried one by one, kept where they pay.
 
 All places of a log are tried in one batch at the present numbers, by what soon follows them, until no more is found;
-then the numbers are searched again. Every second sample chooses, the others judge.
+then the numbers are searched again. Every second sample chooses, those between judge on the quarters that do not teach.
 """
 
 from __future__ import annotations
@@ -23,7 +23,9 @@ Array = NDArray[np.float64]
 _MOST = 12  # events of a log and round
 _SOON = 10  # samples after an event, by which it is judged
 _ROUNDS, _TIMES = 3, 4  # of choosing and searching, and of choosing in each
-_PAYS = 8.0  # in units of noise: what one of some hundred places has to gain (their logarithm, twice)
+_PAYS = 8.0  # in units of what is left: what one of some hundred places has to gain (their logarithm, twice)
+_MOST_LEFT = 0.5  # of the error
+_NORMAL = 1.4826  # standard deviation over median magnitude of a normal law
 
 
 @dataclass(frozen=True)
@@ -92,8 +94,13 @@ def _with_rows(log: Log, places: Sequence[int]) -> Log:
 
 
 def _tried(bench: TrialBench, kind: _Kind) -> tuple[int, Gain | None]:
-    """Return how many events were found, and what they gain."""
-    base = bench.searched(bench.setting, bench.base.point, alternate=True)
+    """Return how many events were found, and what they gain on the quarters of the logs that judge; nothing of little.
+
+    Their numbers come from the quarters that teach, as those of all candidates. Where events are is chosen by every
+    second sample, everywhere, and the others judge. A hundred events explain some of whatever a model lacks: so these
+    have to explain most of it.
+    """
+    base = bench.base
     found: list[list[int]] = [[] for _ in bench.setting.logs]
     trial = base
     for _ in range(_ROUNDS):
@@ -102,10 +109,11 @@ def _tried(bench: TrialBench, kind: _Kind) -> tuple[int, Gain | None]:
         if found == before:
             break
         logs = tuple(kind.put(log, starts) for log, starts in zip(bench.setting.logs, found, strict=True))
-        trial = bench.searched(replace(bench.setting, logs=logs), point, alternate=True)
+        trial = bench.searched(replace(bench.setting, logs=logs), point)
     if not any(found) or not all(np.isfinite(r).all() for r in trial.residuals):
         return 0, None
-    return sum(map(len, found)), gain(base.residuals, trial.residuals, bench.noise, alternate=True)
+    gained = gain([r[1::2] for r in base.residuals], [r[1::2] for r in trial.residuals], bench.noise)
+    return sum(map(len, found)), gained if gained.after < _MOST_LEFT * gained.before else None
 
 
 def _settled(bench: TrialBench, point: Point, k: int, kind: _Kind, already: list[int]) -> list[int]:
@@ -129,7 +137,8 @@ def _chosen(bench: TrialBench, point: Point, k: int, kind: _Kind, already: list[
     if not all(np.isfinite(part).all() for part in (here, *parts)):
         return already
     used = np.flatnonzero(log.used(log.angle_name))
-    worth = [_worth(bench, here, part, int(np.searchsorted(used, abs(place))))
+    scale = max(bench.noise, _NORMAL * float(np.median(np.abs(here))))
+    worth = [_worth(bench, scale, here, part, int(np.searchsorted(used, abs(place))))
              for part, place in zip(parts, [*every, *already], strict=True)]
     chosen = [place for place, gained in zip(already, worth[len(every):], strict=True) if gained < -_PAYS]
     for i in np.argsort(worth[:len(every)])[::-1]:
@@ -139,9 +148,9 @@ def _chosen(bench: TrialBench, point: Point, k: int, kind: _Kind, already: list[
     return sorted(chosen)
 
 
-def _worth(bench: TrialBench, before: Array, after: Array, first: int) -> float:
+def _worth(bench: TrialBench, scale: float, before: Array, after: Array, first: int) -> float:
     """Return by how much an event lowers the cost of the samples soon after it: later ones may be of others."""
     soon = slice(first, first + _SOON)
     teaches = teaching(np.arange(len(before), dtype=np.float64), alternate=True)[soon]
-    costs = [bench.task.loss.cost(r[soon][teaches] / bench.noise) for r in (before, after)]
+    costs = [bench.task.loss.cost(r[soon][teaches] / scale) for r in (before, after)]
     return costs[0] - costs[1]

@@ -20,6 +20,8 @@ _SETTLED = 0.01  # of the scale
 _SIGMAS = 8.0
 _STRONG = 0.1  # of the speed without load: less drive says nothing
 _HALF = 0.5
+_SMALL = 0.1  # rad, a way on which friction and deadband may hold the shaft
+_MOST = 0.6  # of a window's commands
 _TOO_FAST = 2.0  # times the speed without load
 _AROUND = 6  # bins
 _LONG = 3  # bins in a row: an outlier gives one to either side
@@ -95,7 +97,19 @@ def _against(one: Look) -> Iterator[tuple[float, float]]:
     for first, last in _runs(lack > _HALF * np.abs(best.drive)):
         if last - first + 1 >= _LONG and found[first:last + 1].any():
             begin = best.time[first] - _AHEAD * _BIN
+            if _arrives(one, float(begin), float(best.time[last])):
+                continue
             yield float(begin + one.log.start), float(best.time[last] + _MORE + one.log.start)
+
+
+def _arrives(one: Look, begin: float, end: float) -> bool:
+    """Tell whether the shaft goes to its command in a window, or has no way to go: a habit of few motions is unsure."""
+    time, angle, asked = one.time[one.smooth], one.angle[one.smooth], one.asked[one.smooth]
+    start, stop = np.interp((begin, end), time, angle)
+    goals = asked[(time >= begin - _DELAY) & (time <= end)]
+    nearer = np.abs(goals - stop) < _HALF * np.abs(goals - start)
+    small = np.abs(goals - start) < _SMALL
+    return bool(len(goals) and (small | nearer).mean() > _MOST)
 
 
 def _habit(one: Look, error: float) -> _Habit | None:

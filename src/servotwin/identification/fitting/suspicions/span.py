@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from servotwin.errors import InputError
 from servotwin.identification.fitting.suspicions.look import Array, Finding, Look, aligned
 
 _FACTOR = math.sqrt(2.0)  # half way to 2 on a scale of ratios; pulse gains of makers differ by 12 %
@@ -28,7 +29,7 @@ def spans(looks: Sequence[Look]) -> list[Finding]:
     good = [one for one, ratio in zip(looks, ratios, strict=True)
             if not math.isnan(ratio) and 1.0 / _FACTOR < ratio < _FACTOR]
     found = [_scaled(one, ratio, good) for one, ratio in zip(looks, ratios, strict=True)
-             if ratio > _FACTOR or (ratio < 1.0 / _FACTOR and _free(one))]
+             if ratio > _FACTOR or (0.0 < ratio < 1.0 / _FACTOR and _free(one))]
     named = {finding.log for finding in found}
     return [*found, *(finding for one in looks if one.log.name not in named for finding in _beyond(one))]
 
@@ -69,10 +70,14 @@ def _free(one: Look) -> bool:
 def _scaled(one: Look, ratio: float, good: Sequence[Look]) -> Finding:
     known = min((*_KNOWN, *(1.0 / k for k in _KNOWN)), key=lambda k: abs(math.log(abs(ratio) / k)))
     factor = known if abs(math.log(abs(ratio) / known)) < _NEAR else ratio
+    try:
+        mended = one.with_angle(aligned(one, one.angle / factor, good))
+    except InputError:  # an angle that hardly moves would be of any size
+        mended = None
     return Finding("span", one.log.name, (
         f"log {one.log.name!r}: the shaft moves {ratio:.3g} times as far as it is asked to; check unit and scale of "
         "the angle, and travel and pulse range in the servo file (potentiometer.feedback_gain); mending \"span\" "
-        f"divides the angle by {factor:.4g}"), one.with_angle(aligned(one, one.angle / factor, good)))
+        f"divides the angle by {factor:.4g}"), mended)
 
 
 def _beyond(one: Look) -> list[Finding]:

@@ -1,0 +1,162 @@
+"""The rig of logs that are compared with a known servo: delay, offsets, and when pulses come; never the servo."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.identification.fitting.arrow import Loss, Prior
+from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.frames import changes, gaps, has_pulses
+from servotwin.identification.fitting.phases import settled
+from servotwin.identification.fitting.point import DELAY_SCALE, OFFSET_SCALE, SHARED, Point
+from servotwin.identification.fitting.scatter import by_sensor
+from servotwin.identification.fitting.task import HUBER, Task
+from servotwin.logs.log import ANGLES, Log
+from servotwin.models import Model
+
+Array = NDArray[np.float64]
+
+_PERIOD = "electronics.frame_period"
+DELAYS = (0.0, 0.02, 0.04, 0.06, 0.09)
+"""Where a search for the delay may begin [s]."""
+_ROUNDS = 3  # of noise and search
+_MOST = 20  # steps of a search
+_IN_STEP = 1e-4  # of a whole number: samples that come with the pulses
+
+
+class RigTask(Task):
+    """The search of a fit in which all stays but what is asked for of the rig."""
+
+    asked: tuple[str, ...] = ()
+
+    @property
+    def held(self) -> NDArray[np.bool_]:
+        """Which shared numbers stay: those of the servo, and what is not asked for."""
+        stays = [True] * len(self.forecast.space) + [name not in self.asked for name in self.forecast.extra]
+        return np.asarray(super().held | np.array(stays))
+
+
+def has_unknown_phase(log: Log, model: Model) -> bool:
+    """Tell whether a log leaves open when its pulses come: samples and commands are not in step with the frames.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> model, time = st.PulseServo(st.load_servo("hitec-hs-755hb")), np.arange(20.0)
+    >>> command = np.where(time > 4, 1.6e-3, 1.5e-3)
+    >>> logs = [Log(name="a", time=step * time, command=command, command_kind="pulse_width",
+    ...             measured={"output_angle": time}) for step in (0.02, 0.005, 0.0167)]
+    >>> [has_unknown_phase(log, model) for log in logs]
+    [False, False, True]
+    """
+    if not has_pulses(model) or not len(changes(log)):
+        return False
+    period = log.parameters.get(_PERIOD, model.value_or(_PERIOD, 0.0))
+    if not period:
+        return False
+    step = float(np.median(np.diff(log.time)))
+    ratio = max(step / period, period / step)
+    return abs(ratio - round(ratio)) > _IN_STEP * ratio or len(gaps(log, period)) > 1
+
+
+def with_known(forecast: Forecast, known: Mapping[str, float]) -> Point:
+    """Return the point of the servo with what is known of the rig (SI), and no delay and no offset but those."""
+    point, size = _task(forecast).nominal(), len(forecast.space)
+    period = forecast.cases[0].period
+    values = [known.get(name, period if name == "frame_period" else 0.0) / SHARED[name][0] for name in forecast.extra]
+    return point._replace(shared=np.append(point.shared[:size], values))
+
+
+def fitted_rig(forecast: Forecast, start: Point, asked: Sequence[str], show: Callable[[float, str], None]) -> Point:
+    """Return the point of the servo with the rig that the logs say.
+
+    Parameters
+    ----------
+    forecast : Forecast
+        Whose searched numbers all stay.
+    start : Point
+        Where the search begins.
+    asked : sequence of str
+        What is searched.
+    show : callable
+        Told the share that is done, and what goes on.
+    """
+    task = _task(forecast)
+    task.asked = tuple(asked)
+    task.lower, task.upper = np.minimum(task.lower, start.shared), np.maximum(task.upper, start.shared)
+    found = _searched(task, start, show)
+    if forecast.phased:
+        found = _with_pulses(task, found, show)
+    return found if "initial_state" in asked else _as_measured(forecast, found, start)
+
+
+def _task(forecast: Forecast) -> RigTask:
+    task = RigTask(forecast, Loss(HUBER), list(range(len(forecast.cases))), 0, 1, None)
+    task.prior = Prior(np.zeros(forecast.size), np.zeros(forecast.size))
+    return task
+
+
+def _searched(task: RigTask, there: Point, show: Callable[[float, str], None]) -> Point:
+    """Return where a search ends in which pulses come alike for all logs, from the likeliest delay and offset."""
+    task.forecast.own_phases = "delay" not in task.forecast.extra
+    found = _likely(task, there)
+    for k in range(_ROUNDS):
+        show(k / (2.0 * _ROUNDS), "fitting " + ", ".join(task.asked))
+        task.measure(found)
+        found = task._search(task.fitted).run(found, most=_MOST).point
+    return found
+
+
+def _likely(task: RigTask, there: Point) -> Point:
+    """Return the point from which the search begins: of some usual delays, with and without the offset that is seen."""
+    size, extra = len(task.forecast.space), task.forecast.extra
+    tried = [there]
+    for delay in DELAYS if "delay" in task.asked else (None,):
+        for offset in {None, task._offset()} if "angle_offset" in task.asked else (None,):
+            shared = there.shared.copy()
+            if delay is not None:
+                shared[size + extra.index("delay")] = delay / DELAY_SCALE
+            if offset is not None:
+                shared[size + extra.index("angle_offset")] = offset / OFFSET_SCALE
+            tried.append(there._replace(shared=shared))
+    sizes = [sum(float(np.abs(part.residual).sum()) for part in parts) for parts in task.forecast.at_all(tried)]
+    return tried[int(np.argmin([one if math.isfinite(one) else math.inf for one in sizes]))]
+
+
+def _with_pulses(task: RigTask, found: Point, show: Callable[[float, str], None]) -> Point:
+    """Return the point with each log's own pulses, where that is nearer."""
+    task.forecast.own_phases = True
+    best, least = found, _size(task, found)
+    for k in range(_ROUNDS):
+        show(0.5 + k / (2.0 * _ROUNDS), "pulses")
+        before = [task.forecast.frames_of(found, i) for i in task.fitted]
+        task.measure(found)
+        found = task._search(task.fitted).run(settled(task.scan(found), task.fitted), most=_MOST).point
+        size = _size(task, found)
+        best, least = (found, size) if size < least else (best, least)
+        if [task.forecast.frames_of(found, i) for i in task.fitted] == before:
+            break
+    return best
+
+
+def _as_measured(forecast: Forecast, point: Point, start: Point) -> Point:
+    """Return a point whose logs begin where they were measured, though they keep their own delays and pulses."""
+    own = []
+    for case, found, first in zip(forecast.cases, point.own, start.own, strict=True):
+        keeps = [name in ("log_delay", "frame_phase") for name in forecast.names_of_own(case)]
+        own.append(np.where(keeps, found, first))
+    return point._replace(own=tuple(own))
+
+
+def _size(task: Task, point: Point) -> float:
+    """Return the rms error of the angle over all logs (SI); inf where a simulation failed."""
+    forecast, every = task.forecast, []
+    for k, part in enumerate(forecast.at(point, derivatives=False)):
+        residuals = by_sensor(forecast, k, part)
+        every.append(residuals[next(name for name in ANGLES if name in residuals)])
+    size = float(np.sqrt(np.mean(np.concatenate(every) ** 2)))
+    return size if math.isfinite(size) else math.inf

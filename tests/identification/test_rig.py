@@ -1,0 +1,74 @@
+"""The rig of logs that a known servo is compared with: it never makes the servo look worse."""
+
+import numpy as np
+import pytest
+
+import servotwin as st
+from servotwin.identification.fitting.rig import has_unknown_phase
+from servotwin.identification.fitting.validate import validate
+
+SERVO = st.load_servo("hitec-hs-755hb")
+RIGS = [(), ("delay", "angle_offset"), ("frame_phase",), ("delay", "angle_offset", "frame_phase", "initial_state")]
+
+
+def exact(step=0.0167, duration=4.0, name="random"):
+    """Return a log without noise whose samples are `step` apart, of random steps."""
+    rng = np.random.default_rng(0)
+    levels = 60.0 + 40.0 * rng.uniform(-1.0, 1.0, 14)
+    run = st.simulate(st.PulseServo(SERVO), st.signals.samples(np.arange(0.0, duration, 0.3)[:14], levels, unit="deg"),
+                      duration=duration, output_step=step)
+    return st.Log(name=name, time=run.time, command=run["pulse_width"], command_kind="pulse_width",
+                  measured={"output_angle": run["output_angle"]})
+
+
+def late(log, delay, offset, noise=0.0):
+    """Return a log whose angle comes later and is read too high."""
+    fine = st.simulate(st.PulseServo(SERVO), log.signal(), duration=log.duration, output_step=1e-3)
+    angle = np.interp(log.time - delay, fine.time, fine["output_angle"])
+    scatter = noise * np.random.default_rng(3).standard_normal(len(angle))
+    return st.Log(name=log.name, time=log.time, command=log.command, command_kind="pulse_width",
+                  measured={"output_angle": angle + offset + scatter})
+
+
+@pytest.mark.parametrize("nuisance", RIGS)
+def test_an_exact_log_out_of_step_with_the_frames_has_no_error(nuisance):
+    assert np.degrees(validate([exact()], SERVO, nuisance=nuisance).total) < 1e-6
+
+
+def test_a_log_is_judged_whole_where_nobody_asked_for_its_pulses():
+    for found in (validate([exact(0.02)], SERVO), validate([exact()], SERVO)):
+        assert found.total < 1e-9
+        assert found.traces[0].judged.all()
+
+
+@pytest.mark.parametrize(("step", "unknown"), [(0.02, False), (0.005, False), (0.04, False), (0.0167, True)])
+def test_pulses_are_sought_where_a_log_leaves_them_open(step, unknown):
+    assert has_unknown_phase(exact(step, name="one"), st.PulseServo(SERVO)) is unknown
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.035, 0.1])
+def test_delay_and_offset_are_found_from_anywhere(delay):
+    log = late(exact(0.02), delay, 0.05, 1e-3)
+    found = validate([log], SERVO, nuisance=("delay", "angle_offset"))
+    assert found.nuisance["delay"] == pytest.approx(delay, abs=2e-3)
+    assert found.nuisance["angle_offset"] == pytest.approx(0.05, abs=2e-3)
+    assert found.total < 3e-3
+
+
+@pytest.mark.parametrize("nuisance", [*RIGS[1:], ("angle_sag",), ("log_delay",), ("frame_period",)])
+def test_a_rig_is_never_worse_than_none(nuisance):
+    rng = np.random.default_rng(1)
+    log = exact()
+    log = st.Log(name="noise", time=log.time, command=log.command, command_kind="pulse_width",
+                 measured={"output_angle": 1.0 + 0.3 * rng.standard_normal(len(log.time))})  # of no servo
+    servo = SERVO.replace({"supply.internal_resistance": 0.2})
+    plain, found = validate([log], servo).traces[0], validate([log], servo, nuisance=nuisance)
+    assert found.total <= np.sqrt(np.mean(plain.residual[found.traces[0].judged] ** 2)) * (1.0 + 1e-9)
+
+
+def test_a_search_that_wanders_beyond_the_stops_is_no_error():
+    servo = SERVO.replace({"stops.lower_angle": -0.01, "stops.upper_angle": 3.2})
+    log = exact()
+    far = st.Log(name="far", time=log.time, command=log.command, command_kind="pulse_width",
+                 measured={"output_angle": 1.5 * (log.measured["output_angle"] - 1.0)})
+    assert np.isfinite(validate([far], servo, nuisance=("delay", "angle_offset", "initial_state")).total)
