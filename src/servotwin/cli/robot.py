@@ -108,6 +108,7 @@ def run(
     from servotwin.cli.robot_words import as_options, chosen_servos, models_of, mounts_of, supply_of, units_of
     from servotwin.robots import joint_names, joint_ranges, robot_model, run_motion, sizing_of
     from servotwin.robots.coupling import couplings_of
+    from servotwin.robots.motion import is_dataset
 
     check_numbers(output_step=output_step, rate=rate, blend=blend)
     plant = robot_model(model_file)
@@ -126,7 +127,7 @@ def run(
         targets = files.targets_in(out, picture=picture, video=video, force=force, inputs=inputs)
         with as_options():
             done = run_motion(plant, mounts, followed, bus=bus, joint_friction=friction, timestep=timestep,
-                              settle=settle, hold=hold or ("previous" if _is_dataset(motion) else "linear"),
+                              settle=settle, hold=hold or ("previous" if is_dataset(motion) else "linear"),
                               window=blend, progress=True)
             sized = sizing_of(done)
         found = facts(done, sized, model_file)
@@ -148,10 +149,6 @@ def check_numbers(*, output_step: float, rate: float, blend: float | None) -> No
             raise InputError(option, got=value, allowed="a positive number of seconds")
     if not _RATES[0] <= rate <= _RATES[1]:
         raise InputError("--fps", got=rate, allowed=f"{_RATES[0]:g} to {_RATES[1]:g} pictures a second")
-
-
-def _is_dataset(path: Path) -> bool:
-    return path.is_dir() or path.suffix.lower() == ".parquet"
 
 
 def _read(path: Path, joints: dict[str, str], ranges: dict[str, tuple[float, float]], **options: Any) -> Motion:
