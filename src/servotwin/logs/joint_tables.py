@@ -104,7 +104,8 @@ def _rows(path: Path, joints: dict[str, dict[str, tuple[str, str]]]) -> Rows:
     table.check_lengths()
     named = [name for name in table.header if name.lower() in _TIMES]
     if len(named) != 1:
-        raise InputError(f"{path}: column of time", got=", ".join(named) or "none", allowed=f"one of {', '.join(_TIMES)}")
+        raise InputError(f"{path}: column of time", got=", ".join(named) or "none",
+                         allowed=f"one of {', '.join(_TIMES)}")
     time = np.asarray(units.to_si(table.numbers(named[0]), _TIMES[named[0].lower()], "time"))
     own = next((name for name in table.header if name.lower() in _EPISODES), None)
     episode = np.zeros(len(time), np.int64) if own is None else table.numbers(own).astype(np.int64)

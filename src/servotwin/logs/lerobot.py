@@ -63,8 +63,8 @@ def read_lerobot_logs(path: str | Path, *, joints: str | Mapping[str, str] | Non
     degrees = dataset.degrees(data)
     columns = _columns(folder, chosen, asked, data, degrees)
     left = [joint.name for joint in known if joint not in chosen and joint.is_gripper and joints is None]
-    clock = (f"loop of {data.clock()}; positions are read at a stamp and the goal of its row acts later: the delay of a "
-             "fit is the time between")
+    clock = (f"loop of {data.clock()}; positions are read at a stamp and the goal of its row acts later: the delay of "
+             "a fit is the time between")
     remarks = (*(f"{name} was left out: it has 0 to 100 of its range; {_OPTION} {name}:0.9deg reads it, with what "
                  "one of these is" for name in left), clock)
     robot = str(dataset.info.get("robot_type") or "")
