@@ -137,3 +137,49 @@ def test_the_extra_is_named_where_it_is_missing(tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
     with pytest.raises(MissingExtraError, match=r"servotwin\[data\]"):
         read_logs(folder, joints="*:deg")
+
+
+def joint_table(folder, *, unit="_deg", joints=("shoulder_pan", "gripper"), scale=1.0):
+    """Write a table with an action and a state of each joint, and two episodes."""
+    header = ["timestamp", "episode_index", *(f"action.{name}.pos{unit}" for name in joints),
+              *(f"observation.state.{name}.pos{unit}" for name in joints)]
+    rows = [[k / FPS, episode, *(scale * (k + n) for n in range(len(joints))),
+             *(scale * (k + n - 0.5) for n in range(len(joints)))] for episode in (0, 1) for k in range(5)]
+    file = folder / "arm.csv"
+    file.write_text("\n".join([",".join(header), *(",".join(map(str, row)) for row in rows)]) + "\n")
+    return file
+
+
+@pytest.mark.parametrize(("unit", "scale", "joints"), [("_deg", 1.0, None), ("_rad", math.radians(1.0), None),
+                                                       ("", 1.0, {"*": "deg", "gripper": "deg"})])
+def test_a_table_of_several_joints_is_read_as_a_dataset(tmp_path, unit, scale, joints):
+    logs = read_logs(joint_table(tmp_path, unit=unit, scale=scale), joints=joints)
+    assert [log.name for log in logs] == ["shoulder_pan 000000", "gripper 000000", "shoulder_pan 000001",
+                                          "gripper 000001"]
+    np.testing.assert_allclose(logs[1].command, np.radians(np.arange(5) + 1.0), rtol=1e-9)
+    np.testing.assert_allclose(logs[1].measured["output_angle"], logs[1].command - math.radians(0.5), atol=1e-9)
+    assert logs[0].time[-1] == pytest.approx(4 / FPS)
+
+
+def test_a_table_of_several_joints_has_units_in_all_names_or_is_told(tmp_path):
+    with pytest.raises(InputError, match="unit of shoulder_pan is not known"):
+        read_logs(joint_table(tmp_path, unit=""))
+    text = joint_table(tmp_path).read_text().replace("action.gripper.pos_deg", "action.gripper.pos")
+    (tmp_path / "arm.csv").write_text(text)
+    with pytest.raises(InputError, match="some with a unit and some without"):
+        read_logs(tmp_path / "arm.csv")
+
+
+@pytest.mark.parametrize("names", ["action_deg,state_deg", "action,observation.state", "action [deg],state [deg]"])
+def test_action_and_state_of_one_joint_are_known_by_name(tmp_path, names):
+    rows = "\n".join(f"{k / FPS},{10.0 * k},{10.0 * k - 1.0}" for k in range(12))
+    (tmp_path / "one.csv").write_text(f"timestamp,{names}\n{rows}\n")
+    log, = read_logs(tmp_path / "one.csv")
+    np.testing.assert_allclose(log.command, np.radians(10.0 * np.arange(12)), rtol=1e-6)
+    np.testing.assert_allclose(log.measured["output_angle"], np.radians(10.0 * np.arange(12) - 1.0), rtol=1e-6)
+
+
+def test_the_clock_of_the_loop_is_said(tmp_path):
+    log = read_logs(dataset(tmp_path / "set"), joints="shoulder_pan:deg")[0]
+    assert any(text.startswith("loop of 30 Hz, stamps are numbers of frames") and "the delay of a fit" in text
+               for text in log.reading.remarks)

@@ -9,16 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from servotwin.cli import robot_options as options
 from servotwin.cli import shared_options as shared
 from servotwin.cli.robot_arm import add_to
 from servotwin.cli.robot_compare import compare
 from servotwin.cli.robot_mobile import mobile
+from servotwin.cli.robot_validate import validate
 from servotwin.cli.terminal import emit_help, emit_json, pairs, patience, show, table
 
 if TYPE_CHECKING:
     from servotwin.robots import Motion, RobotRun, Sizing
 
-_MOTION, _ROBOT = "Motion", "Servos of the robot"
 _MOST_NOTES = 6  # that are told
 _RATES = (1.0, 120.0)  # pictures a second
 
@@ -41,52 +42,28 @@ def _robot(context: typer.Context) -> None:
     "Example: servotwin robot run so101 --motion lerobot/svla_so101_pickplace --episode 3 --unit range "
     "--calibration follower.json --supply 12V:0.1ohm --out pick"))
 def run(
-    model_file: Annotated[str, typer.Argument(
-        metavar="MODEL.xml", help="MJCF or URDF file of the robot, with or without actuators; or so101, an arm that "
-        "comes with servotwin: without --servo it has six STS3215 with LeRobot's registers.")],
+    model_file: options.ModelArgument,
     motion: Annotated[Path, typer.Option(
         metavar="FILE", help="CSV file with a column time_s and one of each joint that moves (elbow_deg, elbow_rad, "
-        "slider_mm), or the folder of a LeRobot dataset.", rich_help_panel=_MOTION)],
+        "slider_mm), or the folder of a LeRobot dataset.", rich_help_panel=options.MOTION)],
     out: Annotated[Path, typer.Option(
         metavar="FOLDER", help="Folder for tables, pictures, video and page.", rich_help_panel=shared.OUTPUT)],
-    servo: Annotated[list[str] | None, typer.Option(
-        metavar="JOINT=ID", help="Servo of a joint, repeatable: catalog id, or path of a servo file (.toml); "
-        "'*=ID' for all other hinges that follow no other joint.", rich_help_panel=_ROBOT)] = None,
-    mount: Annotated[list[str] | None, typer.Option(
-        metavar="JOINT=ZERO:DIRECTION:RATIO", help="How a servo sits at its joint, repeatable: angle of the joint "
-        "where the servo's is 0, 1 or -1, turns of the joint per turn of the servo, such as elbow=-90deg:-1; of a "
-        "slide its place and its way per radian, slider=0mm:1:9mm.", rich_help_panel=_ROBOT)] = None,
-    model: Annotated[str | None, typer.Option(
-        metavar="MODEL", help="digital, pulse, pulse-inductive, bounded or averaged (default: by the kind of each "
-        "servo).", rich_help_panel=_ROBOT)] = None,
-    change: Annotated[list[str] | None, typer.Option(
-        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of all servos; repeatable; with a unit, or in SI "
-        "units.", rich_help_panel=_ROBOT)] = None,
-    register: Annotated[list[str] | None, typer.Option(
-        metavar="NAME=VALUE", help="Write a register of all servos, such as P_Coefficient=16, or a set such as "
-        "lerobot; repeatable, or with commas.", rich_help_panel=_ROBOT)] = None,
-    supply: Annotated[str | None, typer.Option(
-        metavar="VOLTS[:OHMS]", help="Supply that all servos share, such as 12V:0.1ohm (default: each its own).",
-        rich_help_panel=_ROBOT)] = None,
-    friction: Annotated[str, typer.Option(
-        metavar="HOW", help="What to do with damping and friction that the model's joints have themselves: refuse, "
-        "clear (the servo has its own) or keep.", rich_help_panel=_ROBOT)] = "refuse",
-    calibration: Annotated[Path | None, typer.Option(
-        metavar="FILE.json", help="LeRobot's calibration of the robot.", rich_help_panel=_MOTION)] = None,
+    servo: options.ServoOption = None, mount: options.MountOption = None, model: options.ModelOption = None,
+    change: options.SetOption = None, register: options.RegisterOption = None, supply: options.SupplyOption = None,
+    friction: options.FrictionOption = "refuse",
+    calibration: options.CalibrationOption = None,
     episode: Annotated[int | None, typer.Option(
-        metavar="NUMBER", help="Episode of the dataset (default: its first).", rich_help_panel=_MOTION)] = None,
-    unit: Annotated[list[str] | None, typer.Option(
-        metavar="[JOINT=]UNIT", help="Unit of a dataset's goals, if it is not known: deg, range (-100 to 100), or such "
-        "as deg-90; repeatable.", rich_help_panel=_MOTION)] = None,
+        metavar="NUMBER", help="Episode of the dataset (default: its first).", rich_help_panel=options.MOTION)] = None,
+    unit: options.UnitOption = None,
     hold: Annotated[str | None, typer.Option(
         metavar="HOW", help="What servos are told between samples: linear (default of tables) or previous (default of "
-        "datasets, as LeRobot sends them).", rich_help_panel=_MOTION)] = None,
+        "datasets, as LeRobot sends them).", rich_help_panel=options.MOTION)] = None,
     blend: Annotated[float | None, typer.Option(
         metavar="SECONDS", help="Over which ideal actuators round the corners of the motion (default: two samples, "
-        "0.05 to 0.1 s).", rich_help_panel=_MOTION)] = None,
+        "0.05 to 0.1 s).", rich_help_panel=options.MOTION)] = None,
     settle: Annotated[float, typer.Option(
         metavar="SECONDS", help="For which the robot holds its first goal before the motion, and its last one after "
-        "it.", rich_help_panel=_MOTION)] = 0.5,
+        "it.", rich_help_panel=options.MOTION)] = 0.5,
     timestep: Annotated[float | None, typer.Option(
         metavar="SECONDS", help="Of MuJoCo (default: that of the model).", rich_help_panel=shared.OUTPUT)] = None,
     output_step: Annotated[float, typer.Option(
@@ -108,6 +85,7 @@ def run(
     from servotwin.cli.robot_words import as_options, chosen_servos, models_of, mounts_of, supply_of, units_of
     from servotwin.robots import joint_names, joint_ranges, robot_model, run_motion, sizing_of
     from servotwin.robots.coupling import couplings_of
+    from servotwin.robots.motion import is_dataset
 
     check_numbers(output_step=output_step, rate=rate, blend=blend)
     plant = robot_model(model_file)
@@ -126,7 +104,7 @@ def run(
         targets = files.targets_in(out, picture=picture, video=video, force=force, inputs=inputs)
         with as_options():
             done = run_motion(plant, mounts, followed, bus=bus, joint_friction=friction, timestep=timestep,
-                              settle=settle, hold=hold or ("previous" if _is_dataset(motion) else "linear"),
+                              settle=settle, hold=hold or ("previous" if is_dataset(motion) else "linear"),
                               window=blend, progress=True)
             sized = sizing_of(done)
         found = facts(done, sized, model_file)
@@ -148,10 +126,6 @@ def check_numbers(*, output_step: float, rate: float, blend: float | None) -> No
             raise InputError(option, got=value, allowed="a positive number of seconds")
     if not _RATES[0] <= rate <= _RATES[1]:
         raise InputError("--fps", got=rate, allowed=f"{_RATES[0]:g} to {_RATES[1]:g} pictures a second")
-
-
-def _is_dataset(path: Path) -> bool:
-    return path.is_dir() or path.suffix.lower() == ".parquet"
 
 
 def _read(path: Path, joints: dict[str, str], ranges: dict[str, tuple[float, float]], **options: Any) -> Motion:
@@ -179,7 +153,7 @@ def check_drawing(plant: Any, camera: str | None, *, video: bool) -> bool:
 
 
 def _show(done: RobotRun, sized: dict[str, Sizing], found: dict[str, Any]) -> None:
-    from servotwin.cli.robot_facts import HEAD, heat_is_assumed, row
+    from servotwin.cli.robot_facts import HEAD, heat_is_assumed, place, row
 
     servos: dict[str, list[str]] = {}
     for joint, mount in done.mounts.items():
@@ -194,6 +168,9 @@ def _show(done: RobotRun, sized: dict[str, Sizing], found: dict[str, Any]) -> No
          pairs([*([("assumed", f"thermal numbers by mass: {', '.join(assumed)}")] if assumed else []),
                 *([("not known", f"temperatures, for neither thermal numbers nor a mass are given: "
                     f"{', '.join(unknown)}")] if unknown else []),
+                *([("off the measured joints", ", ".join(
+                    f"{joint} {place(done.measured_error(joint), done.slides(joint))}" for joint in done.mounts
+                    if joint in done.motion.measured) + ", rms")] if done.motion.measured else []),
                 *(("note", text) for text in found["notes"][:_MOST_NOTES]),
                 ("written", found["files"][-1])]))
 
@@ -203,3 +180,8 @@ robot.command("mobile", help="Let the paper's mobile robot drive along waypoints
               epilog="Example: servotwin robot mobile --unequal --encoders 512 --out round")(mobile)
 robot.command("compare", help="Compare all controllers on all tasks of the arms, by every fidelity.",
               epilog="Example: servotwin robot compare --robot two-link --out compared")(compare)
+robot.command("validate", help="Send the recorded goals of a robot through its servos, and say how far the simulated "
+              "joints are from the measured ones.", epilog=(
+    "Example: servotwin robot validate so101 lerobot/svla_so101_pickplace --episode 3 --unit range "
+    "--calibration follower.json --supply 12V:0.1ohm --out compared\n\n"
+    "Example: servotwin robot validate so101 arm.csv --servo '*=fitted.toml'"))(validate)

@@ -36,7 +36,7 @@ def _of_joint(run: RobotRun, sized: Sizing) -> dict[str, Any]:
     return {
         "servo": mount.model.servo.name, "model": model_name(mount.model),
         "mount": {"zero": mount.zero, "direction": mount.direction, "ratio": mount.ratio},
-        "slides": run.slides(sized.joint), "tracking": shown,
+        "slides": run.slides(sized.joint), "tracking": shown, "measured_rms": run.measured_error(sized.joint),
         "sizing": {
             "big_enough": sized.big_enough, "verdict": sized.verdict, "margin": sized.margin, "short": sized.short,
             "worst": sized.worst._asdict(), "supply_voltage": sized.voltage, "left_voltage": sized.left_voltage,

@@ -157,8 +157,11 @@ def _joint_table(run: RobotRun, output_step: float) -> str:
     for joint in run.mounts:
         slides = run.slides(joint)
         unit, dimension = ("mm", "length") if slides else ("deg", "angle")
-        places = {"goal": run.goal(joint), "place" if slides else "angle": run.record[joint]["joint_angle"],
-                  "ideal": run.ideal.courses[joint].angle}
+        places: dict[str, NDArray[np.float64]] = {
+            "goal": run.goal(joint), "place" if slides else "angle": run.record[joint]["joint_angle"],
+            "ideal": run.ideal.courses[joint].angle}
+        if (measured := run.measured(joint)) is not None:
+            places["measured"] = measured
         for name, values in places.items():
             columns[f"{joint}.{name}_{unit}"] = np.asarray(from_si(values, unit, dimension))
         columns[f"{joint}.needed_{'force_N' if slides else 'torque_Nm'}"] = run.ideal.torque[joint]
@@ -172,7 +175,7 @@ def _pictures(run: RobotRun, sized: Mapping[str, Sizing]) -> dict[str, Callable[
     record = run.record
     followed = [plotting.JointTrace(
         joint, run.time, run.goal(joint), record[joint]["joint_angle"], run.ideal.courses[joint].angle,
-        run.slides(joint)) for joint in run.mounts]
+        run.slides(joint), run.measured(joint)) for joint in run.mounts]
     drawn = [plotting.ServoTrace(joint, run.time, record[joint]["armature_current"], *(
         record[joint].get(name) for name in ("bus_voltage", "winding_temperature", "housing_temperature")))
         for joint in run.mounts]

@@ -37,8 +37,9 @@ def page(run: RobotRun, sized: Mapping[str, Sizing], found: Mapping[str, Any], f
                       "and what the servo gave, as means over 20 ms, in its curve at full drive. Filled: the servo "
                       "drives the motion; open: it holds it back. The number is the margin.")
             + f"<h2>Following the motion</h2>\n{_tracking(run)}"
-            + figure("tracking.png", "Goal, servo and ideal actuator. Dashed lines: the motion begins and ends; "
-                      "before and after it the robot holds its goal.")
+            + figure("tracking.png", "Goal, servo and ideal actuator"
+                      f"{', and the measured joint' if run.motion.measured else ''}. Dashed lines: the motion "
+                      "begins and ends; before and after it the robot holds its goal.")
             + "<h2>Currents, supply, temperatures</h2>\n"
             + figure("electrical.png", "Motor current as its mean and, pale, all between the smallest and the "
                       f"largest; voltage at the servo; temperatures.{_heat_words(run)}")
@@ -122,13 +123,16 @@ def _sizes(run: RobotRun, sized: Mapping[str, Sizing]) -> str:
 
 
 def _tracking(run: RobotRun) -> str:
-    head = ["joint", "servo", "error, rms", "largest", "late by", "error left", "stands off before", "after",
+    measured = bool(run.motion.measured)
+    head = ["joint", "servo", *(["off the measured joint, rms"] if measured else []), "error, rms", "largest",
+            "late by", "error left", "stands off before", "after",
             "current, peak", "mean", "lowest voltage"]
     rows = []
     for joint, found in run.tracking.items():
         slides = run.slides(joint)
         rows.append([
             joint, run.mounts[joint].model.servo.name,
+            *([signed(place(run.measured_error(joint), slides)) or "–"] if measured else []),
             *(signed(place(value, slides)) for value in (found.rms, found.largest)),
             _or_dash(1e3 * found.delay, "{:.0f} ms"),
             *(signed(place(value, slides)) or "–" for value in (

@@ -25,6 +25,7 @@ _ROLES: dict[str, frozenset[str]] = {name: frozenset(words.split()) for name, wo
     VOLTAGE: "voltage spannung vcc vbat vin vbus vsupply battery",
     SPEED: "speed velocity vel omega drehzahl geschwindigkeit",
 }.items()}
+_LEROBOT = frozenset(("observation", "state"))
 _ALONE = {"t": TIME, "q": ANGLE, "i": "current"}  # letters that mean this where they stand alone
 _MOTOR = frozenset(("motor", "armature", "winding", "anker"))
 _OTHER = frozenset((
@@ -74,6 +75,8 @@ def meaning_of(column: str, below: str = "") -> Meaning | None:
     if _ARDUINO.fullmatch(column.strip()):
         return Meaning(COUNTS, "", "")
     words, unit = _parts(column, below)
+    if words and words <= _LEROBOT:  # "observation.state": where the joint is
+        words = frozenset(("position",))
     dimension = (unit_word(unit) or ("", ""))[1]
     if words & _OTHER:
         return None

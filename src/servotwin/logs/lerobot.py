@@ -10,6 +10,7 @@ import numpy as np
 from servotwin.errors import InputError, UnitError, UnknownNameError
 from servotwin.logs.columns import Column
 from servotwin.logs.csv_logs import in_file
+from servotwin.logs.joint_tables import is_joint_table
 from servotwin.logs.lerobot_data import ACTION, STATE, Joint, Rows, dataset_of, open_dataset
 from servotwin.logs.log import Log
 from servotwin.logs.reading import ReadColumn, Reading
@@ -21,7 +22,7 @@ _OPTION = "--joint"
 
 def recognises(path: Path) -> bool:
     """Return whether a path belongs to a dataset."""
-    return dataset_of(path) is not None
+    return dataset_of(path) is not None or is_joint_table(path)
 
 
 def logs_of(path: Path, *, joints: str | Mapping[str, str] | None) -> list[Log]:
@@ -32,10 +33,15 @@ def logs_of(path: Path, *, joints: str | Mapping[str, str] | None) -> list[Log]:
 def read_lerobot_logs(path: str | Path, *, joints: str | Mapping[str, str] | None = None) -> list[Log]:
     """Return the joints of a LeRobot dataset as logs, one a joint and episode.
 
+    A loop of LeRobot stamps its beginning, reads positions, and sends goals some milliseconds later, so that a goal
+    acts on the positions of later rows. Rows stay as they are: the `delay` of a fit is the time from the reading of
+    positions to when the goal of the same row acts. A remark of each log says so, and what its stamps are.
+
     Parameters
     ----------
     path : str or Path
-        The dataset's folder, or one of its Parquet files.
+        The dataset's folder, or one of its Parquet files; or a table (CSV) that has an action and a state of several
+        joints, such as `action.elbow_deg` and `state.elbow_deg`.
     joints : str or mapping, optional
         Which joints, and the unit of their positions: ``"shoulder_pan:deg,elbow_flex:0.93deg"``,
         ``{"elbow_flex": "0.93deg"}``, ``"shoulder_pan"``; `*` stands for all others but the gripper. All but the
@@ -57,8 +63,10 @@ def read_lerobot_logs(path: str | Path, *, joints: str | Mapping[str, str] | Non
     degrees = dataset.degrees(data)
     columns = _columns(folder, chosen, asked, data, degrees)
     left = [joint.name for joint in known if joint not in chosen and joint.is_gripper and joints is None]
-    remarks = tuple(f"{name} was left out: it has 0 to 100 of its range; {_OPTION} {name}:0.9deg reads it, with what "
-                    "one of these is" for name in left)
+    clock = (f"loop of {data.clock()}; positions are read at a stamp and the goal of its row acts later: the delay of "
+             "a fit is the time between")
+    remarks = (*(f"{name} was left out: it has 0 to 100 of its range; {_OPTION} {name}:0.9deg reads it, with what "
+                 "one of these is" for name in left), clock)
     robot = str(dataset.info.get("robot_type") or "")
     return [_log(folder, data, joint, columns[joint.name], (start, stop), {
         "joint": joint.name, "episode": float(episode), **({"robot": robot} if robot else {})}, remarks)

@@ -12,7 +12,7 @@ huggingface/lerobot). Values of that range are cut off at 100, so positions beyo
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,22 +29,24 @@ _RANGE = 100.0  # of normalised positions
 _ROUNDING = 1e-3  # of float32 at its end
 _SERVO_ROBOTS = ("so100", "so101", "so_", "koch", "lekiwi", "moss", "bi_so")  # beginnings of `robot_type`
 _NO_POSITIONS = (".vel", ".torque", ".effort", ".current")
+_REGULAR = 1e-3  # of a step: float32 rounds stamps of an hour by as much
 _OLD = "main_"  # how joints were named before June 2025
 
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint: its name, and its places in `action` and `observation.state`."""
+    """A joint: its name, its places in `action` and `observation.state`, and whether it surely has degrees."""
 
     name: str
     column: str
     action: int
     state: int
+    in_degrees: bool = False
 
     @property
     def is_gripper(self) -> bool:
         """Whether it has 0 to 100 rather than -100 to 100."""
-        return "gripper" in self.name.lower()
+        return "gripper" in self.name.lower() and not self.in_degrees
 
     @property
     def is_old(self) -> bool:
@@ -84,12 +86,18 @@ class Dataset:
     joints : list of Joint
     files : list of Path
         With its rows.
+    read : callable, optional
+        Returns its rows; those of the Parquet files unless given.
+    unit_from : str
+        From what it is known that positions are degrees; empty where only they tell.
     """
 
     folder: Path
     info: Mapping[str, Any]
     joints: list[Joint]
     files: list[Path]
+    read: Callable[[], Rows] | None = None
+    unit_from: str = ""
 
     def rows(self) -> Rows:
         """Return what its files hold.
@@ -101,14 +109,18 @@ class Dataset:
         MissingExtraError
             If pyarrow is not installed.
         """
+        if self.read is not None:
+            return self.read()
         if not self.files:
             raise InputError(f"{self.folder}", got="no data/**/*.parquet",
                              allowed="a dataset with its data, not only meta")
-        return Rows(self.files, max(joint.action for joint in self.joints) + 1,
+        return rows_of_files(self.files, max(joint.action for joint in self.joints) + 1,
                     max(joint.state for joint in self.joints) + 1)
 
     def degrees(self, rows: Rows) -> str:
         """Return from what the positions are known to be degrees; empty where they are not."""
+        if self.unit_from:
+            return self.unit_from
         body = [joint for joint in self.joints if not joint.is_gripper]
         if not body or not str(self.info.get("robot_type") or "").startswith(_SERVO_ROBOTS):
             return ""
@@ -132,7 +144,11 @@ def open_dataset(path: Path) -> Dataset:
     InputError
         If it is none, or has no joints.
     """
+    from servotwin.logs.joint_tables import open_joint_table
+
     folder = dataset_of(path)
+    if folder is None and (table := open_joint_table(path)) is not None:
+        return table
     if folder is None:
         raise InputError(f"{path}", got="no dataset of LeRobot", allowed=f"a folder with {_INFO}, or a file of it")
     info = read_json(folder / _INFO)
@@ -172,21 +188,47 @@ def _size(feature: object) -> int:
     return int(shape[0]) if isinstance(shape, list) and len(shape) == 1 and isinstance(shape[0], int) else 0
 
 
+@dataclass(frozen=True, eq=False)
 class Rows:
-    """The rows of the Parquet files, in the order of episodes and frames."""
+    """The rows of a dataset, in the order of episodes and frames.
 
-    def __init__(self, files: list[Path], action_size: int, state_size: int) -> None:
-        parts = [_read(file, action_size, state_size) for file in files]
-        order = np.lexsort((np.concatenate([p["timestamp"] for p in parts]),
-                            np.concatenate([p["episode_index"] for p in parts])))
-        self.actions, self.states, self.time, self.episode = (
-            np.concatenate([p[key] for p in parts])[order] for key in (ACTION, STATE, "timestamp", "episode_index"))
+    Parameters
+    ----------
+    actions, states : ndarray, shape (n, joints)
+    time : ndarray, shape (n,)
+        [s]
+    episode : ndarray of int, shape (n,)
+    """
+
+    actions: NDArray[np.float64]
+    states: NDArray[np.float64]
+    time: NDArray[np.float64]
+    episode: NDArray[Any]
 
     def episodes(self) -> list[tuple[int, int, int]]:
         """Return the first row, the one after the last, and the number of each episode."""
         ends = np.flatnonzero(np.diff(self.episode)) + 1
         starts = [0, *ends.tolist()]
         return [(a, b, int(self.episode[a])) for a, b in zip(starts, [*ends.tolist(), self.episode.size], strict=True)]
+
+    def clock(self) -> str:
+        """Return what the stamps are, in words: numbers of frames, or read off a clock."""
+        steps = np.concatenate([np.diff(self.time[a:b]) for a, b, _ in self.episodes()])
+        if not steps.size:
+            return "one frame"
+        usual = float(np.median(steps))
+        regular = bool(np.all(np.abs(steps - usual) < _REGULAR * usual))
+        what = "numbers of frames over the rate, not read off a clock" if regular else "read off a clock"
+        return f"{1.0 / max(usual, 1e-9):.3g} Hz, stamps are {what}"
+
+
+def rows_of_files(files: list[Path], action_size: int, state_size: int) -> Rows:
+    """Return the rows of Parquet files."""
+    parts = [_read(file, action_size, state_size) for file in files]
+    order = np.lexsort((np.concatenate([p["timestamp"] for p in parts]),
+                        np.concatenate([p["episode_index"] for p in parts])))
+    return Rows(*(np.concatenate([p[key] for p in parts])[order]
+                  for key in (ACTION, STATE, "timestamp", "episode_index")))
 
 
 def _read(file: Path, action_size: int, state_size: int) -> dict[str, NDArray[Any]]:

@@ -21,6 +21,7 @@ from servotwin.plotting.loops import loop_curve
 from servotwin.plotting.panels import Curve, Limit, curves, pulses
 from servotwin.plotting.paths import PathTrace, robot_paths
 from servotwin.plotting.ranking import ranking
+from servotwin.plotting.replays import ReplayTrace, replay_windows
 from servotwin.plotting.responses import SHOWN, Shown, shown, time_response
 from servotwin.plotting.robots import (
     Cloud,
@@ -47,6 +48,7 @@ __all__ = [
     "JointUse",
     "Limit",
     "PathTrace",
+    "ReplayTrace",
     "Response",
     "ServoTrace",
     "ShaftTrace",
@@ -69,6 +71,7 @@ __all__ = [
     "pulses",
     "ranking",
     "readable",
+    "replay_windows",
     "robot_paths",
     "root_locus",
     "save",

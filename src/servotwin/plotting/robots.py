@@ -41,6 +41,8 @@ class JointTrace(NamedTuple):
     time, goal, real, ideal : ndarray, shape (n,)
         What was asked for, what the servo made of it, and what an ideal actuator makes of it.
     slides : bool
+    measured : ndarray, shape (n,), optional
+        Where the real joint was; nan where it was not measured.
     """
 
     label: str
@@ -49,6 +51,7 @@ class JointTrace(NamedTuple):
     real: Array
     ideal: Array
     slides: bool = False
+    measured: Array | None = None
 
 
 class ServoTrace(NamedTuple):
@@ -242,6 +245,9 @@ def _followed(ax: Axes, joint: JointTrace) -> None:
              ("servo", joint.real, {"color": COLOURS["blue"], "linewidth": 1.5}))
     for label, values, style in lines:
         ax.plot(time, _shown(_thin(values, _LINE_POINTS), joint.slides), label=label, **style)  # type: ignore[arg-type]
+    if joint.measured is not None:
+        ax.plot(time, _shown(_thin(joint.measured, _LINE_POINTS), joint.slides), label="measured",
+                color=COLOURS["vermilion"], linewidth=1.1, linestyle=(0, (5, 1.5)))
     ax.set_title(joint.label.replace("_", " "), fontweight="bold")
     ax.set_ylabel("place (mm)" if joint.slides else "angle (°)")
 
@@ -250,6 +256,9 @@ def _error(ax: Axes, joint: JointTrace) -> None:
     ax.axhline(0.0, color=COLOURS["grey"], linewidth=1.0)
     ax.plot(_thin(joint.time, _LINE_POINTS), _thin(_shown(joint.goal - joint.real, joint.slides), _LINE_POINTS),
             color=COLOURS["blue"], linewidth=1.2)
+    if joint.measured is not None:
+        ax.plot(_thin(joint.time, _LINE_POINTS), _thin(_shown(joint.goal - joint.measured, joint.slides),
+                _LINE_POINTS), color=COLOURS["vermilion"], linewidth=1.0, linestyle=(0, (5, 1.5)))
     ax.set_ylabel("error (mm)" if joint.slides else "error (°)")
 
 

@@ -15,6 +15,7 @@ from servotwin.robots.pursuit import PurePursuit
 from servotwin.robots.recipe import Recipe, recipe_of
 from servotwin.robots.record import Record, ServoRecord
 from servotwin.robots.redundancy import AwayFromLimits, LeastMotion, LeastTorque
+from servotwin.robots.replay import JointError, Replay, RobotValidation, validate_robot
 from servotwin.robots.run import RobotRun, run_motion
 from servotwin.robots.scara import scara
 from servotwin.robots.sizing import Sizing, sizing_of
@@ -26,12 +27,13 @@ from servotwin.robots.waypoints import WaypointRun, ideal_waypoints, round_of, r
 from servotwin.robots.wheels import Odometry, Pose, SpeedMap, wheel_servo, wheel_speed_of, worn
 
 __all__ = [
-    "Arm", "AwayFromLimits", "CommandMap", "DriveState", "JointPath", "LeastMotion", "LeastTorque", "Motion",
-    "Mount", "Odometry", "Pose", "PurePursuit", "Recipe", "Record", "RobotRun", "ServoActuated", "ServoDrive",
-    "ServoRecord", "Sizing", "SpeedMap", "TaskMetrics", "TaskRun", "ToolPath", "WaypointRun", "contour_error",
-    "follow", "ideal_task", "ideal_waypoints", "joint_names", "joint_ranges", "mobile_robot", "read_motion",
-    "recipe_of", "robot_model", "round_of", "run_motion", "run_task", "run_waypoints", "scara", "sizing_of",
-    "task_path", "two_link", "unequal_servos", "wheel_servo", "wheel_speed_of", "worn",
+    "Arm", "AwayFromLimits", "CommandMap", "DriveState", "JointError", "JointPath", "LeastMotion", "LeastTorque",
+    "Motion", "Mount", "Odometry", "Pose", "PurePursuit", "Recipe", "Record", "Replay", "RobotRun",
+    "RobotValidation", "ServoActuated", "ServoDrive", "ServoRecord", "Sizing", "SpeedMap", "TaskMetrics", "TaskRun",
+    "ToolPath", "WaypointRun", "contour_error", "follow", "ideal_task", "ideal_waypoints", "joint_names",
+    "joint_ranges", "mobile_robot", "read_motion", "recipe_of", "robot_model", "round_of", "run_motion", "run_task",
+    "run_waypoints", "scara", "sizing_of", "task_path", "two_link", "unequal_servos", "validate_robot",
+    "wheel_servo", "wheel_speed_of", "worn",
 ]
 
 

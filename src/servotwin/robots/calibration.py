@@ -66,11 +66,24 @@ class Calibration:
         goals : (n,) array
         form : {"-100 to 100", "0 to 100", "degrees"}
         """
+        return np.trunc(self._unrounded(goals, form))
+
+    def read_counts(self, positions: NDArray[np.float64], form: str) -> NDArray[np.float64]:
+        """Return the whole counts that positions were made of.
+
+        Examples
+        --------
+        >>> Calibration(range_min=900, range_max=3100).read_counts(np.array([49.9999]), RANGE).tolist()
+        [2550.0]
+        """
+        return np.rint(self._unrounded(positions, form))
+
+    def _unrounded(self, goals: NDArray[np.float64], form: str) -> NDArray[np.float64]:
         if form == DEGREES:
-            return np.trunc(goals * (_COUNTS - 1) / 360.0 + (self.range_min + self.range_max) / 2.0)
+            return np.asarray(goals * (_COUNTS - 1) / 360.0 + (self.range_min + self.range_max) / 2.0)
         if self.inverted:
             goals = -goals if form == RANGE else 100.0 - goals
-        return np.trunc(range_share(goals, form) * (self.range_max - self.range_min) + self.range_min)
+        return np.asarray(range_share(goals, form) * (self.range_max - self.range_min) + self.range_min)
 
     def angles(self, counts: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the angles from the middle of the range [rad]."""
@@ -89,7 +102,7 @@ def range_share(goals: NDArray[np.float64], form: str) -> NDArray[np.float64]:
 
 
 def joint_angles(goals: NDArray[np.float64], form: str, calibration: Calibration | None,
-                 limits: tuple[float, float] | None) -> NDArray[np.float64]:
+                 limits: tuple[float, float] | None, *, measured: bool = False) -> NDArray[np.float64]:
     """Return goals as angles of a joint [rad].
 
     Parameters
@@ -102,6 +115,8 @@ def joint_angles(goals: NDArray[np.float64], form: str, calibration: Calibration
         Of the joint in the robot's model. Without a calibration they are the ends of -100 to 100. With one, they only
         say where the calibrated range lies: the middle of both is the same, or where 0 to 100 is meant, the lower end.
         Unless given, the middle is at 0 [rad]
+    measured : bool
+        They are positions, not goals: rounded to the nearest count, not cut off.
 
     Raises
     ------
@@ -115,7 +130,7 @@ def joint_angles(goals: NDArray[np.float64], form: str, calibration: Calibration
     """
     middle = 0.0 if limits is None else 0.5 * (limits[0] + limits[1])
     if calibration is not None:
-        counts = calibration.counts(goals, form)
+        counts = calibration.read_counts(goals, form) if measured else calibration.counts(goals, form)
         if form == OPENING and limits is not None:
             closed = calibration.counts(np.zeros(1), form)
             return np.asarray(limits[0] + _ANGLE * np.abs(counts - closed))

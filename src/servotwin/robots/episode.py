@@ -30,8 +30,8 @@ class Goals:
     ----------
     time : (n,) array
         Counted from the first frame [s]
-    angles : dict of str to (n,) array
-        By joint [rad]
+    angles, measured : dict of str to (n,) array
+        Goals and measured positions by joint [rad]
     source : str
         Dataset and episode.
     robot : str
@@ -40,6 +40,7 @@ class Goals:
 
     time: NDArray[np.float64]
     angles: dict[str, NDArray[np.float64]]
+    measured: dict[str, NDArray[np.float64]]
     source: str
     robot: str
 
@@ -81,20 +82,26 @@ def episode_goals(path: Path, joints: Mapping[str, str], *, unit: str | Mapping[
     robot = str(dataset.info.get("robot_type") or "")
     drive_mode = not robot.startswith(_DYNAMIXEL)
     known = None if calibration is None else read_calibration(calibration, drive_mode=drive_mode)
-    angles = {}
+    angles, measured = {}, {}
     for joint in dataset.joints:
-        form, limits = forms[joint.name], (ranges or {}).get(joint.name)
+        form, limits = forms[joint.name], None if dataset.unit_from else (ranges or {}).get(joint.name)
         one = None if known is None else _calibrated(known, joint, calibration)
         if form.form != DEGREES and one is None and limits is None:
             raise InputError(f"{dataset.folder}: {joint.name} has {form.form} of its calibrated range",
                              allowed="with calibration=, a file of LeRobot, or ranges=, the limits of the joint in rad")
-        goals = np.asarray(rows.actions[start:stop, joint.action], dtype=np.float64)
-        if not np.all(np.isfinite(goals)):
-            raise InputError(f"{dataset.folder}: {joint.name} in episode {number}", allowed="finite numbers",
-                             got=float(goals[~np.isfinite(goals)][0]))
-        angles[joint.name] = joint_angles(form.degrees(goals), form.form, one, limits)
+        for found, some, at in ((angles, rows.actions, joint.action), (measured, rows.states, joint.state)):
+            values = np.asarray(some[start:stop, at], dtype=np.float64)
+            if not np.all(np.isfinite(values)):
+                raise InputError(f"{dataset.folder}: {joint.name} in episode {number}", allowed="finite numbers",
+                                 got=float(values[~np.isfinite(values)][0]))
+            found[joint.name] = joint_angles(form.degrees(values), form.form, one, limits, measured=found is measured)
     time = np.asarray(rows.time[start:stop] - rows.time[start])
-    return Goals(time=time, angles=angles, source=f"{path}, episode {number}", robot=robot)
+    return Goals(time=time, angles=angles, measured=measured, source=f"{path}, episode {number}", robot=robot)
+
+
+def episodes_of(path: Path) -> tuple[int, ...]:
+    """Return the numbers of all episodes of a dataset."""
+    return tuple(number for _, _, number in open_dataset(path).rows().episodes())
 
 
 def _episode(dataset: Dataset, rows: Rows, episode: int | None) -> tuple[int, int, int]:

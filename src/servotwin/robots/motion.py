@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from servotwin import units
 from servotwin.errors import InputError, UnitError, UnknownNameError
+from servotwin.logs.joint_tables import is_joint_table
 from servotwin.robots.episode import episode_goals
 from servotwin.tables import TextTable, read_table
 from servotwin.units.words import unit_word, units_written
@@ -37,6 +38,8 @@ class Motion:
         Joints that it says nothing of: they hold still where they are.
     robot : str
         LeRobot's name of the kind of robot that it was recorded with; empty where that is not known.
+    measured : mapping of str to (n,) array
+        Where joints were at these times, as far as it was recorded: of a hinge [rad], of a slide [m]
 
     Raises
     ------
@@ -55,6 +58,7 @@ class Motion:
     source: str
     still: tuple[str, ...] = field(default=())
     robot: str = ""
+    measured: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check, and keep own copies that nobody changes."""
@@ -68,10 +72,11 @@ class Motion:
         if not self.angles:
             raise InputError(f"{self.source}: joints", got="none", allowed="at least one that moves")
         angles = {str(joint): self._array(joint, values) for joint, values in self.angles.items()}
-        for joint, values in angles.items():
+        measured = {str(joint): self._array(joint, values) for joint, values in self.measured.items()}
+        for joint, values in (*angles.items(), *measured.items()):
             if values.shape != time.shape:
                 raise InputError(f"{self.source}: {joint}", got=f"shape {values.shape}", allowed=f"{time.shape}")
-        for name, value in (("time", time), ("angles", angles), ("still", tuple(self.still))):
+        for name, value in (("time", time), ("angles", angles), ("measured", measured), ("still", tuple(self.still))):
             object.__setattr__(self, name, value)
 
     def _array(self, name: str, values: object) -> NDArray[np.float64]:
@@ -131,7 +136,9 @@ def read_motion(path: str | Path, joints: Iterable[str] | Mapping[str, str], *,
     r"""Return the motion in a table, or the goals of an episode of a LeRobot dataset.
 
     A table (CSV) has a column `time` (or `time_s`, `time_ms`), counted from its first row, and a column for each joint
-    that moves: `elbow_deg`, `elbow_rad`, `slider_mm`, or `elbow` in SI. The rest of the parameters is for datasets.
+    that moves: `elbow_deg`, `elbow_rad`, `slider_mm`, or `elbow` in SI. The rest of the parameters is for datasets, and
+    for tables with an action and a state of several joints (`action.elbow_deg`, `state.elbow_deg`). The positions that
+    a dataset has beside its goals are `measured`.
 
     Goals of a dataset are degrees, or -100 to 100 of the range in which a joint was calibrated; a gripper has 0 to 100.
     Angles count from the middle of that range, as LeRobot's degrees do; `servotwin.robots.calibration` says how.
@@ -179,9 +186,9 @@ def read_motion(path: str | Path, joints: Iterable[str] | Mapping[str, str], *,
     known = _known(joints)
     for joint, limits in (ranges or {}).items():
         _check_limits(joint, limits)
-    if _is_dataset(path):
+    if is_dataset(path):
         goals = episode_goals(path, known, unit=unit, calibration=calibration, episode=episode, ranges=ranges)
-        time, angles, source, robot = goals.time, goals.angles, goals.source, goals.robot
+        time, angles, source, robot, measured = goals.time, goals.angles, goals.source, goals.robot, goals.measured
     else:
         for name, given in (("unit", unit), ("calibration", calibration), ("episode", episode)):
             if given is not None:
@@ -190,13 +197,15 @@ def read_motion(path: str | Path, joints: Iterable[str] | Mapping[str, str], *,
         table = read_table(path, lambda name: name in _TIMES or _meaning(name, known) is not None)
         table.check_lengths()
         time, angles, source, robot = _time(table), _angles(table, known), f"{path}", ""
+        measured = {}
     still = tuple(joint for joint in known if joint not in angles)
-    return Motion(time=time, angles=angles, source=source, still=still, robot=robot)
+    return Motion(time=time, angles=angles, source=source, still=still, robot=robot, measured=measured)
 
 
-def _is_dataset(path: Path) -> bool:
+def is_dataset(path: Path) -> bool:
+    """Tell whether a path is of a dataset of LeRobot, or of a table that is read as one."""
     try:
-        return path.is_dir() or (path.suffix.lower() == _DATASET_ENDING and path.is_file())
+        return path.is_dir() or (path.suffix.lower() == _DATASET_ENDING and path.is_file()) or is_joint_table(path)
     except (OSError, ValueError):  # reading says what is wrong with the name
         return False
 

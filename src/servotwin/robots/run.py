@@ -83,6 +83,18 @@ class RobotRun:
         """Return where a joint is to be at these times: angle of a hinge [rad], place of a slide [m]."""
         return goal_of(self.motion, joint, self.time, self.ideal)
 
+    def measured(self, joint: str) -> Array | None:
+        """Return where the real joint was at these times, nan before and after its episode; None if nobody measured."""
+        if joint not in self.motion.measured:
+            return None
+        return np.interp(self.time, self.motion.time, self.motion.measured[joint], left=math.nan, right=math.nan)
+
+    def measured_error(self, joint: str) -> float:
+        """Return how far the simulated joint is from the measured one, rms; nan if nobody measured [rad or m]."""
+        measured = self.measured(joint)
+        return math.nan if measured is None else math.sqrt(float(np.nanmean(
+            (self.record[joint]["joint_angle"] - measured)**2)))
+
     def slides(self, joint: str) -> bool:
         """Tell whether a joint is a slide."""
         return joint_names(self.model)[joint] == "length"
