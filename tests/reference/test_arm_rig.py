@@ -197,6 +197,19 @@ def test_an_episode_of_six_joints_takes_little_and_is_read_back(tmp_path):
     assert table.dtype.names[1] == "actionshoulder_panpos"
 
 
+def test_goals_and_positions_are_the_encoders():
+    """A zero moves the joint, not what is recorded: encoder and goal differ by the droop of an arm without one."""
+    truth = rig.random_truth(rig.PAN_TILT_LIFT, "feetech", 6)
+    still = truth._replace(servos=tuple(servo._replace(zero=0.0) for servo in truth.servos))
+    moved = truth._replace(servos=tuple(servo._replace(zero=z * DELTA) for servo, z in
+                                        zip(still.servos, (20.0, -15.0, 10.0), strict=True)))
+    plain, other = (recorder.record(one, 4.0, "smooth") for one in (still, moved))
+    np.testing.assert_array_equal(plain.action, other.action)
+    np.testing.assert_allclose(other.true_angle, plain.true_angle, atol=5e-3)
+    np.testing.assert_allclose(other.motion.angle - plain.motion.angle,
+                               np.tile(-DELTA * np.array([20.0, -15.0, 10.0]), (len(plain.time), 1)), atol=5e-3)
+
+
 def test_smaller_steps_move_alike():
     truth = rig.random_truth(rig.SO101, "feetech", 4)
     coarse, fine = (recorder.record(truth, 5.0, "smooth", step=step).true_angle for step in (2e-4, 5e-5))
