@@ -250,7 +250,7 @@ int run_arm(int n, const Link *L, const Servo *S, const double *up, double V_oc,
                 double g = goals[m->taken * n + j];
                 m->taken++;
                 if (isnan(g)) continue;
-                g = floor((g + S[j].zero) / DELTA + 0.5);
+                g = floor(g / DELTA + 0.5);
                 m->goal = g; m->on_course = 0;
             }
             m->duty = tick(m, &S[j], q[j]);
