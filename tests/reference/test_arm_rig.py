@@ -9,6 +9,7 @@ import pytest
 import servotwin as st
 from reference import arm_rig as rig
 from reference import arm_rig_recorder as recorder
+from reference.arm_rig_fits import left_by, servo_of, truths_of
 from reference.arm_rig_servo import DELTA, USUAL, Servo, dynamixel, feetech
 
 pytestmark = pytest.mark.skipif(rig.compiler() is None, reason="no C compiler")
@@ -107,24 +108,6 @@ CASES = {"feetech-sts3215-12v": 12.0, "feetech-sts3215-7v4": 7.4, "dynamixel-xl4
          "dynamixel-xl330-m288": 5.0}
 
 
-def engine_servo(name, servo, V_oc):
-    made = st.load_servo(name)
-    made = (st.feetech_sts({"P_Coefficient": int(servo.P), "D_Coefficient": int(servo.D), "I_Coefficient": 0,
-                            "Acceleration": 254, "Maximum_Acceleration": 254}, servo=made)
-            if not servo.dynamixel else st.dynamixel_x({"Position_P_Gain": int(servo.P), "Position_D_Gain": 0},
-                                                       servo=made))
-    N = made.gear.gear_reduction
-    return made.replace({
-        "motor.armature_resistance": servo.R, "motor.torque_constant": servo.K / N,
-        "motor.back_emf_constant": servo.K / N, "motor.rotor_inertia": servo.J / N**2,
-        "motor.motor_viscous_friction": servo.B / N**2, "friction.coulomb_torque_forward": servo.forward / N,
-        "friction.coulomb_torque_backward": servo.backward / N, "friction.load_friction": None,
-        "friction.load_friction_motor": servo.load_motor, "friction.load_friction_external": servo.load_external,
-        "supply.bridge_drop_voltage": servo.drop, "supply.open_circuit_voltage": V_oc, "gear.backlash": None,
-        "gear.output_inertia": None, "firmware.control_phase": servo.phase,
-        "firmware.duty_slew": servo.slew or None})
-
-
 @pytest.mark.parametrize("name", CASES)
 def test_one_joint_moves_as_the_engine_moves_it(name):
     """Two solutions of one specification: a pole that goes up and down by steps, within a tenth of a count."""
@@ -138,7 +121,7 @@ def test_one_joint_moves_as_the_engine_moves_it(name):
     command = st.signals.samples(at, goal, unit="rad", hold="previous")
     load = st.loads.Pendulum(mass=0.15, length=0.2, inertia=0.3 * INERTIA, hanging_angle=-math.pi / 2,
                              gravity=rig.GRAVITY)
-    theirs = st.simulate(st.DigitalServo(engine_servo(name, servo, V_oc)), command, duration=3.3, load=load,
+    theirs = st.simulate(st.DigitalServo(servo_of(name, servo, V_oc)), command, duration=3.3, load=load,
                          output_times=times, initial={"output_angle": 0.0})
     off = ours.angle[:, 0] - theirs["output_angle"]
     assert np.max(np.abs(ours.angle)) > 0.4
@@ -214,3 +197,14 @@ def test_smaller_steps_move_alike():
     truth = rig.random_truth(rig.SO101, "feetech", 4)
     coarse, fine = (recorder.record(truth, 5.0, "smooth", step=step).true_angle for step in (2e-4, 5e-5))
     assert np.sqrt(np.mean((coarse - fine) ** 2)) < 2e-3
+
+
+def test_the_truth_leaves_little_of_an_episode():
+    """Counts and the clock of the stamps alone: 10 ms late after a minute of late turns, at 1 rad/s half a degree."""
+    truth = rig.random_truth(rig.PAN_TILT_LIFT, "dynamixel", 3)
+    left = left_by(truth, recorder.record(truth, 10.0, "smooth", stamps="loop"))
+    assert DELTA / math.sqrt(12.0) < left < 2.0 * DELTA
+    assert left < left_by(truth, recorder.record(truth, 10.0, "smooth")) < math.radians(1.0)
+    true = truths_of(truth)
+    assert true["output_torque_constant"] == truth.servos[0].K
+    assert true["zero.lift"] == -truth.servos[1].zero
