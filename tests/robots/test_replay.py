@@ -56,9 +56,9 @@ def test_errors_by_joint_and_kind_are_those_of_the_samples():
     told = found.errors[SERVOS]["elbow"]
     assert told[ALL].rms == pytest.approx(math.sqrt(np.mean(error**2)))
     assert told[ALL].largest == pytest.approx(np.abs(error).max())
-    assert told[MOVING].count + told[RESTING].count == told[ALL].count == 2 * len(one.time)
-    assert 10 < told[MOVING].count / 2 < 50
-    assert told[LOADED].count == 0
+    assert told[MOVING].samples + told[RESTING].samples == told[ALL].samples == 2 * len(one.time)
+    assert 10 < told[MOVING].samples / 2 < 50
+    assert told[LOADED].samples == 0
     worst = found.windows[0]
     inside = (one.time >= worst.start) & (one.time <= worst.stop)
     seen = one.simulated[SERVOS][worst.joint][inside] - one.measured[worst.joint][inside]

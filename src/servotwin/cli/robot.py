@@ -13,6 +13,7 @@ from servotwin.cli import robot_options as options
 from servotwin.cli import shared_options as shared
 from servotwin.cli.robot_arm import add_to
 from servotwin.cli.robot_compare import compare
+from servotwin.cli.robot_fit import fit
 from servotwin.cli.robot_mobile import mobile
 from servotwin.cli.robot_validate import validate
 from servotwin.cli.terminal import emit_help, emit_json, pairs, patience, show, table
@@ -185,3 +186,8 @@ robot.command("validate", help="Send the recorded goals of a robot through its s
     "Example: servotwin robot validate so101 lerobot/svla_so101_pickplace --episode 3 --unit range "
     "--calibration follower.json --supply 12V:0.1ohm --out compared\n\n"
     "Example: servotwin robot validate so101 arm.csv --servo '*=fitted.toml'"))(validate)
+robot.command("fit", help="Fit the servos of a robot, their supply, the masses of its links and the latency of the "
+              "loop to recorded episodes.", epilog=(
+    "Example: servotwin robot fit so101 lerobot/svla_so101_pickplace --unit range --calibration follower.json "
+    "--supply 12V:0.1ohm --out fitted\n\n"
+    "Example: servotwin robot fit unknown arm.csv --servo '*=feetech-sts3215-12v' --no-intervals"))(fit)

@@ -73,8 +73,8 @@ class Asked:
 
 def asked_robot(model_file: str, dataset: Path, *, servo: Sequence[str], mount: Sequence[str], model: str | None,
                 change: Sequence[str], register: Sequence[str], supply: str | None, calibration: Path | None,
-                episodes: Sequence[int], unit: Sequence[str]) -> Asked:
-    """Return a robot and the recorded episodes of it, of the words of options."""
+                episodes: Sequence[int], unit: Sequence[str], plant: Any = None) -> Asked:
+    """Return a robot and the recorded episodes of it, of the words of options; `plant` is one without a file."""
     from dataclasses import replace
 
     from servotwin.cli.robot_words import as_options, chosen_servos, models_of, mounts_of, supply_of, units_of
@@ -83,7 +83,7 @@ def asked_robot(model_file: str, dataset: Path, *, servo: Sequence[str], mount: 
     from servotwin.robots.coupling import couplings_of
     from servotwin.robots.episode import episodes_of
 
-    plant = robot_model(model_file)
+    plant = robot_model(model_file) if plant is None else plant
     joints = joint_names(plant)
     chosen = chosen_servos(model_file, servo, joints, followers=couplings_of(plant))
     mounts = mounts_of(models_of(chosen, model, change, register), mount, joints)

@@ -1,5 +1,6 @@
 """What a servo is, from logs of what it did: parameters with intervals."""
 
+from servotwin.identification.arms import ArmFit, identify_arm
 from servotwin.identification.fitting.advise import Advice, Experiment, advise
 from servotwin.identification.fitting.findings import Finding, findings
 from servotwin.identification.fitting.fit import Fit, Interval, Start, Trace
@@ -42,6 +43,7 @@ __all__ = [
     "LUMPED",
     "RUNGS",
     "Advice",
+    "ArmFit",
     "BamConvention",
     "Cause",
     "Contradiction",
@@ -80,6 +82,7 @@ __all__ = [
     "findings",
     "friction_ladder",
     "identify",
+    "identify_arm",
     "keep_columns",
     "motor_range",
     "read_bam_log",

@@ -82,7 +82,8 @@ def episode_goals(path: Path, joints: Mapping[str, str], *, unit: str | Mapping[
     robot = str(dataset.info.get("robot_type") or "")
     drive_mode = not robot.startswith(_DYNAMIXEL)
     known = None if calibration is None else read_calibration(calibration, drive_mode=drive_mode)
-    angles, measured = {}, {}
+    angles: dict[str, NDArray[np.float64]] = {}
+    measured: dict[str, NDArray[np.float64]] = {}
     for joint in dataset.joints:
         form, limits = forms[joint.name], None if dataset.unit_from else (ranges or {}).get(joint.name)
         one = None if known is None else _calibrated(known, joint, calibration)
@@ -168,3 +169,8 @@ def _unknown(dataset: Dataset, rows: Rows, joints: list[Joint]) -> InputError:
     return InputError(
         f"{dataset.folder}: unit of {names} is not known (goals {np.nanmin(goals):.4g} to {np.nanmax(goals):.4g}: "
         f"degrees, or -100 to 100 of a range)", allowed='unit="deg" or unit="range"')
+
+
+def joints_of_dataset(path: Path) -> tuple[str, ...]:
+    """Return the names of the joints of a dataset."""
+    return tuple(joint.name for joint in open_dataset(path).joints)

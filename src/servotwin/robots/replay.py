@@ -39,12 +39,12 @@ _SETTLE = 0.5  # s
 
 
 class JointError(NamedTuple):
-    """Simulated less measured angle of a joint: root mean square, largest magnitude, mean [rad]; count of samples."""
+    """Simulated less measured angle of a joint: root mean square, largest magnitude, mean [rad]; number of samples."""
 
     rms: float
     largest: float
     mean: float
-    count: int
+    samples: int
 
 
 class Window(NamedTuple):
@@ -114,7 +114,7 @@ class RobotValidation:
     def rms(self, name: str = SERVOS) -> float:
         """Return the error of servos or a rival, all joints together [rad]."""
         found = [self.errors[name][joint][ALL] for joint in self.joints]
-        return math.sqrt(sum(one.count * one.rms**2 for one in found) / sum(one.count for one in found))
+        return math.sqrt(sum(one.samples * one.rms**2 for one in found) / sum(one.samples for one in found))
 
 
 def validate_robot(model: Any, servos: Mapping[str, Model | Mount], motions: Motion | Sequence[Motion], *,

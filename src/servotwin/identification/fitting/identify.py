@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.errors import InputError
 from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.arrow import Loss, Outcome, Prior, Search
 from servotwin.identification.fitting.batches import FIT_ACCURACY, Running
@@ -66,7 +67,7 @@ def identify(
     sensors: Sequence[str] | None = None,
     starts: int = 3, loss: str = "huber", noise: Mapping[str, float] | None = None, level: float = 0.95,
     intervals: bool = True, compare_with: Sequence[str] = ("slew", "M1"), seed: int = 0, progress: Progress = False,
-    diagnose: bool = True, executor: Any = None, accuracy: float = FIT_ACCURACY,
+    diagnose: bool = True, executor: Any = None, accuracy: float = FIT_ACCURACY, robot: Any = None, **of_robot: Any,
 ) -> Fit:
     """Fit parameters of a servo to logs.
 
@@ -130,6 +131,11 @@ def identify(
     accuracy : float
         What angles of simulations may be off by where motions are integrated, not solved in closed form [rad], from
         1e-13 to 1e-4.
+    robot : optional
+        Where `logs` are episodes of a whole robot: its MJCF file or model, "so101" or "unknown". `servo` is then that
+        of all joints, or one by joint, and what comes back an `ArmFit`.
+    of_robot
+        What else `identify_arm` takes.
 
     Returns
     -------
@@ -154,6 +160,14 @@ def identify(
     >>> abs(fit.servo.motor.rotor_inertia / servo.motor.rotor_inertia - 1.0) < 1e-3
     True
     """
+    if robot is not None:
+        from servotwin.identification.arms import identify_arm
+
+        found: Any = identify_arm(logs, robot, servo, level=level, intervals=intervals, diagnose=diagnose,
+                                  progress=progress, **of_robot)
+        return found  # type: ignore[no-any-return]
+    if of_robot:
+        raise InputError("identify", got=", ".join(of_robot), allowed="with robot= only")
     began = clock.monotonic()
     read = checks.checked_logs(logs)
     plain = checks.checked_servo(servo, model)

@@ -1,0 +1,108 @@
+"""What the measured motion of a robot asks of each joint: torques and inertias, link by link.
+
+    tau_j = M_jj q''_j + sum over others of M_jk q''_k + Coriolis + gravity
+
+The first term is that of the joint's own motion, which a simulated servo has itself; the rest is a torque that comes to
+it from outside. Both are linear in the masses of the links, where a link keeps its centre and the shape of its inertia.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.robots.coupling import couple, couplings_of
+from servotwin.robots.places import load_mujoco
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """Torques and inertias at the joints that links ask for, each as heavy as the model says.
+
+    Parameters
+    ----------
+    torque : ndarray, shape (n, joints, links)
+        Beside that of the joint's own acceleration [N m]
+    inertia : ndarray, shape (n, joints, links)
+        [kg m²]
+    """
+
+    torque: Array
+    inertia: Array
+
+    def of(self, factors: Array) -> tuple[Array, Array]:
+        """Return torque and inertia of all links whose masses are so many times those of the model."""
+        return self.torque @ factors, self.inertia @ factors
+
+
+def links_of(model: Any, joints: Sequence[str]) -> list[int]:
+    """Return the bodies with a mass that some of the joints move."""
+    dofs = {int(model.jnt_dofadr[model.joint(name).id]) for name in joints}
+    found = []
+    for body in range(1, model.nbody):
+        above, moved = body, False
+        while above and not moved:
+            first = int(model.body_dofadr[above])
+            moved = bool(dofs & set(range(first, first + int(model.body_dofnum[above]))))
+            above = int(model.body_parentid[above])
+        if moved and model.body_mass[body] > 0.0:
+            found.append(body)
+    return found
+
+
+def link_names(model: Any, links: Sequence[int]) -> list[str]:
+    """Return the names of bodies."""
+    return [model.body(body).name or f"body {body}" for body in links]
+
+
+def with_masses(model: Any, links: Sequence[int], factors: Array) -> Any:
+    """Return a copy of a model whose links are so many times as heavy."""
+    found = copy.copy(model)
+    found.body_mass[links] = model.body_mass[links] * factors
+    found.body_inertia[links] = model.body_inertia[links] * factors[:, None]
+    load_mujoco().mj_setConst(found, load_mujoco().MjData(found))
+    return found
+
+
+def asked_of(model: Any, joints: Sequence[str], links: Sequence[int], angle: Array, speed: Array,
+             acceleration: Array) -> Asked:
+    """Return what a motion of the joints asks for, others being where the model has them.
+
+    Parameters
+    ----------
+    model : MjModel
+    joints : sequence of str
+    links : sequence of int
+    angle, speed, acceleration : ndarray, shape (n, joints)
+    """
+    mujoco = load_mujoco()
+    own = copy.copy(model)
+    own.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT) | int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    numbers = [model.joint(name).id for name in joints]
+    places, dofs = model.jnt_qposadr[numbers], model.jnt_dofadr[numbers]
+    own.dof_armature[:], own.dof_damping[:], own.dof_frictionloss[:] = 0.0, 0.0, 0.0
+    masses, inertias = model.body_mass.copy(), model.body_inertia.copy()
+    n, count = angle.shape
+    torque, inertia = (np.zeros((n, count, len(links) + 1)) for _ in range(2))  # that of all comes last
+    data, whole, follow = mujoco.MjData(own), np.zeros((model.nv, model.nv)), bool(couplings_of(model))
+    for b in range(-1, len(links)):  # all, then with one twice as heavy: alone, the others would have no inertia
+        own.body_mass[:], own.body_inertia[:] = masses, inertias
+        if b >= 0:
+            own.body_mass[links[b]], own.body_inertia[links[b]] = 2.0 * masses[links[b]], 2.0 * inertias[links[b]]
+        for k in range(n):
+            data.qpos[places], data.qvel[dofs], data.qacc[dofs] = angle[k], speed[k], acceleration[k]
+            if follow:
+                couple(own, data.qpos)
+            mujoco.mj_inverse(own, data)
+            mujoco.mj_fullM(own, data, whole)
+            inertia[k, :, b] = whole[dofs, dofs]
+            torque[k, :, b] = data.qfrc_inverse[dofs]
+    torque, inertia = (some[..., :-1] - some[..., -1:] for some in (torque, inertia))
+    return Asked(torque - inertia * acceleration[:, :, None], np.maximum(inertia, 0.0))

@@ -1,0 +1,129 @@
+"""Residuals of a robot's joints in units of noise, and how they change with every number.
+
+Noise of a joint is that of its positions, and that of the clock: a row whose stamp is off by some milliseconds is off
+at all joints at once, each by its speed. With s the deviation of stamps, v_j the speeds and σ_j the noise of positions,
+a row has the covariance diag(σ²) + s² v vᵀ; it is multiplied by the inverse root of that.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.identification.arms.episodes import Episode
+from servotwin.identification.arms.numbers import LATENCY, Numbers
+from servotwin.identification.fitting.point import LogPart
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+STEP, _STEPS = 0.08, {"rad": 0.02}  # of a number on its scale; of some, in SI
+_BEGIN = 0.6  # s: until then an episode still shows how it began
+_MAD = 1.4826
+_LEAST = 2.0e-4  # rad
+_FAST = 0.3  # rad/s
+_MOST_OFF = 0.02  # s
+_COARSE, _COUNTED = 0.01, 0.05  # rad, of a count
+
+
+class Simulated(Protocol):
+    """What simulates the joints of an episode at several points."""
+
+    numbers: Numbers
+
+    def angles(self, episode: Episode, points: Array, *, fine: bool = False) -> Array:
+        """Return angles, shape (copies, n, joints); `fine` without the counts of the servos."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Noise of positions of each joint [rad], and of stamps [s]."""
+
+    positions: Array
+    stamps: float
+
+
+def quantum_of(positions: Sequence[Array]) -> float:
+    """Return the step in which positions were counted [rad]; 0 where they do not look counted.
+
+    Examples
+    --------
+    >>> round(quantum_of([np.round(np.sin(np.linspace(0.0, 3.0, 99)) / 0.002) * 0.002]), 4)
+    0.002
+    """
+    steps = np.concatenate([np.abs(np.diff(one)) for one in positions])
+    some = steps[steps > 1e-6]
+    least = float(some.min(initial=math.inf))
+    if not some.size or least > _COARSE:
+        return 0.0
+    return least if float(np.abs(some / least - np.round(some / least)).max()) < _COUNTED else 0.0
+
+
+def used_rows(episode: Episode) -> Mask:
+    """Return which samples of an episode count before anything is known of it, shape (n, joints)."""
+    return np.repeat((episode.time >= episode.time[0] + _BEGIN)[:, None], episode.measured.shape[1], axis=1)
+
+
+def noise_of(episodes: Sequence[Episode], residuals: Sequence[Array], used: Sequence[Mask]) -> Noise:
+    """Return the noise that residuals show, robust: at rest that of positions, in motion that of stamps too."""
+    joints, positions, off = episodes[0].measured.shape[1], [], []
+    for j in range(joints):
+        r = np.concatenate([one[mask[:, j], j] for one, mask in zip(residuals, used, strict=True)])
+        v = np.concatenate([e.speed[mask[:, j], j] for e, mask in zip(episodes, used, strict=True)])
+        still = np.abs(v) < _FAST
+        sigma = max(_MAD * float(np.median(np.abs(r[still] if still.sum() > 20 else r))), _LEAST,
+                    quantum_of([e.measured[:, j] for e in episodes]) / math.sqrt(12.0))
+        positions.append(sigma)
+        if (~still).sum() > 20:
+            more = np.maximum(r[~still]**2 - sigma**2, 0.0) / v[~still]**2
+            off.append(np.sqrt(float(np.median(more))) * _MAD)
+    return Noise(np.array(positions), min(float(np.median(off)) if off else 0.0, _MOST_OFF))
+
+
+def whitened(values: Array, episode: Episode, noise: Noise, used: Mask) -> Array:
+    """Return residuals or derivatives, shape (n, joints, …), in units of noise; 0 where a sample does not count."""
+    sigma = noise.positions
+    u = used * (noise.stamps * episode.speed / sigma)
+    s = (u**2).sum(axis=1)
+    share = np.where(s > 1e-12, (1.0 - 1.0 / np.sqrt(1.0 + s)) / np.maximum(s, 1e-12), 0.0)
+    flat = (values.reshape(*values.shape[:2], -1) / sigma[:, None]) * used[..., None]
+    along = np.einsum("nj,njp->np", u, flat)
+    return np.asarray((flat - share[:, None, None] * u[..., None] * along[:, None, :]).reshape(values.shape))
+
+
+def residuals(simulated: Simulated, episode: Episode, points: Array) -> Array:
+    """Return simulated less measured angles at several points, shape (copies, n, joints)."""
+    return simulated.angles(episode, points) - episode.measured
+
+
+def derivatives(simulated: Simulated, episode: Episode, x: Array, held: Mask) -> tuple[Array, Array]:
+    """Return residuals at a point, shape (n, joints), and their derivatives, shape (n, joints, numbers)."""
+    numbers = simulated.numbers
+    moved = [k for k in range(len(x)) if not held[k] and numbers.names[k] != LATENCY]
+    steps = np.array([_STEPS.get(one.unit, STEP) / (1.0 if one.logarithmic else one.scale) if one.unit in _STEPS
+                      else STEP for one in numbers.all])
+    steps = np.where(x + steps > numbers.upper, -steps, steps)
+    points = np.repeat(x[None], 1 + len(moved), axis=0)
+    points[1 + np.arange(len(moved)), moved] += steps[moved]
+    smooth = simulated.angles(episode, points, fine=True)
+    slopes = np.zeros((*smooth.shape[1:], len(x)))
+    slopes[..., moved] = np.moveaxis((smooth[1:] - smooth[0]) / steps[moved][:, None, None], 0, -1)
+    found = residuals(simulated, episode, x[None])
+    late = numbers.names.index(LATENCY)
+    if not held[late]:
+        slopes[..., late] = -np.gradient(smooth[0], episode.time, axis=0) * numbers.all[late].scale
+    return found[0], slopes
+
+
+def parts_of(episode: Episode, residual: Array, slopes: Array | None, noise: Noise, used: Mask) -> list[LogPart]:
+    """Return what an episode says, joint by joint, in units of noise."""
+    r = whitened(residual, episode, noise, used)
+    s = np.zeros((*residual.shape, 0)) if slopes is None else whitened(slopes, episode, noise, used)
+    nothing = np.zeros((0, 0))
+    return [LogPart(r[mask, j], s[mask, j], nothing.reshape(0, 0) if not mask.any() else np.zeros((int(mask.sum()), 0)))
+            for j, mask in enumerate(used.T) if mask.any()]

@@ -1,0 +1,108 @@
+"""The search of a robot's numbers: bounded least squares with a robust loss (Levenberg, Marquardt)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.identification.arms.episodes import Episode
+from servotwin.identification.arms.rows import Mask, Noise, Simulated, derivatives, parts_of, residuals
+from servotwin.identification.fitting.arrow import Loss, Prior, block
+
+Array = NDArray[np.float64]
+_DAMPINGS = (1e-4, 0.1, 10.0)  # tried side by side
+_LEAST_GAIN = 1e-3  # of the cost
+_LEAST_STEP = 1e-4
+
+
+class ArmSearch:
+    """A least-squares problem over episodes of a robot.
+
+    Parameters
+    ----------
+    simulated : Simulated
+    episodes : sequence of Episode
+    used : sequence of ndarray of bool
+        Which samples of each count.
+    noise : Noise
+    loss : Loss
+    prior : Prior
+    held : ndarray of bool
+        Numbers that stay.
+    """
+
+    def __init__(self, simulated: Simulated, episodes: Sequence[Episode], used: Sequence[Mask], noise: Noise,
+                 loss: Loss, prior: Prior, held: Mask) -> None:
+        self.simulated, self.episodes, self.used = simulated, list(episodes), list(used)
+        self.noise, self.loss, self.prior, self.held = noise, loss, prior, held
+
+    def cost(self, x: Array, found: Sequence[Array]) -> float:
+        """Return the cost of a point whose residuals are known; inf where a lane failed."""
+        total = self.prior.cost(x)
+        for episode, residual, used in zip(self.episodes, found, self.used, strict=True):
+            total += sum(self.loss.cost(part.residual) for part in parts_of(episode, residual, None, self.noise, used))
+        return total if math.isfinite(total) else math.inf
+
+    def costs(self, points: Array) -> list[float]:
+        """Return the costs of several points."""
+        found = [residuals(self.simulated, episode, points) for episode in self.episodes]
+        return [self.cost(x, [one[k] for one in found]) for k, x in enumerate(points)]
+
+    def linear(self, x: Array) -> tuple[list[Array], list[Array]]:
+        """Return residuals and derivatives of all episodes at a point."""
+        both = [derivatives(self.simulated, episode, x, self.held) for episode in self.episodes]
+        return [one for one, _ in both], [slopes for _, slopes in both]
+
+    def normal(self, x: Array, found: Sequence[Array], slopes: Sequence[Array]) -> tuple[Array, Array]:
+        """Return gradient and matrix of the normal equations."""
+        g, H = (x - self.prior.mean) * self.prior.weight**2, np.diag(self.prior.weight**2)
+        for episode, residual, slope, used in zip(self.episodes, found, slopes, self.used, strict=True):
+            for part in parts_of(episode, residual, slope, self.noise, used):
+                one = block(part, self.loss)
+                g, H = g + one.g_s, H + one.H_ss
+        return g, H
+
+    def run(self, x: Array, *, most: int, tell: Callable[[int], object] = lambda step: None) -> Array:
+        """Return the best point that a search from another one comes to."""
+        lower, upper = self.simulated.numbers.lower, self.simulated.numbers.upper
+        best, scale = math.inf, 1.0
+        for step in range(most):
+            tell(step)
+            found, slopes = self.linear(x)
+            best = self.cost(x, found)
+            g, H = self.normal(x, found, slopes)
+            trials = np.stack([stepped(x, g, H, scale * damping, lower, upper, self.held) for damping in _DAMPINGS])
+            costs = self.costs(trials)
+            k = int(np.argmin(costs))
+            if not costs[k] < best:
+                scale *= 10.0
+                if scale > 1e4:
+                    break
+                continue
+            moved, gain = float(np.abs(trials[k] - x).max()), best - costs[k]
+            x, best, scale = trials[k], costs[k], max(scale * (0.3 if k == 0 else 1.0), 1e-3)
+            if gain < _LEAST_GAIN * best or moved < _LEAST_STEP:
+                break
+        return x
+
+
+def stepped(x: Array, g: Array, H: Array, damping: float, lower: Array, upper: Array, held: Mask) -> Array:
+    """Return the next point of a damped step within bounds."""
+    damped = H + damping * np.diag(np.maximum(np.diag(H), 1e-9))
+    stays = held | ((x <= lower) & (g > 0.0)) | ((x >= upper) & (g < 0.0))
+    change = np.zeros(len(x))
+    for _ in range(len(x) + 1):
+        moves = ~stays
+        if not moves.any():
+            break
+        fixed = damped[np.ix_(moves, stays)] @ change[stays]
+        change[moves] = -np.linalg.lstsq(damped[np.ix_(moves, moves)], g[moves] + fixed, rcond=1e-14)[0]
+        over = moves & ((x + change < lower) | (x + change > upper))
+        if not over.any():
+            break
+        change[over] = np.clip(x + change, lower, upper)[over] - x[over]
+        stays = stays | over
+    return np.asarray(np.clip(x + change, lower, upper))
