@@ -52,7 +52,8 @@ _ALIKE = {"friction.load_friction": _DIRECTED, "friction.load_friction_stribeck"
 SUPPLY = "supply.internal_resistance"
 SOFT = ", soft supply"
 """What the name of a rung with a supply that gives way ends with."""
-_SOFT_SHARE = 0.05  # of the armature's resistance, where that of the supply begins
+_SOFT_SHARE = 0.2  # of the armature's resistance, where that of the supply begins: nearer to 0 a search stays there
+_STIFFER = 0.9  # of the armature's resistance, that then begins lower
 _FEWEST = 3  # held out logs, whose scatter is believed
 _STRIBECK_SPEED = 0.2  # rad/s at the output, where Stribeck friction begins to fade
 
@@ -214,7 +215,7 @@ def may_give_way(model: Model, logs: Sequence[Log], free: Sequence[str]) -> bool
     logs : sequence of Log
     free : sequence of str
     """
-    known = SUPPLY in free or any(SUPPLY in log.parameters or "bus_voltage" in log.measured for log in logs)
+    known = SUPPLY in free or any(SUPPLY in log.parameters for log in logs)
     return not known and SUPPLY in (*model.requires, *model.optional)
 
 
@@ -274,7 +275,8 @@ def _start(servo: Servo, name: str, before: Sequence[Rung]) -> Servo:
     if base.get("friction.breakaway_ratio") == 1.0 and "friction.breakaway_ratio" in RUNGS[law]:
         values["friction.breakaway_ratio"] = own["friction.breakaway_ratio"]
     if soft and not base.get(SUPPLY):
-        values[SUPPLY] = _SOFT_SHARE * float(nominal(base, "motor.armature_resistance") or 1.0)
+        R_a = float(nominal(base, "motor.armature_resistance") or 1.0)
+        values |= {SUPPLY: _SOFT_SHARE * R_a, "motor.armature_resistance": _STIFFER * R_a}
     return base.replace(values, source="where a rung of the friction ladder begins")
 
 
