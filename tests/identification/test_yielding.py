@@ -9,6 +9,7 @@ import pytest
 import servotwin as st
 from identification.synthetic_logs import TRUTH, noisy, run
 from servotwin.identification import identify
+from servotwin.identification.fitting.free import nominal
 from servotwin.identification.fitting.yielding import Yielded
 
 FORWARD, BACKWARD = "friction.coulomb_torque_forward", "friction.coulomb_torque_backward"
@@ -112,3 +113,35 @@ def test_of_a_product_the_least_certain_prior_yields_and_none_is_far_off_alone(u
 ], ids=["file", "given, open"])
 def test_lines(one, words):
     assert str(one) == words
+
+
+def sag(model, **more):
+    """Return by how many degrees a servo gives way to 0.5 N m."""
+    zero = st.simulate(model, st.signals.constant(1500.0, unit="us"), duration=0.1)["output_angle"][0]
+    lanes = st.simulate_many(model, st.signals.constant(1500.0, unit="us"), duration=1.5, load=st.loads.Constant(0.5),
+                             output_times=np.linspace(1.2, 1.5, 16), **more)
+    return np.degrees(zero - lanes["output_angle"].mean(axis=1))
+
+
+def test_a_prior_that_is_pushed_is_widened():
+    """A file that is sure of resistance, rotor and friction to 5 %, and 15 % off in the first; nothing on the horn."""
+    names = ["motor.armature_resistance", "output_inertia", "output_coulomb_torque"]
+    values = {name: nominal(TRUTH, name) for name in names}
+    truth = TRUTH.replace({names[0]: 0.85 * values[names[0]]})
+    logs, time = [], np.arange(0.0, 2.0, 0.02)
+    for k in range(4):
+        rng = np.random.default_rng(k)
+        width = 1500.0 + np.repeat(rng.uniform(-400.0, 400.0, 10), 10)
+        made = st.simulate(st.PulseServo(truth), st.signals.samples(time, width, unit="us"), duration=float(time[-1]),
+                           output_times=time)
+        logs.append(st.Log(name=str(k), time=time, command=1e-6 * width, command_kind="pulse_width",
+                           measured={"output_angle": made["output_angle"] + 1e-3 * rng.standard_normal(len(time))}))
+    fit = identify(logs, TRUTH, free=names, priors={name: (v, 0.05 * v) for name, v in values.items()}, **PLAIN)
+    assert fit.yielded == ()
+    (one,) = fit.widened
+    assert one.name == names[0]
+    assert one.std > 2.5 * one.file_std
+    assert any("the logs push motor.armature_resistance" in line for line in fit.warnings)
+    drawn, true = sag(fit.model, parameters=fit.draw(400)), sag(st.PulseServo(truth))[0]
+    assert np.quantile(drawn, 0.1) < true < np.quantile(drawn, 0.9)  # it was in the lowest 4 % of them
+    assert "widened" in fit.servo.fit

@@ -22,7 +22,7 @@ from servotwin.units import is_finite
 
 if TYPE_CHECKING:
     from servotwin.identification.fitting.comparison import ErrorTables
-    from servotwin.identification.fitting.yielding import Yielded
+    from servotwin.identification.fitting.yielding import Widened, Yielded
 
 Array = NDArray[np.float64]
 
@@ -223,7 +223,7 @@ def checked_count(what: str, number: Any, *, least: int) -> int:
     return int(number)
 
 
-def warnings_of(yielded: Sequence[Yielded], tables: ErrorTables) -> tuple[str, ...]:
+def warnings_of(yielded: Sequence[Yielded | Widened], tables: ErrorTables) -> tuple[str, ...]:
     """Return what a reader has to know of a fit, a line each."""
     found = [str(one) for one in yielded]
     if tables.holdout and tables.training:

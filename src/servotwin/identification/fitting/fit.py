@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from servotwin.identification.fitting.ladder import Ladder
     from servotwin.identification.fitting.uncertainty import Uncertainty
     from servotwin.identification.fitting.verdict import Verdict
-    from servotwin.identification.fitting.yielding import Yielded
+    from servotwin.identification.fitting.yielding import Widened, Yielded
     from servotwin.signals import Signal
 
 Array = NDArray[np.float64]
@@ -70,6 +71,30 @@ class Trace:
     delay : float
         The servo at a time t after the first sample is that which this command leads to at t − delay [s]; negative
         where the command begins before the first sample.
+    parameters : mapping of str to float
+        What differs from the fitted servo in this log (SI): what the log says, and when its program's first tick comes.
+    initial : mapping of str to float
+        Where the shaft was at the command's t = 0 (SI); empty where the servo stands where its first command says.
+    offset : float
+        Measured less true angle [rad].
+
+    Examples
+    --------
+    The fitted servo under the command of a trace is the trace again:
+
+    >>> import servotwin as st
+    >>> servo = st.load_servo("hitec-hs-755hb")
+    >>> run = st.simulate(st.PulseServo(servo), st.signals.step(0.0, 60.0, at=0.1, unit="deg"), duration=1.0,
+    ...                   output_step=0.02)
+    >>> log = st.Log(name="step", time=run.time, command=run["pulse_width"], command_kind="pulse_width",
+    ...              measured={"output_angle": run["output_angle"]})
+    >>> fit = st.identify([log], servo, free=["motor.rotor_inertia"], starts=1, compare_with=())
+    >>> trace = fit.traces[0]
+    >>> times = np.maximum(trace.time - trace.log.start - trace.delay, 0.0)
+    >>> again = st.simulate(type(fit.model)(fit.servo.replace(trace.parameters)), trace.command, load=trace.log.load,
+    ...                     duration=float(times[-1]), output_times=times, initial=trace.initial)
+    >>> bool(np.abs(again["output_angle"] + trace.offset - trace.simulated).max() < 1e-6)
+    True
     """
 
     log: Log
@@ -81,6 +106,9 @@ class Trace:
     judged: NDArray[np.bool_] = field(repr=False)
     command: Signal = field(repr=False)
     delay: float = 0.0
+    parameters: Mapping[str, float] = field(default_factory=dict, repr=False)
+    initial: Mapping[str, float] = field(default_factory=dict, repr=False)
+    offset: float = 0.0
 
     @property
     def residual(self) -> Array:
@@ -141,6 +169,8 @@ class Fit:
         Whether each log's ticks took the commands that the log wanted.
     yielded : tuple of Yielded
         Priors that were dropped because the logs contradict them, in the order in which they went.
+    widened : tuple of Widened
+        Priors that the logs push by more than 2.5 of their widths: they count as wide as they are off.
     prior_share : mapping of str to float
         How much of what is known of each number is prior, from 0 to 1: 1 less its variance over that which the logs
         alone would leave; nan of a number at a bound. Empty without intervals.
@@ -180,6 +210,7 @@ class Fit:
     phased: bool = False
     ticked: bool = False
     yielded: tuple[Yielded, ...] = ()
+    widened: tuple[Widened, ...] = ()
     prior_share: Mapping[str, float] = field(default_factory=dict)
     allowed: Allowed | None = field(default=None, repr=False)
 
@@ -239,6 +270,20 @@ class Fit:
     def undetermined(self) -> tuple[str, ...]:
         """Names that the logs do not determine."""
         return tuple(dict.fromkeys(name for item in self.unidentifiable for name in item.parameters))
+
+    @property
+    def searches(self) -> tuple[int, str]:
+        """How many searches from different starts ended within 1 % of the best cost, and whether that is bad."""
+        least = min((start.cost for start in self.starts), default=math.nan)
+        same = sum(start.cost <= 1.01 * least + 1e-9 for start in self.starts)
+        words = "searches from different starts ended within 1 % of the best cost"
+        if same > 1:
+            return same, f"{words}: they agree"
+        if self.verdict is not None and self.verdict.holds and not self.verdict.undecided:
+            return same, f"{words}: no harm, for what is left is noise, and no other could leave less"
+        if not any(start.converged for start in self.starts if start.cost > 1.01 * least + 1e-9):
+            return same, f"{words}: no harm, for the others were given up as worse before their end"
+        return same, f"{words}: perhaps bad, for the others ended elsewhere, and there may be a better end; try more"
 
     @property
     def correlation(self) -> Array:

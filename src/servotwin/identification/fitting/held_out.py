@@ -11,10 +11,12 @@ from servotwin.identification.fitting.arrow import Loss
 from servotwin.identification.fitting.fit import Trace
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.frames import latency, widest
+from servotwin.identification.fitting.lanes import LogLanes
 from servotwin.identification.fitting.phases import PulseChoice, Scan, settled
-from servotwin.identification.fitting.point import DELAY_SCALE, LogPart, Point
+from servotwin.identification.fitting.point import DELAY_SCALE, STEP, LogPart, Point
 from servotwin.identification.fitting.scatter import by_sensor
 from servotwin.logs.log import ANGLES
+from servotwin.simulation.lanes.load_columns import LOAD_NAMES
 
 Array = NDArray[np.float64]
 
@@ -37,6 +39,9 @@ def trace_of(forecast: Forecast, point: Point, k: int, part: LogPart, *, held_ou
     case = forecast.cases[k]
     name = next(name for name in ANGLES if name in case.places)
     times, measured = case.times[case.places[name]], case.values[name]
+    lanes = LogLanes(forecast, k, 0, point, sides=0, step=STEP, rates=False, noise=forecast.noise)
+    sent = lanes.bundle()
+    searched = forecast.space.columns(lanes.x)
     late = held_out and forecast.phased and not whole
     own = dict(zip(forecast.names_of_own(case), point.own[k], strict=True))
     return Trace(
@@ -45,7 +50,10 @@ def trace_of(forecast: Forecast, point: Point, k: int, part: LogPart, *, held_ou
         judged=np.asarray(times >= 0.5 * case.log.duration) if late else np.ones(len(times), np.bool_),
         command=forecast.command_at(point, k),
         delay=forecast.nuisance_of(point.shared, "delay") + float(own.get("log_delay", 0.0)) * DELAY_SCALE
-        - forecast.lead_at(point, k))
+        - forecast.lead_at(point, k),
+        parameters={key: float(values[0]) for key, values in sent.columns.items()
+                    if key not in searched and key not in LOAD_NAMES},
+        initial={key: float(values[0]) for key, values in sent.initial.items()}, offset=lanes.offset)
 
 
 def with_pulses_of(forecast: Forecast, loss: Loss, point: Point, held_out: Sequence[int],

@@ -39,7 +39,7 @@ from servotwin.identification.fitting.robot_registers import as_logs_say
 from servotwin.identification.fitting.task import HUBER, Task
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty, rows_of, uncertainty
 from servotwin.identification.fitting.words import explain, simplest, vague_directions
-from servotwin.identification.fitting.yielding import Dropped, Yielded, settle, yielded
+from servotwin.identification.fitting.yielding import Dropped, Widened, Yielded, settle, widened, yielded
 from servotwin.logs.log import Log
 from servotwin.models import DigitalServo, Model
 from servotwin.parameters import Servo
@@ -212,7 +212,7 @@ def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: fl
             found, doubts = _with_doubts(task, found, level, show)
     except KeyboardInterrupt:
         interrupted = True
-    dropped = yielded(task, found, left, doubts)
+    dropped, wide = yielded(task, found, left, doubts), widened(task, found, left)
     traces = _traces(forecast, with_pulses_of(forecast, task.loss, found.point, held_out, task.fitted), held_out)
     final = identified_servo(forecast.model.servo, forecast.space, found.point.shared, doubts, level,
                              [one.name for one in dropped])
@@ -223,7 +223,7 @@ def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: fl
                          lambda: show(0.95, "errors of simpler models"))
     except KeyboardInterrupt:
         interrupted, tables = True, compare(task, held_out, traces, final, ())
-    fit = _fit(task, found, doubts, dropped, final, traces, tables, ended)
+    fit = _fit(task, found, doubts, dropped, wide, final, traces, tables, ended)
     middles = {name: 0.5 * (low + high) for name, (low, high) in doubts.spans.items()}
     fit = replace(fit, level=level, interrupted=interrupted, phased=forecast.phased, ticked=forecast.ticked,
                   estimates={**fit.estimates, **middles})
@@ -329,8 +329,8 @@ def _explained(task: Task, dropped: Sequence[Yielded]) -> tuple[str, ...]:
     return () if cause is None else (cause,)
 
 
-def _fit(task: Task, found: Outcome, doubts: Doubts, dropped: tuple[Yielded, ...], servo: Servo,
-         traces: tuple[Trace, ...], tables: Any, ended: Sequence[Outcome]) -> Fit:
+def _fit(task: Task, found: Outcome, doubts: Doubts, dropped: tuple[Yielded, ...], wide: tuple[Widened, ...],
+         servo: Servo, traces: tuple[Trace, ...], tables: Any, ended: Sequence[Outcome]) -> Fit:
     doubt, reaching, stuck = doubts.doubt, doubts.ends, task.at_bound(found)
     forecast, space = task.forecast, task.forecast.space
     names = (*space.names, *forecast.extra)
@@ -352,6 +352,7 @@ def _fit(task: Task, found: Outcome, doubts: Doubts, dropped: tuple[Yielded, ...
         holdout=tables.holdout, training=tables.training, traces=traces,
         starts=tuple(Start(outcome.cost, outcome.converged) for outcome in ended), noise=dict(forecast.noise),
         cost=found.cost, space=space, best=x,
-        warnings=(*task.remarks, *task.unsure, *checks.warnings_of(dropped, tables), *_explained(task, dropped)),
-        doubt=doubt, ends=dict(reaching), scales={n: scales[n] for n in forecast.extra}, yielded=dropped,
+        warnings=(*task.remarks, *task.unsure, *checks.warnings_of((*dropped, *wide), tables),
+                  *_explained(task, dropped)),
+        doubt=doubt, ends=dict(reaching), scales={n: scales[n] for n in forecast.extra}, yielded=dropped, widened=wide,
         prior_share=doubts.prior_share, allowed=doubts.allowed, spans=doubts.spans)

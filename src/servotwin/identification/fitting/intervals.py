@@ -70,12 +70,14 @@ def ends(search: Search, best: Outcome, doubt: Uncertainty, which: Sequence[int]
         Is told of points that cost clearly less than the end of the search: it lies in another valley.
     """
     reaches = {k: doubt.quantile(level, k) for k in which}
+    exact = {k: Ends(-reaches[k], reaches[k], "normal") for k in which if not doubt.std[k] > 0.0}
+    wanted, which = which, [k for k in which if k not in exact]
     both = [(k, side) for k in which for side in (-1.0, 1.0)]
     points = [moved(search, best, doubt, k, side * reaches[k], rows) for k, side in both]
     beyond = [begins(search, best, doubt, k, far * side * reaches[k], rows)[1] for far in _FAR for k, side in both]
     costs = iter(search.costs([*points, *beyond]) if both else [])
     rises, near, far = ({one: next(costs) - best.cost for one in both} for _ in range(3))
-    found: dict[int, Ends] = {}
+    found = exact  # of residuals that are 0
     bent: list[int] = []
     for k in which:
         reach = reaches[k]
@@ -96,7 +98,7 @@ def ends(search: Search, best: Outcome, doubt: Uncertainty, which: Sequence[int]
         share = (low * of_low + high * of_high) / max(low + high, 1e-300)
         found[k] = Ends(-low, high, "profile", min(max(share, 0.0), 1.0))
         tell(len(found))
-    return {k: found[k] for k in which}
+    return {k: found[k] for k in wanted}
 
 
 def moved(search: Search, best: Outcome, doubt: Uncertainty, k: int, steps: float, rows: Sequence[Rows]) -> Point:

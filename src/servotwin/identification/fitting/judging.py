@@ -14,10 +14,11 @@ from servotwin.identification.fitting.noise import SensorSeries, noise_of
 from servotwin.identification.fitting.point import Point
 from servotwin.identification.fitting.task import Task
 from servotwin.identification.fitting.uncertainty import Rows, rows_of
-from servotwin.identification.fitting.verdict import Cause, Verdict, judge, shown
+from servotwin.identification.fitting.verdict import UNHELD, Cause, Verdict, intervals_said, judge, shown
 from servotwin.logs.log import ANGLES
 
 _OUTLIERS = 0.005  # of the samples: then they are told
+_FINEST = 1e-9  # SI: what no simulation is told to be nearer
 _EFFORT = 3.0  # times that of the fit, for all trials: the verdict itself and their start are not counted
 
 
@@ -41,25 +42,37 @@ def with_verdict(task: Task, point: Point, fit: Fit, show: Callable[[float, str]
     if len(sensors) != 1:
         return fit
     sensor = sensors.pop()
-    verdict = judge([_series(trace) for trace in fitted], sensor, _rows(task, point), len(fit.names))
+    verdict = judge([_series(trace) for trace in fitted], sensor, _rows(task, point), len(fit.names),
+                    max(task.forecast.running.accuracy, _FINEST))
     verdict = replace(verdict, noise={**verdict.noise, **_others(task)})
     causes: tuple[Cause, ...] = ()
     try:
         if trials:
             causes = _outliers(verdict, fitted, sensor)
         if trials and (verdict.undecided or not verdict.holds):
-            causes += diagnose(task, point, fit.traces, verdict, sensor, _EFFORT * effort,
-                               lambda share, text: show(0.96 + 0.04 * share, text))
+            found = diagnose(task, point, fit.traces, verdict, sensor, _EFFORT * effort, _half_widths(fit),
+                             lambda share, text: show(0.96 + 0.04 * share, text))
+            causes, verdict = (*causes, *found.causes), replace(verdict, moved=found.moved)
     except KeyboardInterrupt:
         trials = False
     if verdict.undecided and any(cause.name != "outliers" for cause in causes):
         # What a number of the model tells of samples that it was not fitted to is no noise
         verdict = replace(verdict, holds=False, sentence=f"residuals are {verdict.ratio:.2g} times the noise of "
                           f"{shown(verdict.noise[sensor], sensor)} that neighbours show, and follow a better model: "
-                          "this one lacks something; the intervals below do not hold")
+                          f"this one lacks something; {UNHELD}")
+    said = intervals_said(verdict.moved, sought=bool(fit.ends))
+    verdict = replace(verdict, sentence=verdict.sentence.replace(UNHELD, said))
     verdict = replace(verdict, causes=causes, sentence=_with_causes(verdict, causes, tried=trials))
-    said = () if verdict.holds and not verdict.undecided else (verdict.sentence,)
-    return replace(fit, verdict=verdict, warnings=(*said, *fit.warnings))
+    first = () if verdict.holds and not verdict.undecided else (verdict.sentence,)
+    return replace(fit, verdict=verdict, warnings=(*first, *fit.warnings))
+
+
+def _half_widths(fit: Fit) -> dict[str, float]:
+    """Return the half widths of the intervals by name, on the scale of the search."""
+    if fit.doubt is None:
+        return {}
+    return {fit.names[k]: 0.5 * (ends.upper - ends.lower) * float(fit.doubt.std[k]) for k, ends in fit.ends.items()
+            if fit.names[k] not in fit.spans}
 
 
 def _with_causes(verdict: Verdict, causes: Sequence[Cause], *, tried: bool) -> str:

@@ -169,7 +169,7 @@ def with_record(fit: Fit, logs: Sequence[Log], fitted: Sequence[int], mend: Sequ
         "free": list(fit.space.names),
         "bounds": {p.name: [p.lower, p.upper] for p in fit.space.parameters},
         "at_bound": list(fit.at_bound), "undetermined": [str(item) for item in fit.unidentifiable],
-        "yielded": [str(one) for one in fit.yielded],
+        "yielded": [str(one) for one in fit.yielded], "widened": [str(one) for one in fit.widened],
         "prior_share": {name: round(share, 3) for name, share in fit.prior_share.items() if share >= LEAST_SHARE},
         "nuisance": {name: fit.estimates[name] for name in fit.names if name not in fit.space.names},
         "load": {p.name: fit.estimates[p.name] for p in fit.space.parameters if p.name in LOAD_NAMES},

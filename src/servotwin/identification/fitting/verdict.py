@@ -19,6 +19,8 @@ from servotwin.identification.fitting.uncertainty import Rows
 
 Array = NDArray[np.float64]
 
+UNHELD = "the intervals below do not hold"
+"""Until it is checked."""
 FALSE_ALARM = 1e-3
 """Of each test."""
 UNDECIDED = 1.5
@@ -68,7 +70,7 @@ class Verdict:
     ----------
     sentence : str
     holds : bool
-        Whether what is left is noise, so that the intervals hold.
+        Whether what is left is noise, so that the intervals hold; if it is not, `moved` says which do nevertheless.
     ratio : float
         Rms residual over the noise that needs no model, of the angle.
     noise : mapping of str to float
@@ -81,6 +83,10 @@ class Verdict:
         How often a true model would fail each test by as much, such as "size".
     outliers : float
         Share of samples that lie far off alone.
+    moved : mapping of str to tuple
+        Where what is left is no noise: by how many half widths of its interval each number would be off if the model
+        lacks the worst of what may be missing, as large as what is left allows; and what that is. Empty where it was
+        not simulated.
     """
 
     sentence: str
@@ -91,6 +97,7 @@ class Verdict:
     causes: tuple[Cause, ...] = ()
     odds: Mapping[str, float] = field(default_factory=dict)
     outliers: float = 0.0
+    moved: Mapping[str, tuple[float, str]] = field(default_factory=dict)
 
     @property
     def undecided(self) -> bool:
@@ -115,7 +122,8 @@ class Excess:
         return self.size > _SMALL and self.odds < FALSE_ALARM
 
 
-def judge(series: Sequence[SensorSeries], sensor: str, rows: Sequence[Rows] = (), numbers: int = 0) -> Verdict:
+def judge(series: Sequence[SensorSeries], sensor: str, rows: Sequence[Rows] = (), numbers: int = 0,
+          accuracy: float = 0.0) -> Verdict:
     """Return the verdict on a fit, without causes.
 
     Parameters
@@ -128,8 +136,14 @@ def judge(series: Sequence[SensorSeries], sensor: str, rows: Sequence[Rows] = ()
         What each log says of the shared numbers.
     numbers : int
         How many were fitted.
+    accuracy : float
+        Of the simulation (SI): what leaves less is exact.
     """
     noise = noise_of(series)
+    left = math.sqrt(float(np.mean(np.concatenate([one.residual for one in series])**2)))
+    if left <= accuracy:
+        return Verdict(f"exact: what is left, {shown(left, sensor)}, is no more than the simulation is off", True,
+                       left / noise.size, {sensor: noise.size}, 0.0)
     inner = [~isolated(one, noise.jitter) for one in series]
     # What also the measured values alone show: fast errors of a wrong model are no outliers
     plain = [replace(one, simulated=np.zeros(len(one.time))) for one in series]
@@ -158,7 +172,7 @@ def _sentence(failed: Sequence[str], ratio: float, noise: Noise, sensor: str) ->
             return (f"what is left does not follow the motion; the sensor's noise is {size} where neighbours tell it, "
                     "but no log stands still long enough to compare")
         return f"what is left is noise of {size}: the model can do what these logs show"
-    lacks = "the model lacks something; the intervals below do not hold"
+    lacks = f"the model lacks something; {UNHELD}"
     if ratio >= 1.3:
         return f"residuals are {ratio:.2g} times the sensor's noise of {size}: {lacks}"
     if "memory" in failed or "size" in failed:
@@ -166,6 +180,29 @@ def _sentence(failed: Sequence[str], ratio: float, noise: Noise, sensor: str) ->
     if "motion" in failed:
         return f"residuals are hardly larger than the sensor's noise of {size}, but follow the motion: {lacks}"
     return f"each log is followed to {size}, but they want different numbers: {lacks}"
+
+
+def intervals_said(moved: Mapping[str, tuple[float, str]], *, sought: bool = True) -> str:
+    """Return what a simulated check says of the intervals of a model that lacks something.
+
+    Examples
+    --------
+    >>> intervals_said({"delay": (0.4, "play"), "output_inertia": (5.3, "load friction")})
+    'of the intervals below only that of delay holds (load friction would move output_inertia by 5.3 half widths)'
+    >>> intervals_said({"delay": (0.4, "play")})
+    'the intervals below hold nevertheless (play would move delay by 0.4 half widths)'
+    """
+    if not moved:
+        return "whether the intervals below hold was not simulated" if sought else "there are no intervals"
+    worst = max(moved, key=lambda name: moved[name][0])
+    why = f"{moved[worst][1]} would move {worst} by {moved[worst][0]:.2g} half widths"
+    good = [name for name, (widths, _) in moved.items() if widths <= 1.0]
+    if len(good) == len(moved):
+        return f"the intervals below hold nevertheless ({why})"
+    if not good:
+        return f"{UNHELD} ({why})"
+    said = f"only that of {good[0]} holds" if len(good) == 1 else f"only those of {', '.join(good)} hold"
+    return f"of the intervals below {said} ({why})"
 
 
 def shown(value: float, sensor: str) -> str:
@@ -248,7 +285,7 @@ def _motion(series: Sequence[SensorSeries], scaled: Sequence[Array],
     moves = [_moves(one)[keep] for one, keep in zip(series, inner, strict=True)]
     order = np.concatenate(moves).argsort(kind="stable").argsort(kind="stable") / max(sum(map(len, moves)) - 1, 1)
     ranks = np.split(2.0 * math.sqrt(3.0) * (order - 0.5), np.cumsum([len(m) for m in moves])[:-1])
-    mean = float(np.mean(np.concatenate(power)))
+    mean = max(float(np.mean(np.concatenate(power))), 1e-300)
     return _test([rank * (p / mean - 1.0) for rank, p in zip(ranks, power, strict=True)], 0.0, 0.0)
 
 

@@ -1,4 +1,4 @@
-"""Priors that yield: where logs and servo file disagree too far, the logs are believed.
+"""Priors that yield: where logs and servo file disagree too far, the logs are believed; short of it, widths grow.
 
 A prior is a normal law whose cost does not rise any further beyond 3.5 standard deviations: what is outside is wrong by
 any amount. So a prior stays where the fit with it is the better one by far, and goes where the fit without it is better
@@ -28,6 +28,9 @@ APART = 3.5
 """Standard errors between logs and prior from which on the prior is not believed: 1 of 2000 that are right."""
 _REACH = 1.92  # rise of the cost at the ends of a 95 % interval
 _OPEN = 0.5 * APART**2 - _REACH  # gain from which on the fit without a prior lies within the interval
+PUSHED = 2.5
+"""Standard errors, and widths, from which on a prior counts as wide as it is off: 1 of 80 that are right."""
+_PUSH = 0.5 * PUSHED**2
 _FACTORS = (0.25, 0.4, 0.63, 0.8, 1.25, 1.6, 2.5, 4.0)  # of the value: where the logs are asked once more
 _STEPS = 8  # of a search that only has to show whether it goes down
 _HINT = 0.5  # of the gain that counts: the noise is not known yet
@@ -88,13 +91,54 @@ class Yielded:
 
 
 @dataclass(frozen=True)
+class Widened:
+    """A prior that the logs push so far that it counts as wide as it is off.
+
+    Parameters
+    ----------
+    name : str
+    file, file_std : float
+        What the prior says (SI).
+    logs : float
+        What the fit finds (SI).
+    apart : float
+        Standard errors between the two, by how much better the logs are fitted without the prior.
+    std : float
+        The standard deviation that the prior counts with (SI).
+    unit : str
+        SI.
+    of_file : bool
+        Whether the servo file said so, or else the caller.
+    """
+
+    name: str
+    file: float
+    file_std: float
+    logs: float
+    apart: float
+    std: float
+    unit: str = ""
+    of_file: bool = True
+
+    def __str__(self) -> str:
+        who = "the servo file" if self.of_file else "the prior that was given"
+        return (f"the logs push {self.name} to {self.logs:.4g} {self.unit}".rstrip() + f", {self.apart:.2g} standard "
+                f"errors from what {who} says, {self.file:.4g} ± {self.file_std:.2g} {self.unit}".rstrip()
+                + f": that counts as ± {self.std:.2g} {self.unit}".rstrip() + " here")
+
+
+@dataclass(frozen=True)
 class Dropped:
-    """A shared number whose prior was dropped: which one, the prior on the scale of the search, and how far off."""
+    """A shared number whose prior was dropped or widened: which one, the prior as it is searched, and how far off.
+
+    `wide` is its new standard deviation on that scale; inf where it was dropped.
+    """
 
     which: int
     mean: float
     std: float
     apart: float
+    wide: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -110,7 +154,7 @@ class _Trial:
 def settle(task: Task, found: Outcome, tell: Told) -> tuple[Outcome, tuple[Dropped, ...]]:
     """Drop the priors that the logs contradict, one after the other; return where the fit ends then, and which.
 
-    The task goes on without them.
+    Those that the logs push, if less far, are widened. The task goes on so.
 
     Parameters
     ----------
@@ -124,13 +168,13 @@ def settle(task: Task, found: Outcome, tell: Told) -> tuple[Outcome, tuple[Dropp
     count = int((task.prior.weight > 0.0).sum())
     for k in range(count):
         tell(k / count, "priors")
-        trials = _trials(task, found)
+        trials = [trial for trial in _trials(task, found) if trial.dropped.which not in [one.which for one in left]]
         if not trials:
             break
         best = max(trial.gain for trial in trials)
         # What fits as well is told apart by how far its own prior has to be left
         chosen = min((t for t in trials if t.gain > best - _REACH), key=lambda t: t.moved)
-        task.prior = _without(task.prior, [chosen.dropped.which])
+        task.prior = _widened(task.prior, chosen.dropped)
         found = task.again(chosen.end.point, _part_of(tell, k, count))
         left.append(chosen.dropped)
     return found, tuple(left)
@@ -150,6 +194,8 @@ def yielded(task: Task, found: Outcome, left: Sequence[Dropped], doubts: Doubts)
     """
     result = []
     for one in left:
+        if math.isfinite(one.wide):
+            continue
         p, x = task.forecast.space.parameters[one.which], float(found.point.shared[one.which])
         group = [name for item in doubts.unidentifiable if p.name in item.parameters for name in item.parameters]
         mates = tuple(dict.fromkeys(name for name in group if name != p.name and _believed(task, name)))
@@ -161,6 +207,17 @@ def yielded(task: Task, found: Outcome, left: Sequence[Dropped], doubts: Doubts)
             std, interval = abs(p.slope(x)) * std, (min(a, b), max(a, b))
         said = p.prior if p.prior is not None else (math.nan, math.nan)
         result.append(Yielded(p.name, *said, float(p.value(x)), std, one.apart, *interval, p.unit, p.of_file, mates))
+    return tuple(result)
+
+
+def widened(task: Task, found: Outcome, left: Sequence[Dropped]) -> tuple[Widened, ...]:
+    """Return the widened priors with what the fit says."""
+    result = []
+    for one in left:
+        p, x = task.forecast.space.parameters[one.which], float(found.point.shared[one.which])
+        if p.prior is not None and math.isfinite(one.wide):
+            result.append(Widened(p.name, *p.prior, float(p.value(x)), one.apart, p.prior[1] * one.wide / one.std,
+                                  p.unit, p.of_file))
     return tuple(result)
 
 
@@ -179,6 +236,12 @@ def _without(prior: Prior, which: Sequence[int]) -> Prior:
     return Prior(prior.mean, weight)
 
 
+def _widened(prior: Prior, one: Dropped) -> Prior:
+    weight = prior.weight.copy()
+    weight[one.which] = 1.0 / one.wide  # 0 of one that is dropped
+    return Prior(prior.mean, weight)
+
+
 def _search(task: Task, prior: Prior) -> Search:
     return Search(task.forecast, task.loss, prior, task.lower, task.upper, task.fitted, task.held)
 
@@ -193,7 +256,7 @@ def _trials(task: Task, found: Outcome) -> list[_Trial]:
         return []
     far = _far(task, found, free, base)
     without = _search(task, _without(task.prior, believed)).run(found.point, most=_STEPS)
-    if not far and base - without.cost < _HINT * _OPEN:
+    if not far and base - without.cost < _HINT * _PUSH:
         return []
     trials = []
     for k in believed:
@@ -241,7 +304,7 @@ def _judged(task: Task, found: Outcome, k: int, end: Outcome, base: float) -> _T
     """Return a fit without the prior of a number, if that is not believed; in the noise that is left without it."""
     mean, weight = float(task.prior.mean[k]), float(task.prior.weight[k])
     off, std = abs(float(end.point.shared[k]) - mean), 1.0 / weight
-    if base - end.cost < _HINT * _OPEN or off < APART * std:
+    if base - end.cost < _HINT * _PUSH or off < PUSHED * std:
         return None
     alone, before = _without(task.prior, [k]), task.forecast.noise
     task.take_noise(end.point)
@@ -255,6 +318,7 @@ def _judged(task: Task, found: Outcome, k: int, end: Outcome, base: float) -> _T
     # Twice the gain is off² / (std² + that of the logs²); the latter is wider where residuals are correlated
     of_logs = max(off**2 / (2.0 * gain) - std**2, 0.0)
     apart = off / math.hypot(std, widening * math.sqrt(of_logs))
-    if 0.5 * apart**2 < _OPEN:
+    if apart < PUSHED:
         return None
-    return _Trial(Dropped(k, mean, std, apart), replace(end), gain, off / std)
+    goes = off >= APART * std and 0.5 * apart**2 >= _OPEN
+    return _Trial(Dropped(k, mean, std, apart, math.inf if goes else off), replace(end), gain, off / std)

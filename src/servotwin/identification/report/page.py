@@ -103,10 +103,8 @@ def _summary(fit: Fit) -> str:
     if widest:
         cards.append((f"± {share_text(widest[1])}", f"widest of these intervals: <code>{escape(widest[0])}</code>"))
     if len(fit.starts) > 1:
-        best = fit.starts[0].cost
-        same = sum(start.cost <= 1.01 * best + 1e-9 for start in fit.starts)
-        cards.append((f"{same} of {len(fit.starts)}",
-                      "searches from different starts ended within 1 % of the best cost"))
+        number_of, words = fit.searches
+        cards.append((f"{number_of} of {len(fit.starts)}", escape(words)))
     listed = "".join(f"<li><b>{value}</b>{words}</li>" for value, words in cards)
     notes = "".join(f'<div class="note"><p>{escape(text)}</p></div>\n' for text in fit.warnings
                     if fit.verdict is None or text != fit.verdict.sentence)

@@ -299,18 +299,16 @@ class TrialBench:
         return loss.cost(r + J @ step)
 
     def _slopes(self) -> Array:
-        """Return the derivatives of all logs at the base, by shared and own numbers."""
         if not hasattr(self, "_J"):
-            parts = self.base.forecast.at(self.base.point)
-            own = sum(part.own.shape[1] for part in parts)
-            rows, first = [], 0
-            for part in parts:
-                wide = np.zeros((len(part.residual), own))
-                wide[:, first:first + part.own.shape[1]] = part.own
-                first += part.own.shape[1]
-                rows.append(np.column_stack([part.shared, wide]))
-            self._J = np.concatenate(rows)
+            self._J = joined(self.base.forecast.at(self.base.point))
         return self._J
+
+
+def joined(parts: Sequence[LogPart]) -> Array:
+    """Return the derivatives of some logs in one matrix, by shared numbers and those of each log."""
+    from scipy.linalg import block_diag
+
+    return np.column_stack([np.concatenate([part.shared for part in parts]), block_diag(*(part.own for part in parts))])
 
 
 def _finer(forecast: Watched, point: Point) -> bool:

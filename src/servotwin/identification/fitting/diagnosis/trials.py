@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from servotwin.errors import ServotwinError
 from servotwin.identification.fitting.diagnosis.bench import DEAR, Purse, Setting, Spent, Told, TrialBench, gain
 from servotwin.identification.fitting.diagnosis.candidates import TABLE, Candidate, mended_logs, possible
 from servotwin.identification.fitting.diagnosis.events import dropped_samples, lost_pulses
+from servotwin.identification.fitting.diagnosis.holds import moved
 from servotwin.identification.fitting.diagnosis.servos import two_servos
 from servotwin.identification.fitting.findings import findings
 from servotwin.identification.fitting.fit import Trace
@@ -37,9 +39,18 @@ _SPECIAL: dict[str, Try] = {
 """Candidates that are tried in ways of their own."""
 
 
+class Diagnosis(NamedTuple):
+    """Causes, the best first; by how many half widths what may be missing would move each number, and what that is."""
+
+    causes: tuple[Cause, ...]
+    moved: Mapping[str, tuple[float, str]]
+
+
 def diagnose(task: Task, point: Point, traces: Sequence[Trace], verdict: Verdict, sensor: str, budget: float,
-             tell: Callable[[float, str], None]) -> tuple[Cause, ...]:
+             half: Mapping[str, float], tell: Callable[[float, str], None]) -> Diagnosis:
     """Return what explains the residuals of a fit, the best first; nothing that gains no more than chance.
+
+    Beside it, what may be missing would do to the intervals.
 
     Parameters
     ----------
@@ -53,6 +64,8 @@ def diagnose(task: Task, point: Point, traces: Sequence[Trace], verdict: Verdict
         The angle's name.
     budget : float
         What may be simulated, in seconds of one lane of closed form.
+    half : mapping of str to float
+        Half widths of the intervals, on the scale of the search.
     tell : callable
         Told the share done, and what is tried.
     """
@@ -61,7 +74,7 @@ def diagnose(task: Task, point: Point, traces: Sequence[Trace], verdict: Verdict
     try:
         bench = TrialBench(task, point, _chosen(task, traces), purse, noise)
     except (Spent, ServotwinError):
-        return ()
+        return Diagnosis((), {})
     found: list[tuple[Cause, int]] = []
     groups = _ordered(bench, traces)
     count, k, left = sum(map(len, groups)), 0, purse.left
@@ -76,9 +89,17 @@ def diagnose(task: Task, point: Point, traces: Sequence[Trace], verdict: Verdict
             if told is not None and told.gain.counts:
                 found.append((_cause(told, sensor), k))
                 if told.gain.after < _EXPLAINED * noise:
-                    return _ranked(found)
+                    return _diagnosis(bench, found, half)
             left, allowed = left - given + purse.left, allowed - given + purse.left
-    return _ranked(found)
+    return _diagnosis(bench, found, half)
+
+
+def _diagnosis(bench: TrialBench, found: Sequence[tuple[Cause, int]], half: Mapping[str, float]) -> Diagnosis:
+    causes = _ranked(found)
+    try:
+        return Diagnosis(causes, moved(bench, half, causes[0].name if causes else ""))
+    except (ServotwinError, np.linalg.LinAlgError):
+        return Diagnosis(causes, {})
 
 
 def _told(bench: TrialBench, try_it: Try) -> Told | None:
