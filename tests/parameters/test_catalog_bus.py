@@ -141,7 +141,7 @@ def test_plants_of_bam_are_as_published(name):
 def full_speed(servo):
     """Speed without load at full duty, of the DC motor with Coulomb and viscous friction [rad/s]."""
     N, motor, friction = servo.gear.gear_reduction, servo.motor, servo.friction
-    K, R = N * motor.torque_constant, motor.armature_resistance
+    K, R = N * motor.torque_constant, motor.armature_resistance + (servo.supply.bridge_drop_resistance or 0.0)
     share = 1.0 - (friction.load_friction or friction.load_friction_motor or 0.0)
     U = (servo.firmware.duty_limit or 1.0) * servo.supply.open_circuit_voltage - servo.supply.bridge_drop_voltage
     F, B = N * friction.coulomb_torque_forward, N * N * motor.motor_viscous_friction
