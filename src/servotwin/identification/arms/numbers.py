@@ -215,7 +215,7 @@ class Numbers:
 
 
 def arm_free(model: Model) -> list[str]:
-    """Return what is searched of a servo in an arm: what angles tell of its plant, with play and friction under load."""
+    """Return what is searched of a servo in an arm: what angles tell of its plant, play and friction under load too."""
     more = [name for name in ("gear.backlash", "friction.load_friction", "friction.load_friction_motor",
                               "friction.load_friction_external") if model.servo.get(name)]
     return [*(name for name in usual_free(model) if not name.startswith("firmware.")), *more]
