@@ -124,7 +124,8 @@ def settle(task: Task, found: Outcome, tell: Told) -> tuple[Outcome, tuple[Dropp
     count = int((task.prior.weight > 0.0).sum())
     for k in range(count):
         tell(k / count, "priors")
-        trials = _trials(task, found)
+        with task.nearly(found.point):
+            trials = _trials(task, found)
         if not trials:
             break
         best = max(trial.gain for trial in trials)
