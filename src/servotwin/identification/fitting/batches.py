@@ -102,6 +102,8 @@ class Batch:
         Whether bad input is raised; otherwise the bundle that has it fails.
     bundles : tuple of Bundle
         All with the same names of columns and of initial values.
+    nearly : bool
+        As of `simulate_lanes`.
     """
 
     model: Model
@@ -109,6 +111,7 @@ class Batch:
     accuracy: float
     strict: bool
     bundles: tuple[Bundle, ...]
+    nearly: bool = False
 
     @property
     def cost(self) -> float:
@@ -157,7 +160,7 @@ def _simulated(batch: Batch) -> list[dict[str, Array]]:
                      [bundle.load for bundle, count in zip(bundles, counts, strict=True) for _ in range(count)],
                      columns, initial or None, np.zeros(sum(counts), np.int64))
     made = simulate_lanes(lanes, duration=max(bundle.duration for bundle in bundles), output_times=times,
-                          outputs=batch.outputs, executor=HERE, accuracy=batch.accuracy)
+                          outputs=batch.outputs, executor=HERE, accuracy=batch.accuracy, nearly=batch.nearly)
     found, lane = [], 0
     for bundle, count in zip(bundles, counts, strict=True):
         rows, at = slice(lane, lane + count), places[bundle.key]

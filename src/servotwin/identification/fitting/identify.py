@@ -32,7 +32,7 @@ from servotwin.identification.fitting.holdout import split
 from servotwin.identification.fitting.intervals import ends
 from servotwin.identification.fitting.judging import with_verdict
 from servotwin.identification.fitting.phases import credible
-from servotwin.identification.fitting.point import FINE, NUISANCES, SHARED, LogPart, Point
+from servotwin.identification.fitting.point import FINE, NUISANCES, SHARED, STEP, LogPart, Point
 from servotwin.identification.fitting.record import identified_servo, with_record, with_what_logs_say
 from servotwin.identification.fitting.remedies import with_remedies
 from servotwin.identification.fitting.robot_registers import as_logs_say
@@ -307,7 +307,8 @@ def _vague(information: Array, inflation: float, sizes: Array, asked: NDArray[np
 
 def _information(task: Task, found: Outcome, beliefs: Sequence[Prior]) -> Array:
     """Return what the logs say of the shared numbers, from differences so fine that what has no effect has none."""
-    parts = task.forecast.at(found.point, step=FINE, cases=task.fitted)
+    jagged = task.forecast.step > STEP  # then fine differences are those of steps, not of what moves the shaft
+    parts = task.forecast.at(found.point, step=None if jagged else FINE, central=jagged, cases=task.fitted)
     rows = [rows_of(part, task.loss, own, found.point.own[k])
             for k, part, own in zip(task.fitted, parts, beliefs, strict=True)]
     return np.asarray(np.sum([(r.slope * r.inside[:, None]).T @ r.slope for r in rows], axis=0))
