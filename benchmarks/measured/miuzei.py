@@ -27,8 +27,9 @@ EXTERNAL, LEAST = "friction.load_friction_external", "electronics.minimum_drive_
 FIRMWARE = {  # of the digital servo; ticks are a guess, the dead zone is the 1 us of its class: runs would have none
     "control_period": 2e-3, "proportional_gain": 3.5, "derivative_gain": 0.08, "deadband_angle": 2.4e-3,
     "signal_loss": "limp", "signal_timeout": 0.015}  # without pulses the arm falls at once
+SUPPLY = "supply.internal_resistance"
 DIGITAL = ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque", EXTERNAL,
-           "firmware.proportional_gain", "firmware.derivative_gain", "potentiometer.feedback_gain")
+           "firmware.proportional_gain", "firmware.derivative_gain", "potentiometer.feedback_gain", SUPPLY)
 BRIDGES = ("diode", "brake")
 M1 = ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque",
       "electronics.stretcher_gain", "electronics.deadband", "potentiometer.feedback_gain")
@@ -68,8 +69,11 @@ def digital(bridge: str) -> Servo:
         "one_shot_slope", "one_shot_offset", "frame_period", "pulse_width_min", "pulse_width_max")}
     made = st.servo_from_values("miuzei-25kg", {**START, "electronics": electronics,
                                                 "firmware": {**FIRMWARE, "off_state": bridge}})
-    near = {"motor.armature_resistance": 1.6, "motor.torque_constant": 1.1 / REDUCTION, EXTERNAL: 0.15,
-            "motor.back_emf_constant": 1.1 / REDUCTION}  # what first fits found, so that each fold ends in one valley
+    near = {  # what first fits found, so that each fold ends in one valley
+        "motor.armature_resistance": 1.55, "motor.torque_constant": 1.1 / REDUCTION, EXTERNAL: 0.14, SUPPLY: 0.1,
+        "motor.back_emf_constant": 1.1 / REDUCTION, "motor.rotor_inertia": 0.0139 / REDUCTION**2,
+        "friction.coulomb_torque_forward": 0.27 / REDUCTION, "friction.coulomb_torque_backward": 0.27 / REDUCTION,
+        "firmware.proportional_gain": 3.3, "firmware.derivative_gain": 0.075}
     return replace(made, kind="digital").replace(near)
 
 

@@ -13,7 +13,7 @@ from servotwin.identification import LogError, friction_ladder, read_bam_log
 GAINS = (100.0, 200.0, 800.0)
 PLANT = ("motor.armature_resistance", "output_torque_constant", "output_inertia")
 LAWS = ("M1", "M3", "M4", "M6")
-SUPPLY, REDUCTION = "supply.internal_resistance", 288.4
+REDUCTION = 288.4
 NEAR = {  # what first fits found, so that each search ends in one valley
     "motor.armature_resistance": 3.3, "motor.torque_constant": 0.33 / REDUCTION,
     "motor.back_emf_constant": 0.33 / REDUCTION, "motor.rotor_inertia": 2.1e-3 / REDUCTION**2,
@@ -44,7 +44,8 @@ def told(label: str, errors: tuple[LogError, ...]) -> None:
 
 def main(folder: Path) -> None:
     runs = logs(folder)
-    servo = st.load_servo("dynamixel-xl330-m288").replace({"supply.open_circuit_voltage": 7.4, SUPPLY: None, **NEAR})
+    servo = st.load_servo("dynamixel-xl330-m288").replace({
+        "supply.open_circuit_voltage": 7.4, "supply.bridge_drop_resistance": None, **NEAR})
     print(f"XL330 as a bus servo: {len(runs)} runs; rms error by register P [mrad], over all samples "
           f"({', '.join(sorted({log.motion for log in runs}))})")
     for name, published in PUBLISHED.items():
@@ -53,7 +54,7 @@ def main(folder: Path) -> None:
     for gain in GAINS:
         began = time.process_time()
         held = [log.name for log in runs if log.conditions["gain"] == gain]
-        ladder = friction_ladder(runs, servo, free=PLANT, rungs=LAWS, select="criterion", soft_supply=True, priors=None,
+        ladder = friction_ladder(runs, servo, free=PLANT, rungs=LAWS, select="criterion", gives_way=True, priors=None,
                                  starts=1, intervals=False, noise=NOISE, sensors=["output_angle"], holdout=held)
         for rung in ladder.rungs:
             told(f"P {gain:g} held out, {rung.name}", rung.fit.holdout.errors["DigitalServo"])

@@ -1,8 +1,8 @@
 """The friction laws M1 to M6 one after the other on the same logs, and which of them the data pay for.
 
 Each rung begins where a simpler one ended. More terms always fit the logs that are fitted at least as well; whether
-they predict others better is what decides. A supply that gives way bends speeds and torques as friction does, so the
-law that was chosen is fitted once more with one; where that is chosen, so are the richer laws on it.
+they predict others better is what decides. A supply or a bridge that gives way bends speeds and torques as friction
+does, so the law that was chosen is fitted once more with each; where one is chosen, so are the richer laws with it.
 """
 
 from __future__ import annotations
@@ -49,10 +49,11 @@ _FIRST = {  # where a term begins that the rung before does not have: little of 
     "friction.load_friction_motor_quad": 0.01, "friction.load_friction_external_quad": 0.01,
 }
 _ALIKE = {"friction.load_friction": _DIRECTED, "friction.load_friction_stribeck": _DIRECTED_STRIBECK}
-SUPPLY = "supply.internal_resistance"
-SOFT = ", soft supply"
-"""What the name of a rung with a supply that gives way ends with."""
-_SOFT_SHARE = 0.2  # of the armature's resistance, where that of the supply begins: nearer to 0 a search stays there
+EXTRAS: dict[str, str] = {
+    "soft supply": "supply.internal_resistance", "soft bridge": "supply.bridge_drop_resistance"}
+"""What gives way beside friction, and what is searched of it; the name of such a rung is "M4, soft supply"."""
+
+_SOFT_SHARE = 0.2  # of the armature's resistance, where that of what gives way begins: nearer to 0 it may stay there
 _STIFFER = 0.9  # of the armature's resistance, that then begins lower
 _FEWEST = 3  # held out logs, whose scatter is believed
 _STRIBECK_SPEED = 0.2  # rad/s at the output, where Stribeck friction begins to fade
@@ -123,7 +124,7 @@ class Ladder:
 
 def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] | None = None,
                     free: Sequence[str] | None = None, *, rungs: Sequence[str] = tuple(RUNGS),
-                    select: str = "holdout", soft_supply: bool | None = None, progress: Any = False,
+                    select: str = "holdout", gives_way: bool | None = None, progress: Any = False,
                     **options: Any) -> Ladder:
     """Fit friction laws of growing complexity, and choose one.
 
@@ -141,10 +142,10 @@ def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] | None
     select : {"holdout", "criterion"}
         "holdout": the simplest law whose error on the logs that were held out is within one standard error of the
         smallest; "criterion": the smallest information criterion. Without held out logs it is the latter.
-    soft_supply : bool, optional
-        Whether the law that is chosen is fitted once more with an internal resistance of the supply, and where that is
-        chosen the richer laws too: "M4, soft supply". Unless given, where all laws are tried, the model reads one and
-        neither logs nor `free` know of it already.
+    gives_way : bool, optional
+        Whether the law that is chosen is fitted once more with an internal resistance of the supply and once with one
+        of the bridge, and where one of these is chosen the richer laws with it too: "M4, soft supply". Unless given,
+        where all laws are tried. What logs or `free` say already, or the model does not read, is not tried.
     progress : bool or callable
         As of `identify`, over all rungs.
     **options
@@ -167,23 +168,32 @@ def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] | None
               if name not in _TERMS and name not in _BASE and not name.startswith("friction.")]
     climb = _Climb(given, servo, type(plain), others, {"compare_with": (), **options, "diagnose": False}, [])
     ordered = [name for name in RUNGS if name in rungs]
-    soft = (len(ordered) == len(RUNGS) and may_give_way(plain, given, others)) if soft_supply is None else soft_supply
+    wanted = len(ordered) == len(RUNGS) if gives_way is None else gives_way
+    extras = may_give_way(plain, given, others) if wanted else ()
     with checks.shown(progress) as show:
-        count = len(ordered) + soft
+        count = len(ordered) + len(extras)
         ended = all(climb.fitted(name, _share(show, k, count, name)) for k, name in enumerate(ordered))
-        if ended and soft:
-            best = _choice(sorted(climb.found, key=_place), select)[0]
-            if climb.fitted(best + SOFT, _share(show, count - 1, count, best + SOFT)) and (
-                    _choice(climb.found, select)[0].endswith(SOFT)):
-                for name in ordered[ordered.index(best) + 1:]:
-                    if not climb.fitted(name + SOFT, _share(show, count - 1, count, name + SOFT)):
-                        break
-    return ladder_of(sorted(climb.found, key=_place), select)
+        if ended and extras:
+            law = _choice(climb.ordered(), select)[0]
+            ended = all(climb.fitted(name, _share(show, k, count, name))
+                        for k, name in enumerate((f"{law}, {extra}" for extra in extras), len(ordered)))
+            extra = _parts(_choice(climb.ordered(), select)[0])[1]
+            if ended and extra:
+                all(climb.fitted(name, _share(show, count - 1, count, name))
+                    for name in (f"{richer}, {extra}" for richer in ordered[ordered.index(law) + 1:]))
+    return ladder_of(climb.ordered(), select)
 
 
-def _place(rung: Rung) -> tuple[int, bool]:
-    """Return where a rung stands: a law with a supply that gives way stands behind the law."""
-    return list(RUNGS).index(rung.name.removesuffix(SOFT)), rung.name.endswith(SOFT)
+def _parts(name: str) -> tuple[str, str]:
+    """Return the law and what gives way of a rung; the latter empty where nothing does."""
+    law, _, extra = name.partition(", ")
+    return law, extra
+
+
+def _place(rung: Rung) -> tuple[int, int]:
+    """Return where a rung stands: what gives way stands behind its law."""
+    law, extra = _parts(rung.name)
+    return list(RUNGS).index(law), ["", *EXTRAS].index(extra)
 
 
 class _Climb(NamedTuple):
@@ -198,16 +208,20 @@ class _Climb(NamedTuple):
 
     def fitted(self, name: str, tell: Any) -> bool:
         """Fit a rung, and tell whether that came to its end."""
-        law = name.removesuffix(SOFT)
+        law, extra = _parts(name)
         more = {**self.options, **({"starts": 1} if self.found else {})}  # it begins at what a simpler law found
-        names = [*self.others, *RUNGS[law], *([SUPPLY] if name != law else [])]
+        names = [*self.others, *RUNGS[law], *([EXTRAS[extra]] if extra else [])]
         fit = identify(self.logs, _start(self.servo, name, self.found), self.kind, names, progress=tell, **more)
         self.found.append(rung_of(name, fit))
         return not fit.interrupted
 
+    def ordered(self) -> list[Rung]:
+        """Return the rungs, the simplest first."""
+        return sorted(self.found, key=_place)
 
-def may_give_way(model: Model, logs: Sequence[Log], free: Sequence[str]) -> bool:
-    """Return whether a supply that gives way is worth a trial: the model reads it, and nobody knows how much it does.
+
+def may_give_way(model: Model, logs: Sequence[Log], free: Sequence[str]) -> tuple[str, ...]:
+    """Return what may give way and is worth a trial: the model reads it, and nobody knows how much it does.
 
     Parameters
     ----------
@@ -215,8 +229,8 @@ def may_give_way(model: Model, logs: Sequence[Log], free: Sequence[str]) -> bool
     logs : sequence of Log
     free : sequence of str
     """
-    known = SUPPLY in free or any(SUPPLY in log.parameters for log in logs)
-    return not known and SUPPLY in (*model.requires, *model.optional)
+    return tuple(extra for extra, name in EXTRAS.items() if name in (*model.requires, *model.optional)
+                 and name not in free and not any(name in log.parameters for log in logs))
 
 
 def ladder_of(rungs: Sequence[Rung], select: str) -> Ladder:
@@ -253,13 +267,13 @@ def _start(servo: Servo, name: str, before: Sequence[Rung]) -> Servo:
 
     M5 and M6 contain M3 and M4 too: there motor and load outside count alike.
     """
-    law, soft = name.removesuffix(SOFT), name.endswith(SOFT)
+    law, extra = _parts(name)
     alike = {"M5": ("M1", "M2", "M3", "M4", "M5"), "M6": tuple(RUNGS)}.get(law, ())
 
     def within(rung: Rung) -> bool:
-        other = rung.name.removesuffix(SOFT)
+        other, given = _parts(rung.name)
         inside = other in alike or set(RUNGS[other]) <= set(RUNGS[law])
-        return inside and math.isfinite(rung.fit.cost) and (soft or not rung.name.endswith(SOFT))
+        return inside and math.isfinite(rung.fit.cost) and given in ("", extra)
 
     inner = [rung for rung in before if within(rung)]
     base = min(inner, key=lambda rung: rung.training).fit.servo if inner else servo
@@ -274,9 +288,9 @@ def _start(servo: Servo, name: str, before: Sequence[Rung]) -> Servo:
                if term in own and not base.get(term) and not values.get(term)}
     if base.get("friction.breakaway_ratio") == 1.0 and "friction.breakaway_ratio" in RUNGS[law]:
         values["friction.breakaway_ratio"] = own["friction.breakaway_ratio"]
-    if soft and not base.get(SUPPLY):
+    if extra and not base.get(EXTRAS[extra]):
         R_a = float(nominal(base, "motor.armature_resistance") or 1.0)
-        values |= {SUPPLY: _SOFT_SHARE * R_a, "motor.armature_resistance": _STIFFER * R_a}
+        values |= {EXTRAS[extra]: _SOFT_SHARE * R_a, "motor.armature_resistance": _STIFFER * R_a}
     return base.replace(values, source="where a rung of the friction ladder begins")
 
 

@@ -1,7 +1,7 @@
 """Structures of a servo one after the other on the same logs: analog or digital, its bridge, its spring, its friction.
 
 The kind of loop and the bridge are compared first, with Coulomb and viscous friction; an elastic gear or arm where they
-are asked for, and the friction laws M2 to M6 with a supply that gives way, follow on what these leave. A structure with
+are asked for, and the friction laws M2 to M6 with what gives way, follow on what these leave. A structure with
 fewer parts is simpler, and the simplest that predicts no worse is chosen.
 """
 
@@ -22,7 +22,6 @@ from servotwin.identification.fitting.ladder import (
     Rung,
     friction_ladder,
     ladder_of,
-    may_give_way,
     rung_of,
 )
 from servotwin.loads import Flexible, Load
@@ -69,7 +68,7 @@ class Structure(NamedTuple):
 def compare_structures(logs: Sequence[Log], servo: Servo, model: type[Model] | None = None,
                        free: Sequence[str] | None = None, *, kinds: Sequence[str] = KINDS,
                        bridges: Sequence[str] | None = None, springs: Sequence[str] = (),
-                       rungs: Sequence[str] = tuple(RUNGS), select: str = "holdout", soft_supply: bool | None = None,
+                       rungs: Sequence[str] = tuple(RUNGS), select: str = "holdout", gives_way: bool | None = None,
                        progress: Any = False, **options: Any) -> Ladder:
     """Fit structures of a servo to the same logs, and choose the simplest that predicts no worse.
 
@@ -95,7 +94,7 @@ def compare_structures(logs: Sequence[Log], servo: Servo, model: type[Model] | N
         Friction laws of the chosen loop, bridge and spring, "M1" among them or not: of `RUNGS`.
     select : {"holdout", "criterion"}
         As of `friction_ladder`.
-    soft_supply : bool, optional
+    gives_way : bool, optional
         As of `friction_ladder`, on the best law.
     progress : bool or callable
         As of `identify`, over all structures.
@@ -149,9 +148,9 @@ def compare_structures(logs: Sequence[Log], servo: Servo, model: type[Model] | N
             return ladder_of(tuple(found.values()), select)
         best = _best(found, select)
         fit = found[best].fit
-        if soft_supply is None:
-            soft_supply = len(laws) == len(RUNGS) and may_give_way(fit.model, given, fit.space.names)
-        climbed = _climbed(logs_of[best.spring], fit, further, {**options, "soft_supply": soft_supply},
+        if gives_way is None:
+            gives_way = len(laws) == len(RUNGS)
+        climbed = _climbed(logs_of[best.spring], fit, further, {**options, "gives_way": gives_way},
                            lambda share, text: show((before + share * len(further)) / count, text))
     laws_of_best = [rung_of(best.named(rung.name), rung.fit) for rung in climbed.rungs]
     return ladder_of((*found.values(), *laws_of_best), select)
