@@ -255,7 +255,8 @@ def _doubts(what: Whole, x: Array, noise: Noise, found: Sequence[Array], slopes:
     belief = np.array([one.belief for one in numbers.all])
     prior_share = dict(zip(numbers.names, np.clip((beliefs.std / belief)**2, 0.0, 1.0).tolist(), strict=True))
     shares = [1.0 if one.logarithmic else math.nan for one in numbers.all]
-    return _Doubts(beliefs, prior_share, explain(numbers.names, shares, flags, directions))
+    named = {str(one): one for one in explain(numbers.names, shares, flags, directions)}  # several of the same members
+    return _Doubts(beliefs, prior_share, tuple(named.values()))
 
 
 def _sizes(what: Whole) -> Array:

@@ -14,8 +14,8 @@ from servotwin.identification.fitting.arrow import Loss, Prior, block
 
 Array = NDArray[np.float64]
 _DAMPINGS = (1e-4, 0.1, 10.0)  # tried side by side
-_LEAST_GAIN = 1e-3  # of the cost
-_LEAST_STEP = 1e-4
+_LEAST_GAIN = 3e-3  # of the cost: servos that count make it rough
+_RETRIES, _FIRMER = 2, 300.0  # of steps that gained nothing, with so many times the damping
 
 
 class ArmSearch:
@@ -92,16 +92,18 @@ class ArmSearch:
             linear = self.linear(x)
             found = [one.residual for one in linear]
             best = self.cost(x, found)
-            trials, costs = self.tried(x, *self.normal(x, found, [one.slopes for one in linear]), scale)
-            k = int(np.argmin(costs))
-            if not costs[k] < best:
-                scale *= 10.0
-                if scale > 1e4:
+            normal = self.normal(x, found, [one.slopes for one in linear])
+            for _ in range(_RETRIES):
+                trials, costs = self.tried(x, *normal, scale)
+                k = int(np.argmin(costs))
+                if costs[k] < best:
                     break
-                continue
-            moved, gain = float(np.abs(trials[k] - x).max()), best - costs[k]
-            x, best, scale = trials[k], costs[k], max(scale * (0.3 if k == 0 else 1.0), 1e-3)
-            if gain < _LEAST_GAIN * best or moved < _LEAST_STEP:
+                scale *= _FIRMER
+            else:
+                break
+            gain = best - costs[k]
+            x, scale = trials[k], max(scale * (0.3 if k == 0 else 1.0), 1e-3)
+            if gain < _LEAST_GAIN * best:
                 break
         return x
 
