@@ -19,6 +19,7 @@ from servotwin.identification.fitting.fit import Fit
 from servotwin.identification.fitting.free import nominal
 from servotwin.identification.fitting.holdout import LogError, pooled
 from servotwin.identification.fitting.identify import identify
+from servotwin.identification.fitting.stopping import Within
 from servotwin.logs.log import Log
 from servotwin.models.base import Model
 from servotwin.parameters import Servo
@@ -154,6 +155,7 @@ def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] | None
     others = [name for name in (free or checks.usual_free(plain, given))
               if name not in _TERMS and name not in _BASE and not name.startswith("friction.")]
     options = {"compare_with": (), **options, "diagnose": False}  # the ladder is the trial
+    options["within"] = Within(options.get("within"))
     found: list[Rung] = []
     ordered = [name for name in RUNGS if name in rungs]
     with checks.shown(progress) as show:
