@@ -6,7 +6,7 @@ whenever one of them is, and run as long as the longest. No lane feels that, to 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from time import perf_counter
@@ -41,10 +41,13 @@ class Running:
     crew : Crew
     accuracy : float
         Of motions that are integrated [rad].
+    look : callable
+        Called before each simulation; may raise KeyboardInterrupt.
     """
 
     crew: Crew = field(default_factory=Crew)
     accuracy: float = FIT_ACCURACY
+    look: Callable[[], None] = lambda: None
 
 
 @dataclass(frozen=True, eq=False)

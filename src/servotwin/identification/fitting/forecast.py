@@ -242,6 +242,7 @@ class Forecast:
         derivatives, for all signals.
         """
         which, step = range(len(self.cases)) if cases is None else cases, self.step if step is None else step
+        self.running.look()
         sloped = [derivatives] * len(points) if isinstance(derivatives, bool) else derivatives
         lanes = [LogLanes(self, k, at, point, sides=(1 + central) * sloped[at], step=step, rates=rates,
                           noise=self.noise if noises is None else noises[at])
@@ -268,6 +269,7 @@ class Forecast:
                 for call in calls]
         with closing(self._done(work)) as running:
             for call, batch, done in zip(calls, work, running, strict=True):
+                self.running.look()
                 self._pace = min(self._pace, done.seconds / batch.cost)
                 for k, signals in zip(call, done.signals, strict=True):
                     lanes[k].take(signals)
