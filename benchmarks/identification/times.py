@@ -223,13 +223,17 @@ def measure(name: str, *, first_only: bool = False) -> None:
         print(f"  {name:12} M1 to M6 {spent:8.1f} s   chosen {ladder.chosen}", flush=True)
         return
     first, early = _timed(lambda: _fit(row, **FIRST))
-    print(f"  {name:12} first    {early:8.1f} s   {_off(first, row.truth)}", flush=True)
+    print(f"  {name:12} first    {early:8.1f} s   {_rms(first):7.3f} mrad   {_off(first, row.truth)}", flush=True)
     if first_only:
         return
     fit, spent = _timed(lambda: _fit(row))
-    rms = math.sqrt(np.mean(np.concatenate([t.residual for t in fit.traces if not t.held_out]) ** 2))
-    print(f"  {name:12} default  {spent:8.1f} s   {_off(fit, row.truth)}\n  {'':12} rms {1e3 * rms:.3f} mrad; "
+    print(f"  {name:12} default  {spent:8.1f} s   {_rms(fit):7.3f} mrad   {_off(fit, row.truth)}\n  {'':12} "
           f"{fit.verdict.sentence if fit.verdict else ''}", flush=True)
+
+
+def _rms(fit: st.Fit) -> float:
+    """Return what is left of the fitted logs [mrad]."""
+    return 1e3 * math.sqrt(np.mean(np.concatenate([t.residual for t in fit.traces if not t.held_out]) ** 2))
 
 
 def main(*words: str) -> None:
