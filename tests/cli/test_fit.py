@@ -216,6 +216,17 @@ def test_an_interrupt_keeps_the_best_so_far(fit, tmp_path, monkeypatch):
     assert "INTERRUPTED" in fit(*QUICK).out
 
 
+def test_the_time_that_a_fit_may_take(fit, tmp_path):
+    ended = fit("--starts", "6", "--within", "0.4 s", "--out", "my.toml", "--json")
+    if ended.code == 0:  # slow machines find nothing in that time
+        assert ended.data["interrupted"] is True
+        assert ended.data["unknown"]
+        assert st.load_servo(tmp_path / "my.toml").fit["unknown"] == ended.data["unknown"]
+    assert "--within" in fit(*QUICK, "--within", "1us", "--out", "none.toml").error
+    assert "--within" in fit(*QUICK, "--within", "soon").error
+    assert not (tmp_path / "none.toml").exists()
+
+
 def test_an_interrupt_before_the_first_step_leaves_nothing(fit, tmp_path, monkeypatch):
     from servotwin.identification.fitting.arrow import Search
 

@@ -83,6 +83,16 @@ def test_an_interrupt(case, child_environment, tmp_path):
         assert json.loads(out)["error"]["message"] == "interrupted"
 
 
+@pytest.mark.parametrize("case", [name for name in PROGRAMS if name != "where an exception would be lost"])
+def test_a_termination_does_the_same(case, child_environment, tmp_path):
+    program, out, err, files = PROGRAMS[case]
+    program = program.replace("interrupts.CODE", "interrupts.code()").replace("ctrl_c()", "terminate()")
+    done = subprocess.run([sys.executable, "-c", START + "terminate = lambda: signal.raise_signal(signal.SIGTERM)\n"
+                           + program], capture_output=True, text=True, cwd=tmp_path, env=child_environment, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (143, out, err)
+    assert sorted(path.name for path in tmp_path.iterdir()) == files
+
+
 def test_where_interrupts_are_ignored_they_stay_so(child_environment):
     program = START.replace("signal.default_int_handler", "signal.SIG_IGN") + """
 interrupts.watch([])

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from servotwin.identification.fitting.point import LogPart, Point
+from servotwin.identification.fitting.point import STEP, LogPart, Point
 
 Array = Any
 
@@ -20,7 +20,7 @@ class Toy:
                  belief: tuple[float, float] = (0.0, 0.0)) -> None:
         self.functions, self.size, self.own, self.belief = list(functions), size, own, belief
         self.cases = tuple(range(len(self.functions)))
-        self.calls = 0
+        self.calls, self.step = 0, STEP
 
     def own_belief(self, case: int) -> tuple[Array, Array]:
         return np.full(self.own, self.belief[0]), np.full(self.own, self.belief[1])

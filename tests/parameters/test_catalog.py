@@ -348,3 +348,9 @@ def test_files_are_easy_to_edit_by_hand(servo):
     for row in re.findall(r"^\w+ = \{.*\}$", text, re.MULTILINE):
         keys = re.findall(r"(?:\{ |, )(value|unit|origin|source|std|lower|upper) = ", row)
         assert keys == sorted(keys, key=["value", "unit", "origin", "source", "std", "lower", "upper"].index)
+
+
+def test_no_rig_is_in_a_servo():
+    """What belonged to the bench of a fit stands beside it: the logs of others know nothing of its delay and zero."""
+    for name in catalog_names():
+        assert not {"nuisance", "frame_phase", "control_phase"} & set(load_servo(name).fit), name

@@ -29,8 +29,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0: done; 2: bad input or an output that cannot be written; 130: interrupted; 1: a validation
-        above its --max-error, or a mistake of servotwin.
+        0: done; 2: bad input or an output that cannot be written; 130 or 143: interrupted, by Ctrl-C or SIGTERM; 1: a
+        validation above its --max-error, or a mistake of servotwin.
 
     Examples
     --------
@@ -54,7 +54,7 @@ def _ran(words: Sequence[str]) -> int:
             code = _run(words)
         if sys.stdout is not None:
             sys.stdout.flush()
-        return interrupts.CODE if interrupts.noted() else code
+        return interrupts.code() if interrupts.noted() else code
     except KeyboardInterrupt as error:
         return _failed(error, words)
     except SystemExit:  # how rich, which draws the help, reacts to a broken pipe

@@ -18,6 +18,7 @@ from servotwin.logs.reading import reading_facts
 if TYPE_CHECKING:
     from servotwin.cli.outputs import Target
     from servotwin.identification import Advice, Fit, Ladder, Log
+    from servotwin.identification.fitting.stopping import Within
     from servotwin.models import Model
 
 _LOGS, _SEARCH = log_reading.PANEL, "What to search for, and how"
@@ -100,6 +101,9 @@ def fit(
         metavar="FILE.toml", help="Write the fitted servo.", rich_help_panel=shared.OUTPUT)] = None,
     report: Annotated[Path | None, typer.Option(
         metavar="FILE.html", help="Write a page with pictures.", rich_help_panel=shared.OUTPUT)] = None,
+    within: Annotated[str | None, typer.Option(
+        metavar="DURATION", help="Stop after this time, such as 90s or 5min, and keep the best so far, as Ctrl-C does.",
+        rich_help_panel=_SEARCH)] = None,
     accuracy: shared.AccuracyOption = 1e-7,
     scheduler: shared.SchedulerOption = None,
     force: Annotated[bool, typer.Option(
@@ -123,7 +127,7 @@ def fit(
     _check_ladder(search.model, ladder=ladder, structures=structures, springs=spring)
     options = {"holdout": holdout, "mend": mend, "nuisance": nuisance, "sensors": sensors, "starts": starts,
                "loss": loss, "level": level, "intervals": intervals, "seed": seed, "compare": compare,
-               "diagnose": diagnose, "accuracy": accuracy}
+               "diagnose": diagnose, "accuracy": accuracy, "within": within}
     chosen = _options(options)
     given = log_reading.read(logs, file_format, columns, joint, leave_out or [], force=force, quiet=as_json,
                              registers=bool(register))
@@ -133,10 +137,10 @@ def fit(
     if advise and not found.fit.interrupted and found.fit.doubt is not None:
         found = _Found(found.fit, found.ladder, _advice(found.fit))
     _report(found, files, as_json=as_json)
-    if found.fit.interrupted:
-        from servotwin.cli.interrupts import CODE
+    from servotwin.cli import interrupts
 
-        raise typer.Exit(CODE)
+    if found.fit.interrupted and (within is None or interrupts.noted()):
+        raise typer.Exit(interrupts.code())
 
 
 @dataclass(frozen=True)
@@ -221,7 +225,8 @@ def _options(given: dict[str, Any]) -> dict[str, Any]:
         "nuisance": fit_words.some_or_none("--nuisance", given["nuisance"], None),
         "level": fit_words.share("--level", given["level"]), "starts": given["starts"], "loss": given["loss"],
         "intervals": given["intervals"], "seed": given["seed"], "accuracy": given["accuracy"],
-        "diagnose": given["diagnose"], "compare_with": ("slew", "M1") if given["compare"] else ()}
+        "diagnose": given["diagnose"], "within": fit_words.duration("--within", given["within"]),
+        "compare_with": ("slew", "M1") if given["compare"] else ()}
 
 
 def _climber(search: _Search, *, asked: bool, ladder: bool, structures: bool,
@@ -253,9 +258,24 @@ def _run(search: _Search, logs: list[Log], options: dict[str, Any], scheduler: s
             found = _Found(climbed.fit, climbed)
         else:
             found = _Found(identify(logs, servo, kind, search.free, **options))
-    if found.fit.interrupted and found.fit.cost == float("inf"):
-        raise KeyboardInterrupt  # before the first step: there is nothing to keep
+    if found.fit.interrupted and found.fit.cost == float("inf"):  # before the first step: there is nothing to keep
+        _check_time(options["within"])
+        raise KeyboardInterrupt
     return found
+
+
+def _check_time(within: Within) -> None:
+    """Raise if it was too little for a first step, and no interrupt came.
+
+    Raises
+    ------
+    InputError
+    """
+    from servotwin.cli.interrupts import noted
+    from servotwin.errors import InputError
+
+    if within.over and not noted():
+        raise InputError("--within", got="a time in which nothing was found", allowed="a longer one")
 
 
 @contextlib.contextmanager

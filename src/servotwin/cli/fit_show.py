@@ -36,14 +36,15 @@ def sections(fit: Fit, files: Sequence[str]) -> list[RenderableType]:
            f"{len(fit.traces)} logs, {held} of them held out, {fit.seconds:.1f} s"
     parts: list[RenderableType] = [head, *_verdict(fit)]
     if fit.interrupted:
-        parts.append("INTERRUPTED: the best so far, without intervals")
+        parts.append(f"INTERRUPTED: the best so far; not known are {', '.join(fit.unknown)}")
     parts += ["", _estimates(fit), ""]
     parts += [f"- {item}" for item in fit.unidentifiable]
     parts += ["- no delay is seen: it ended at 0" if name == "delay" and fit.estimates[name] == 0.0
               else f"- {name} ended at a bound of the search" for name in fit.at_bound]
     parts += [""] if fit.unidentifiable or fit.at_bound else []
     parts.append(errors(tables_of(fit), fit.traces, "motion"))
-    said = [text for text in fit.warnings if fit.verdict is None or text != fit.verdict.sentence]
+    said = [text for text in fit.warnings if (fit.verdict is None or text != fit.verdict.sentence)
+            and not (fit.interrupted and text.startswith("stopped: the best"))]
     if said:
         parts += ["", *[f"! {text}" for text in said]]
     given = was_set(fit.model)
@@ -133,6 +134,7 @@ def facts(fit: Fit, files: Sequence[str]) -> dict[str, Any]:
                         "remedy": cause.remedy} for cause in fit.verdict.causes]},
         "starts": [{"cost": float(start.cost), "converged": bool(start.converged)} for start in fit.starts],
         "data": fit.servo.fit.get("data"), "seconds": fit.seconds, "interrupted": fit.interrupted,
+        "unknown": list(fit.unknown),
         "set": was_set(fit.model), "files": list(files),
     }
 

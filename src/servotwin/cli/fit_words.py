@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from servotwin.errors import InputError, ServotwinError, UnknownNameError
 from servotwin.identification.fitting.free import Space, nominal
+from servotwin.identification.fitting.stopping import Within
 from servotwin.identification.report.shown import dimension_of_free
 from servotwin.studies.kinds import Distribution, Normal, Offset, Relative, Uniform
 from servotwin.studies.words import distribution_of
@@ -81,6 +82,17 @@ def share(option: str, text: str) -> float:
     if not 0.0 <= found < 1.0:
         raise InputError(option, got=text, allowed="a share from 0 to below 1, such as 0.25 or 25%")
     return found
+
+
+def duration(option: str, text: str | None) -> Within:
+    """Return the time that a fit may take, which begins now.
+
+    Examples
+    --------
+    >>> duration("--within", "5 min").over, duration("--within", None).over
+    (False, False)
+    """
+    return Within(None if text is None else quantity(option, text, "time", bare=True, positive=True))
 
 
 def held_out(text: str | None) -> float | tuple[str, ...] | None:

@@ -1,4 +1,4 @@
-"""Ctrl-C: the process ends with 130 and one line, wherever it is, and takes along what is half written.
+"""Ctrl-C and SIGTERM: the process ends with 130 or 143 and one line, and takes along what is half written.
 
 No exception is raised into running code: while modules are imported or kernels compiled it would come out as another
 one, or be lost.
@@ -31,6 +31,7 @@ class _State:
         self.waiting = False
         self.finishing = False  # the first one is noted: there is something to keep
         self.noted = False
+        self.code = CODE
         self.last_words: list[Callable[[], str | None]] = []
 
 
@@ -38,7 +39,7 @@ _state = _State()
 
 
 def watch(words: Sequence[str]) -> None:
-    """Let Ctrl-C end this process; where it is ignored, as in a shell's background job, it stays so.
+    """Let Ctrl-C or SIGTERM end this process; where they are ignored, as in a shell's background job, it stays so.
 
     Parameters
     ----------
@@ -46,9 +47,11 @@ def watch(words: Sequence[str]) -> None:
         The command line: with ``--json`` the line is an object on standard output too.
     """
     _state.words = words
-    if threading.current_thread() is threading.main_thread() and (
-            signal.getsignal(signal.SIGINT) is signal.default_int_handler):
-        signal.signal(signal.SIGINT, _interrupted)
+    if threading.current_thread() is threading.main_thread():
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            signal.signal(signal.SIGINT, _interrupted)
+        if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
+            signal.signal(signal.SIGTERM, _interrupted)
 
 
 def leave(code: int) -> NoReturn:
@@ -57,6 +60,11 @@ def leave(code: int) -> NoReturn:
         with contextlib.suppress(OSError, ValueError, AttributeError):
             stream.flush()
     os._exit(code)
+
+
+def code() -> int:
+    """Return the exit code of a process that the signal ended which was noted: 128 and its number."""
+    return _state.code
 
 
 def noted() -> bool:
@@ -122,6 +130,8 @@ def _check() -> None:
 
 
 def _interrupted(number: int, frame: FrameType | None) -> None:
+    if not _state.noted:
+        _state.code = 128 + number
     if _state.held:
         _state.waiting = True
     elif _state.finishing and not _state.noted:
@@ -133,6 +143,7 @@ def _interrupted(number: int, frame: FrameType | None) -> None:
 
 def _end() -> NoReturn:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
     files = sys.modules.get("servotwin.parameters.output_file")
     undo_all = getattr(files, "undo_all", None)  # absent before it is imported
     if undo_all is not None:
@@ -144,7 +155,7 @@ def _end() -> NoReturn:
     if "--json" in _state.words:
         _write(1, '{"error": {"type": "KeyboardInterrupt", "message": "interrupted"}}\n')
     _write(2, "".join(f"servotwin: {text}\n" for text in [*said, "interrupted"]))
-    os._exit(CODE)
+    os._exit(_state.code)
 
 
 def _write(stream: int, text: str) -> None:

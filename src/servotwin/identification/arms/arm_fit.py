@@ -22,6 +22,7 @@ from servotwin.robots import RobotValidation
 
 Array = NDArray[np.float64]
 BELIEFS = "by beliefs"
+HALF = 0.5  # of what is known of a number
 
 
 class ArmCause(NamedTuple):
@@ -67,6 +68,8 @@ class ArmFit:
     causes : tuple of ArmCause
         What would explain more, the best first.
     warnings : tuple of str
+    prior_share : mapping of str to float
+        How much of what is known of each number is belief, from 0 to 1. Empty without intervals.
     stages : mapping of str to float
         CPU seconds that each stage took.
     """
@@ -93,7 +96,7 @@ class ArmFit:
     numbers: Numbers = field(repr=False)
     best: Array = field(repr=False)
     doubt: Uncertainty | None = field(repr=False)
-    doubt_with_beliefs: Uncertainty | None = field(repr=False)
+    prior_share: Mapping[str, float] = field(default_factory=dict)
     stages: Mapping[str, float] = field(default_factory=dict)
     level: float = 0.95
 
@@ -105,8 +108,8 @@ class ArmFit:
     def intervals(self, level: float | None = None) -> dict[str, Interval]:
         """Return the interval of every name (SI).
 
-        Their method is "normal" of what the episodes tell, "by beliefs" where they do not and the interval stands on
-        what files say of masses and servos, "at bound", or "not sought".
+        Beliefs count in all of them: how far masses, servos and the supply may be off what files say. Their method is
+        "normal" of what the episodes tell, "by beliefs" where most of it is belief, "at bound", or "not sought".
 
         Raises
         ------
@@ -119,12 +122,12 @@ class ArmFit:
         return {name: self._interval(k, name, wanted) for k, name in enumerate(self.names)}
 
     def _interval(self, k: int, name: str, level: float) -> Interval:
-        if self.doubt is None or self.doubt_with_beliefs is None:
+        if self.doubt is None:
             return Interval(math.nan, math.nan, "not sought")
         if name in self.at_bound:
             return Interval(math.nan, math.nan, "at bound")
-        told = name not in self.undetermined
-        doubt = self.doubt if told else self.doubt_with_beliefs
+        doubt = self.doubt
+        told = name not in self.undetermined and self.prior_share[name] < HALF
         reach = doubt.quantile(level, k) * float(doubt.std[k])
         ends = [self.numbers.value(k, float(np.clip(self.best[k] + side * reach, self.numbers.lower[k],
                                                     self.numbers.upper[k]))) for side in (-1.0, 1.0)]

@@ -13,7 +13,7 @@ from servotwin.identification.arms.arm_fit import ArmCause
 from servotwin.identification.arms.episodes import Episode
 from servotwin.identification.arms.lanes import JointLanes
 from servotwin.identification.arms.numbers import VOLTAGE, Numbers
-from servotwin.identification.arms.rows import Mask, Noise
+from servotwin.identification.arms.rows import Mask, Noise, residuals, whitened
 from servotwin.identification.arms.search import ArmSearch
 from servotwin.identification.fitting.arrow import Loss, Prior
 
@@ -22,7 +22,8 @@ GAIN = "firmware.proportional_gain"
 _LEAST_GAIN = 12.0  # of the cost
 _LEAST_SHARE = 0.03  # of the cost
 _APART = 0.12  # of a logarithm
-_STEPS = 5
+_STEPS = 8
+_GAINS = (0.25, 0.5, 0.7, 1.0, 1.4, 2.0, 4.0)  # times the registers'
 _FREE_STD = 1.5  # of the logarithm of what a candidate lets go
 
 
@@ -51,18 +52,37 @@ def causes_of(plant: Any, numbers: Numbers, links: Sequence[int], episodes: Sequ
         if not loose:
             continue
         weight[loose] = 1.0 / _FREE_STD if name != "masses" else 0.0
-        start = other.start.copy()
-        for k, one in enumerate(other.names):
-            if one in numbers.names:
-                start[k] = x[numbers.names.index(one)]
         search = ArmSearch(JointLanes(plant, other, links), episodes, used, noise, loss, Prior(other.start, weight),
                            np.zeros(len(other), np.bool_))
+        start = _best_gains(search, loose) if name == "proportional gain" else x.copy()
         ended = search.run(start, most=_STEPS)
         gain = here - search.costs(ended[None])[0]
         sentence = words(other, ended, loose)
         if sentence and gain > max(_LEAST_GAIN, _LEAST_SHARE * here):
             found.append(ArmCause(name, sentence, gain))
     return tuple(sorted(found, key=lambda one: -one.gain))
+
+
+def _best_gains(search: ArmSearch, loose: Sequence[int]) -> Array:
+    """Return where a search of gains begins: of some, those under which the joints of each group are least off."""
+    numbers = search.simulated.numbers
+    points = np.repeat(numbers.start[None], len(_GAINS), axis=0)
+    points[:, loose] += np.log(_GAINS)[:, None]
+    off = _off(search, points)
+    start = numbers.start.copy()
+    for group in numbers.groups:
+        own = [k for k in loose if len(numbers.groups) == 1 or numbers.names[k].startswith(f"{group.name}: ")]
+        start[own] += math.log(_GAINS[int(np.argmin(off[:, list(group.joints)].sum(axis=1)))])
+    return start
+
+
+def _off(search: ArmSearch, points: Array) -> Array:
+    """Return how far each joint is off at several points, in units of noise, shape (points, joints)."""
+    total = np.zeros((len(points), len(search.simulated.numbers.joints)))
+    for episode, used in zip(search.episodes, search.used, strict=True):
+        for k, residual in enumerate(residuals(search.simulated, episode, points)):
+            total[k] += np.abs(whitened(residual, episode, search.noise, used)).sum(axis=0)
+    return total
 
 
 def _lets_go(candidate: str, name: str) -> bool:

@@ -12,20 +12,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.arms.arm_fit import ArmFit
+from servotwin.identification.arms.arm_fit import HALF, ArmFit
 from servotwin.identification.arms.causes import causes_of
 from servotwin.identification.arms.dynamics import link_names, links_of, with_masses
 from servotwin.identification.arms.episodes import Episode, episodes_from, motions_of
 from servotwin.identification.arms.lanes import JointLanes
-from servotwin.identification.arms.numbers import RESISTANCE, VOLTAGE, Numbers
+from servotwin.identification.arms.numbers import RESISTANCE, VOLTAGE, Numbers, arm_free
 from servotwin.identification.arms.plant import UNKNOWN, mounts_of, plant_of, supply_of
-from servotwin.identification.arms.rows import Mask, Noise, noise_of, parts_of, residuals, used_rows
+from servotwin.identification.arms.rows import (
+    Linear,
+    Mask,
+    Noise,
+    beyond_scatter,
+    noise_of,
+    parts_of,
+    residuals,
+    used_rows,
+)
 from servotwin.identification.arms.search import ArmSearch
 from servotwin.identification.arms.whole import WholeArm
 from servotwin.identification.arms.windows import LeftOut, strange_windows, without
 from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.arrow import Loss, Prior
-from servotwin.identification.fitting.checks import usual_free
 from servotwin.identification.fitting.task import HUBER
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty, rows_of, uncertainty
 from servotwin.identification.fitting.words import Unidentifiable, explain, simplest, vague_directions
@@ -36,10 +44,11 @@ from servotwin.robots import Motion, RobotValidation, validate_robot
 
 Array = NDArray[np.float64]
 _ROUNDS, _STEPS = 2, 8  # of the first stage
-_WHOLE_STEPS = 3  # of the second
+_WHOLE_TURNS, _WHOLE_STEPS = 2, 4  # of the second: derivatives, and steps by them
+_FAR = 1.0  # widths of a belief, over which derivatives change
 _HELD_OUT = 4  # episodes for each that is held out
 _PUSHED = 2.5  # widths of a belief
-_NOISY = 1.5  # times the noise
+_NOISY = 2e-3  # rad at rest: more than counts and a clock leave
 
 
 class Whole(NamedTuple):
@@ -121,7 +130,7 @@ def identify_arm(logs: Any, robot: Any, servos: Any = None, *, bus: Supply | Non
     def make(more: Sequence[str] = ()) -> Numbers:
         names = free
         if more:
-            names = [*(free or _plant_names(mounts)), *more]
+            names = [*(free or arm_free(next(iter(mounts.values())).model)), *more]
         return Numbers(mounts, link_names(plant, links), supply, each=each, free=names, zeros=zeros,
                        masses=max(masses, 2.0) if robot == UNKNOWN else masses)
 
@@ -141,7 +150,7 @@ def identify_arm(logs: Any, robot: Any, servos: Any = None, *, bus: Supply | Non
         show(0.9, "errors")
         tables = _tables(what, x, [one.motion for one in fitted], [one.motion for one in episodes[len(fitted):]])
         stages["errors"] = clock.process_time() - began - sum(stages.values())
-    warnings = (*said, *assumed, *_pushed(what, x), *(() if count else (
+    warnings = (*said, *assumed, *_pushed(what, x, doubts), *(() if count else (
         "one episode: nothing was held out, so nothing says how well another one is predicted",)))
     return _fit(what, x, noise, doubts, windows=windows, causes=causes, warnings=warnings, tables=tables,
                 stages=stages, level=level)
@@ -149,11 +158,6 @@ def identify_arm(logs: Any, robot: Any, servos: Any = None, *, bus: Supply | Non
 
 def _are_motions(logs: Any) -> bool:
     return not isinstance(logs, str) and not hasattr(logs, "exists")
-
-
-def _plant_names(mounts: Any) -> list[str]:
-    model = next(iter(mounts.values())).model
-    return [name for name in usual_free(model) if not name.startswith("firmware.")]
 
 
 def _held_out(count: int, asked: int | None) -> int:
@@ -188,14 +192,14 @@ def _left(simulated: Any, what: Whole, x: Array) -> list[Array]:
 def _causes(what: Whole, noise: Noise, x: Array, make: Any) -> Any:
     """Return causes where a belief is pushed far, or what is left is no noise."""
     off = np.abs(x - what.numbers.start) * what.numbers.weight
-    if off.max() < _PUSHED:
+    if off.max() < _PUSHED and noise.positions.max() < _NOISY:
         return ()
     return causes_of(what.plant, what.numbers, what.links, what.episodes, what.used, noise, x, make)
 
 
 class _Doubts(NamedTuple):
-    data: Uncertainty
-    beliefs: Uncertainty
+    all: Uncertainty
+    shares: dict[str, float]
     unidentifiable: tuple[Unidentifiable, ...]
 
 
@@ -206,12 +210,28 @@ def _second_stage(what: Whole, x: Array, noise: Noise, show: Any, *, intervals: 
     noise = noise_of(what.episodes, _left(arm, what, x), what.used)
     if not intervals:
         return x, noise, None
-    x = what.search(arm, noise, held).run(x, most=_WHOLE_STEPS, tell=lambda step: show(
-        0.45 + 0.15 * step, "the whole robot"))
-    show(0.75, "intervals")
-    noise = noise_of(what.episodes, _left(arm, what, x), what.used)
-    found, slopes = what.search(arm, noise, held).linear(x)
+    for turn in range(_WHOLE_TURNS):
+        show(0.45 + 0.2 * turn, "the whole robot")
+        search = what.search(arm, noise, held)
+        slopes = _clean(what, search.linear(x, central=True), noise)
+        moved = search.along(x, slopes, most=_WHOLE_STEPS)
+        far = float(np.abs((moved - x) * np.where(what.numbers.weight > 0.0, what.numbers.weight, 1.0)).max())
+        x = moved
+        if far < _FAR:
+            break
+    show(0.85, "intervals")
+    found = _left(arm, what, x)
+    noise = noise_of(what.episodes, found, what.used)
     return x, noise, _doubts(what, x, noise, found, slopes)
+
+
+def _clean(what: Whole, linear: Sequence[Linear], noise: Noise) -> list[Array]:
+    """Return derivatives without directions in which they are no more than their noise."""
+    tables = [[np.concatenate([part.shared for part in parts_of(episode, one.residual, some, noise, used)])
+               for episode, one, used, some in zip(what.episodes, linear, what.used, chosen, strict=True)]
+              for chosen in ([one.slopes for one in linear], [one.scatter for one in linear])]
+    kept = beyond_scatter(*(np.concatenate(one) for one in tables))
+    return [one.slopes @ kept for one in linear]
 
 
 def _doubts(what: Whole, x: Array, noise: Noise, found: Sequence[Array], slopes: Sequence[Array]) -> _Doubts:
@@ -232,9 +252,11 @@ def _doubts(what: Whole, x: Array, noise: Noise, found: Sequence[Array], slopes:
     directions[moves] = some
     if some.shape[1]:
         directions = simplest(directions)
-    data = uncertainty(rows, prior, stuck, directions) if flags.any() else beliefs
+    belief = np.array([one.belief for one in numbers.all])
+    prior_share = dict(zip(numbers.names, np.clip((beliefs.std / belief)**2, 0.0, 1.0).tolist(), strict=True))
     shares = [1.0 if one.logarithmic else math.nan for one in numbers.all]
-    return _Doubts(data, beliefs, explain(numbers.names, shares, flags, directions))
+    named = {str(one): one for one in explain(numbers.names, shares, flags, directions)}  # several of the same members
+    return _Doubts(beliefs, prior_share, tuple(named.values()))
 
 
 def _sizes(what: Whole) -> Array:
@@ -247,14 +269,15 @@ def _at_bound(what: Whole, x: Array) -> Mask:
     return np.asarray((x <= what.numbers.lower + 1e-9) | (x >= what.numbers.upper - 1e-9))
 
 
-def _pushed(what: Whole, x: Array) -> list[str]:
-    """Return a line on each belief that the episodes push far."""
+def _pushed(what: Whole, x: Array, doubts: _Doubts | None) -> list[str]:
+    """Return a line on each belief that the episodes push far and know better."""
     found = []
     for k, one in enumerate(what.numbers.all):
         widths = (x[k] - one.start) / one.belief if math.isfinite(one.belief) else 0.0
-        if abs(widths) > _PUSHED:
+        if abs(widths) > _PUSHED and (doubts is None or doubts.shares[one.name] < HALF):
             found.append(f"{one.name} was pushed {abs(widths):.1f} widths of its belief, from "
-                         f"{one.value(one.start):.4g} to {one.value(float(x[k])):.4g} {one.unit}: the file may be of another servo or robot")
+                         f"{one.value(one.start):.4g} to {one.value(float(x[k])):.4g} {one.unit}: the file may be of "
+                         "another servo or robot")
     return found
 
 
@@ -296,8 +319,7 @@ def _fit(what: Whole, x: Array, noise: Noise, doubts: _Doubts | None, *, windows
         holdout=tables[2], before_holdout=tables[3],
         noise={**dict(zip(numbers.joints, noise.positions.tolist(), strict=True)), "clock": noise.stamps},
         left_out=windows, causes=causes, warnings=warnings, numbers=numbers, best=x,
-        doubt=doubts.data if doubts else None, doubt_with_beliefs=doubts.beliefs if doubts else None, stages=stages,
-        level=level)
+        doubt=doubts.all if doubts else None, prior_share=doubts.shares if doubts else {}, stages=stages, level=level)
     return replace(fit, servos=_servos(fit))
 
 

@@ -127,7 +127,7 @@ class Numbers:
         made = []
         for name, joints in found.items():
             model = self.mounts[self.joints[joints[0]]].model
-            names = list(free) if free is not None else [one for one in usual_free(model) if _is_plant(one)]
+            names = list(free) if free is not None else arm_free(model)
             made.append(Group(name, tuple(joints), Space(model, names, priors="servo")))
         return tuple(made)
 
@@ -214,8 +214,11 @@ class Numbers:
         return self.all[k].value(x)
 
 
-def _is_plant(name: str) -> bool:
-    return not name.startswith("firmware.")
+def arm_free(model: Model) -> list[str]:
+    """Return what is searched of a servo in an arm: what angles tell of its plant, play and friction under load too."""
+    more = [name for name in ("gear.backlash", "friction.load_friction", "friction.load_friction_motor",
+                              "friction.load_friction_external") if model.servo.get(name)]
+    return [*(name for name in usual_free(model) if not name.startswith("firmware.")), *more]
 
 
 def model_columns(models: Sequence[Model], columns: Sequence[Mapping[str, Array]], copies: int, *,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,11 +21,12 @@ from servotwin.identification.fitting.point import LogPart
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-STEP, _STEPS = 0.08, {"rad": 0.02}  # of a number on its scale; of some, in SI
+STEP, _STEPS = 0.1, {"rad": 0.03}  # of a number on its scale; of some, in SI
 _BEGIN = 0.6  # s: until then an episode still shows how it began
 _MAD = 1.4826
 _LEAST = 2.0e-4  # rad
 _FAST = 0.3  # rad/s
+_SURE = 2.0  # times its noise, of a derivative's power: nothing below
 _MOST_OFF = 0.02  # s
 _COARSE, _COUNTED = 0.01, 0.05  # rad, of a count
 
@@ -101,23 +102,67 @@ def residuals(simulated: Simulated, episode: Episode, points: Array) -> Array:
     return simulated.angles(episode, points) - episode.measured
 
 
-def derivatives(simulated: Simulated, episode: Episode, x: Array, held: Mask) -> tuple[Array, Array]:
-    """Return residuals at a point, shape (n, joints), and their derivatives, shape (n, joints, numbers)."""
+class Linear(NamedTuple):
+    """An episode about a point.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n, joints)
+        [rad]
+    slopes : ndarray, shape (n, joints, numbers)
+        Derivatives.
+    scatter : ndarray, shape (n, joints, numbers)
+        Half of what steps either way differ by: what their noise is; 0 of steps one way.
+    """
+
+    residual: Array
+    slopes: Array
+    scatter: Array
+
+
+def linear_at(simulated: Simulated, episode: Episode, x: Array, held: Mask, *, central: bool = False) -> Linear:
+    """Return residuals at a point and their derivatives by differences, one way or central."""
     numbers = simulated.numbers
     moved = [k for k in range(len(x)) if not held[k] and numbers.names[k] != LATENCY]
-    steps = np.array([_STEPS.get(one.unit, STEP) / (1.0 if one.logarithmic else one.scale) if one.unit in _STEPS
-                      else STEP for one in numbers.all])
-    steps = np.where(x + steps > numbers.upper, -steps, steps)
-    points = np.repeat(x[None], 1 + len(moved), axis=0)
-    points[1 + np.arange(len(moved)), moved] += steps[moved]
+    steps = np.array([_STEPS[one.unit] / one.scale if one.unit in _STEPS and not one.logarithmic else STEP
+                      for one in numbers.all])
+    ways = [np.where(x + side * steps > numbers.upper, -0.5 * side, np.where(
+        x + side * steps < numbers.lower, -0.5 * side, side)) * steps for side in ((1.0, -1.0) if central else (1.0,))]
+    points = np.repeat(x[None], 1 + len(ways) * len(moved), axis=0)
+    for k, way in enumerate(ways):
+        points[1 + k * len(moved) + np.arange(len(moved)), moved] += way[moved]
     smooth = simulated.angles(episode, points, fine=True)
-    slopes = np.zeros((*smooth.shape[1:], len(x)))
-    slopes[..., moved] = np.moveaxis((smooth[1:] - smooth[0]) / steps[moved][:, None, None], 0, -1)
-    found = residuals(simulated, episode, x[None])
+    sides = [np.moveaxis((smooth[1 + k * len(moved):1 + (k + 1) * len(moved)] - smooth[0]) / way[moved][:, None, None],
+                         0, -1) for k, way in enumerate(ways)]
+    slopes, scatter = np.zeros((2, *smooth.shape[1:], len(x)))
+    slopes[..., moved] = np.mean(sides, axis=0)
+    if central:
+        scatter[..., moved] = 0.5 * (sides[0] - sides[1])
     late = numbers.names.index(LATENCY)
     if not held[late]:
         slopes[..., late] = -np.gradient(smooth[0], episode.time, axis=0) * numbers.all[late].scale
-    return found[0], slopes
+    return Linear(residuals(simulated, episode, x[None])[0], slopes, scatter)
+
+
+def beyond_scatter(slopes: Array, scatter: Array) -> Array:
+    """Return what makes derivatives of directions that are no more than their noise nothing, shape (numbers, numbers).
+
+    Simulated servos stick and slip, and count: differences have a noise, which would look like knowledge. With A the
+    product sum of the derivatives and N that of their noise, a direction v counts by 1 − vᵀNv/vᵀAv of what it has.
+
+    Parameters
+    ----------
+    slopes, scatter : ndarray, shape (m, numbers)
+        In units of noise.
+    """
+    from scipy.linalg import eigh
+
+    A, N = slopes.T @ slopes, scatter.T @ scatter
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(A), 1e-12 * max(float(np.diag(A).max(initial=0.0)), 1e-300)))
+    A, N = A * np.outer(scale, scale), N * np.outer(scale, scale)
+    values, vectors = eigh(A, N + 1e-6 * np.eye(len(A)))
+    left = np.sqrt(np.clip(1.0 - _SURE / np.maximum(values, 1e-300), 0.0, 1.0))
+    return np.asarray((scale[:, None] * vectors) @ (left[:, None] * np.linalg.inv(scale[:, None] * vectors)))
 
 
 def parts_of(episode: Episode, residual: Array, slopes: Array | None, noise: Noise, used: Mask) -> list[LogPart]:

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.arms.episodes import Episode
-from servotwin.identification.arms.rows import Mask, Noise, Simulated, derivatives, parts_of, residuals
+from servotwin.identification.arms.rows import Linear, Mask, Noise, Simulated, linear_at, parts_of, residuals
 from servotwin.identification.fitting.arrow import Loss, Prior, block
 
 Array = NDArray[np.float64]
 _DAMPINGS = (1e-4, 0.1, 10.0)  # tried side by side
-_LEAST_GAIN = 1e-3  # of the cost
-_LEAST_STEP = 1e-4
+_LEAST_GAIN = 3e-3  # of the cost: servos that count make it rough
+_RETRIES, _FIRMER = 2, 300.0  # of steps that gained nothing, with so many times the damping
 
 
 class ArmSearch:
@@ -51,10 +51,9 @@ class ArmSearch:
         found = [residuals(self.simulated, episode, points) for episode in self.episodes]
         return [self.cost(x, [one[k] for one in found]) for k, x in enumerate(points)]
 
-    def linear(self, x: Array) -> tuple[list[Array], list[Array]]:
+    def linear(self, x: Array, *, central: bool = False) -> list[Linear]:
         """Return residuals and derivatives of all episodes at a point."""
-        both = [derivatives(self.simulated, episode, x, self.held) for episode in self.episodes]
-        return [one for one, _ in both], [slopes for _, slopes in both]
+        return [linear_at(self.simulated, episode, x, self.held, central=central) for episode in self.episodes]
 
     def normal(self, x: Array, found: Sequence[Array], slopes: Sequence[Array]) -> tuple[Array, Array]:
         """Return gradient and matrix of the normal equations."""
@@ -65,26 +64,46 @@ class ArmSearch:
                 g, H = g + one.g_s, H + one.H_ss
         return g, H
 
+    def tried(self, x: Array, g: Array, H: Array, scale: float) -> tuple[Array, list[float]]:
+        """Return points of steps that are damped more and more, and their costs."""
+        lower, upper = self.simulated.numbers.lower, self.simulated.numbers.upper
+        trials = np.stack([stepped(x, g, H, scale * damping, lower, upper, self.held) for damping in _DAMPINGS])
+        return trials, self.costs(trials)
+
+    def along(self, x: Array, slopes: Sequence[Array], *, most: int) -> Array:
+        """Return the best point that steps by the same derivatives come to."""
+        best = math.inf
+        scale = 1.0
+        for _ in range(most):
+            found = [residuals(self.simulated, episode, x[None])[0] for episode in self.episodes]
+            best = self.cost(x, found)
+            trials, costs = self.tried(x, *self.normal(x, found, slopes), scale)
+            k = int(np.argmin(costs))
+            if not costs[k] < best * (1.0 - _LEAST_GAIN):
+                break
+            x, scale = trials[k], scale * (1.0 if k < 2 else 10.0)
+        return x
+
     def run(self, x: Array, *, most: int, tell: Callable[[int], object] = lambda step: None) -> Array:
         """Return the best point that a search from another one comes to."""
-        lower, upper = self.simulated.numbers.lower, self.simulated.numbers.upper
         best, scale = math.inf, 1.0
         for step in range(most):
             tell(step)
-            found, slopes = self.linear(x)
+            linear = self.linear(x)
+            found = [one.residual for one in linear]
             best = self.cost(x, found)
-            g, H = self.normal(x, found, slopes)
-            trials = np.stack([stepped(x, g, H, scale * damping, lower, upper, self.held) for damping in _DAMPINGS])
-            costs = self.costs(trials)
-            k = int(np.argmin(costs))
-            if not costs[k] < best:
-                scale *= 10.0
-                if scale > 1e4:
+            normal = self.normal(x, found, [one.slopes for one in linear])
+            for _ in range(_RETRIES):
+                trials, costs = self.tried(x, *normal, scale)
+                k = int(np.argmin(costs))
+                if costs[k] < best:
                     break
-                continue
-            moved, gain = float(np.abs(trials[k] - x).max()), best - costs[k]
-            x, best, scale = trials[k], costs[k], max(scale * (0.3 if k == 0 else 1.0), 1e-3)
-            if gain < _LEAST_GAIN * best or moved < _LEAST_STEP:
+                scale *= _FIRMER
+            else:
+                break
+            gain = best - costs[k]
+            x, scale = trials[k], max(scale * (0.3 if k == 0 else 1.0), 1e-3)
+            if gain < _LEAST_GAIN * best:
                 break
         return x
 

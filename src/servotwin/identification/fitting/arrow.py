@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.point import LogPart, Point
+from servotwin.identification.fitting.point import STEP, LogPart, Point
 
 Array = NDArray[np.float64]
 
@@ -197,6 +197,7 @@ class Search:
         self.own = [Prior(mean, weight) for mean, weight in beliefs]
         self.own_reach = [forecast.own_reach(forecast.cases[k]) for k in self.cases]
         self.held = np.zeros(forecast.size, np.bool_) if held is None else held
+        self.least_step = _LEAST_STEP * forecast.step / STEP  # what differences over wider steps do not see
 
     def cost_of(self, point: Point, parts: Sequence[LogPart]) -> float:
         """Return the cost of a point; inf where a simulation failed."""
@@ -244,7 +245,7 @@ class Search:
             scale = np.maximum(0.5 * scale, np.diag(normal.H))
             while True:
                 trial, step = self._step(best.point, normal, damping, scale)
-                if step < _LEAST_STEP:
+                if step < self.least_step:
                     return Outcome(best.point, best.cost, True, k)
                 parts_there = yield Ask(trial, False)
                 cost = self.cost_of(trial, parts_there)

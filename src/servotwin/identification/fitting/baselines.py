@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
+from servotwin.identification.fitting.side_by_side import solved
 from servotwin.identification.fitting.slew_lag import (
     NUMBERS,
     POSITIVE,
@@ -83,10 +84,10 @@ def fit_slew_lag(logs: Sequence[Log], *, loss: Loss = "linear", loss_scale: floa
         raise InputError("loss_scale", got=loss_scale, allowed="a positive number (SI)")
     kind, signal = _kind(logs), _signal(logs)
     fitted = _Fitted(logs, signal, gain=kind != "angle" or signal != "output_angle")
-    x = min((fitted.solve(start, "linear", 1.0) for start in fitted.starts()), key=lambda found: float(found.cost)).x
+    x = fitted.solve(fitted.starts(), "linear", 1.0)
     if loss != "linear":
         spread = 1.4826 * float(np.median(np.abs(fitted.residual(x)))) * 1.5
-        x = fitted.solve(x, loss, loss_scale or max(spread, 1e-9)).x
+        x = fitted.solve([x], loss, loss_scale or max(spread, 1e-9))
     values = {name: float(value.item()) for name, value in fitted.numbers(x[None, :])._asdict().items()}
     return SlewLag(**values, command_kind=kind, signal=signal)
 
@@ -144,35 +145,42 @@ class _Fitted:
         residual: Array = self.courses.angles(self.numbers(x[None, :]))[0][0] - self.measured
         return residual
 
-    def jacobian(self, x: Array) -> Array:
-        """Return its derivatives: by copies that differ a little, by the delay from the speed."""
-        copies = np.repeat(x[None, :], len(x), axis=0)
-        step = np.where(x + _STEP > self.upper, -_STEP, _STEP)
-        copies[np.arange(1, len(x)), np.arange(1, len(x))] += step[1:]
-        angle, speed = self.courses.angles(self.numbers(copies))
-        columns = (angle[1:] - angle[0]) / step[1:, None]
-        return np.column_stack([-speed[0] * self.scale["delay"], columns.T])
+    def seen(self, points: Sequence[Array]) -> list[tuple[Array, Array]]:
+        """Return residuals and derivatives at points: by copies that differ a little, by the delay from the speed."""
+        several, steps = [], []
+        for x in points:
+            copies = np.repeat(x[None, :], len(x), axis=0)
+            step = np.where(x + _STEP > self.upper, -_STEP, _STEP)
+            copies[np.arange(1, len(x)), np.arange(1, len(x))] += step[1:]
+            several.append(copies)
+            steps.append(step)
+        found = []
+        numbers = [self.numbers(copies) for copies in several]
+        for (angle, speed), step in zip(self.courses.angles_of(numbers), steps, strict=True):
+            columns = (angle[1:] - angle[0]) / step[1:, None]
+            found.append((angle[0] - self.measured, np.column_stack([-speed[0] * self.scale["delay"], columns.T])))
+        return found
 
-    def solve(self, start: Array, loss: Loss, scale: float) -> Any:
-        """Return what SciPy finds from a start."""
-        from scipy.optimize import least_squares
-
-        inside = np.clip(start, self.lower + 1e-9, self.upper - 1e-9)
-        return least_squares(self.residual, inside, jac=self.jacobian, bounds=(self.lower, self.upper), loss=loss,
-                             f_scale=scale, x_scale="jac", max_nfev=60)
+    def solve(self, starts: Sequence[Array], loss: Loss, scale: float) -> Array:
+        """Return where the best of the searches from some starts ends."""
+        inside = [np.clip(start, self.lower + 1e-9, self.upper - 1e-9) for start in starts]
+        ends = solved(inside, self.lower, self.upper, self.seen, loss, scale)
+        return min(ends, key=lambda end: end[0])[1]
 
     def starts(self) -> list[Array]:
         """Return the best of a grid over delay, lag and slew rates; gain and offset by a straight line."""
         found: list[tuple[float, Array]] = []
+        grids = []
         for delay in _DELAYS:
             gain, offset = self._line(delay)
             points = [[delay / self.scale["delay"], math.log(self.slews[0] * slew), math.log(self.slews[1] * slew),
                        math.log(lag), offset / self.scale["offset"], 0.1, gain / self.scale["gain"]][:len(self.free)]
                       for lag in _LAGS for slew in _SLEWS]
-            angle = self.courses.angles(self.numbers(np.array(points)))[0]
+            grids.append(np.array(points))
+        for points, (angle, _) in zip(grids, self.courses.angles_of([*map(self.numbers, grids)]), strict=True):
             costs = np.abs(angle - self.measured).mean(axis=1)
             k = int(np.argmin(costs))
-            found.append((float(costs[k]), np.array(points[k])))
+            found.append((float(costs[k]), points[k]))
         return [x for _, x in sorted(found, key=lambda each: each[0])[:_STARTS]]
 
     def _line(self, delay: float) -> tuple[float, float]:

@@ -6,7 +6,7 @@ whenever one of them is, and run as long as the longest. No lane feels that, to 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from time import perf_counter
@@ -41,10 +41,13 @@ class Running:
     crew : Crew
     accuracy : float
         Of motions that are integrated [rad].
+    look : callable
+        Called before each simulation; may raise KeyboardInterrupt.
     """
 
     crew: Crew = field(default_factory=Crew)
     accuracy: float = FIT_ACCURACY
+    look: Callable[[], None] = lambda: None
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +105,8 @@ class Batch:
         Whether bad input is raised; otherwise the bundle that has it fails.
     bundles : tuple of Bundle
         All with the same names of columns and of initial values.
+    nearly : bool
+        As of `simulate_lanes`.
     """
 
     model: Model
@@ -109,6 +114,7 @@ class Batch:
     accuracy: float
     strict: bool
     bundles: tuple[Bundle, ...]
+    nearly: bool = False
 
     @property
     def cost(self) -> float:
@@ -157,7 +163,7 @@ def _simulated(batch: Batch) -> list[dict[str, Array]]:
                      [bundle.load for bundle, count in zip(bundles, counts, strict=True) for _ in range(count)],
                      columns, initial or None, np.zeros(sum(counts), np.int64))
     made = simulate_lanes(lanes, duration=max(bundle.duration for bundle in bundles), output_times=times,
-                          outputs=batch.outputs, executor=HERE, accuracy=batch.accuracy)
+                          outputs=batch.outputs, executor=HERE, accuracy=batch.accuracy, nearly=batch.nearly)
     found, lane = [], 0
     for bundle, count in zip(bundles, counts, strict=True):
         rows, at = slice(lane, lane + count), places[bundle.key]

@@ -177,9 +177,11 @@ class Fit:
     allowed : Allowed
         The law that `draw` draws from.
     interrupted : bool
-        Whether it was stopped before its end: then this is the best so far, without intervals.
+        Whether it was stopped before its end: then this is the best so far.
+    unknown : tuple of str
+        What is not known because it was stopped.
     verdict : Verdict, optional
-        Whether what is left is noise; None of a fit that was stopped.
+        Whether what is left is noise; None of a fit that was stopped in its search.
     """
 
     servo: Servo
@@ -205,6 +207,7 @@ class Fit:
     level: float = 0.95
     seconds: float = 0.0
     interrupted: bool = False
+    unknown: tuple[str, ...] = ()
     verdict: Verdict | None = None
     spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     phased: bool = False

@@ -28,12 +28,13 @@ from servotwin.identification.fitting.point import (
     SHARED,
     SPEED_SCALE,
     STEP,
+    WIDE,
     Frames,
     LogPart,
     Point,
 )
 from servotwin.logs.log import Log
-from servotwin.models import Model
+from servotwin.models import DigitalServo, Model
 from servotwin.parameters.output_side import output_value
 from servotwin.signals import Signal
 
@@ -89,9 +90,13 @@ class Forecast:
         if "control_phase" in nuisance and _PHASE not in model.optional:
             raise InputError("nuisance: control_phase", got=f"{model!r} without ticks", allowed="a DigitalServo")
         self.noise = dict.fromkeys(self.sensors, 1.0)
+        self.step = WIDE if isinstance(model, DigitalServo) else STEP  # of the differences that are derivatives
         delayed = any(name in nuisance for name in ("delay", "log_delay", "frame_phase"))
         self.cases = tuple(make_case(log, model, space, self.sensors, delayed=delayed) for log in logs)
         self.strict = True
+        bent = any(log.load.pendulums or log.load.springs for log in logs)
+        self.bent = bent and isinstance(model, DigitalServo)  # so that motion is integrated, as there is no closed form
+        self.nearly = False  # whether torques of springs and pendulums count by their middle of each tick instead
         self._commands: dict[tuple[Any, ...], Signal] = {}  # points of a search often differ in other numbers only
         self._pace = math.inf  # seconds that a second of one lane takes, as far as is known
         self.work = 0.0  # seconds of one lane that were simulated
@@ -112,7 +117,7 @@ class Forecast:
     def goes_on_from(self, other: Forecast) -> None:
         """Take over where the search of another forecast stands: noise, what it found out of clocks, who simulates."""
         self.noise, self.strict, self.held = dict(other.noise), other.strict, other.held
-        self.running = other.running
+        self.running, self.nearly = other.running, other.nearly and self.bent
         if self.phased and other.phased:
             self.own_phases = other.own_phases
 
@@ -219,23 +224,25 @@ class Forecast:
             return 0.0
         return float(shared[len(self.space) + self.extra.index(name)]) * SHARED[name][0]
 
-    def at(self, point: Point, *, derivatives: bool = True, central: bool = False, step: float = STEP,
-           cases: Sequence[int] | None = None) -> list[LogPart]:
+    def at(self, point: Point, *, derivatives: bool = True, central: bool = False,
+           step: float | None = None, cases: Sequence[int] | None = None) -> list[LogPart]:
         """Return what the logs say at a point, log by log; nan where a simulation failed.
 
-        Derivatives are forward differences over `step`, or central ones at twice the lanes.
+        Derivatives are forward differences over `step`, that of the forecast unless given, or central ones at twice
+        the lanes.
         """
         return self.at_all([point], derivatives=derivatives, central=central, step=step, cases=cases)[0]
 
     def at_all(self, points: Sequence[Point], *, derivatives: bool | Sequence[bool] = False, central: bool = False,
-               step: float = STEP, cases: Sequence[int] | None = None, rates: bool = False,
+               step: float | None = None, cases: Sequence[int] | None = None, rates: bool = False,
                noises: Sequence[Mapping[str, float]] | None = None) -> list[list[LogPart]]:
         """Return what the logs say at several points, in one batch; for each point, log by log.
 
         `derivatives` may differ from point to point, and so may the noise; `rates` gives what a delay changes without
         derivatives, for all signals.
         """
-        which = range(len(self.cases)) if cases is None else cases
+        which, step = range(len(self.cases)) if cases is None else cases, self.step if step is None else step
+        self.running.look()
         sloped = [derivatives] * len(points) if isinstance(derivatives, bool) else derivatives
         lanes = [LogLanes(self, k, at, point, sides=(1 + central) * sloped[at], step=step, rates=rates,
                           noise=self.noise if noises is None else noises[at])
@@ -257,10 +264,12 @@ class Forecast:
         bundles, pace = [lane.bundle() for lane in lanes], self._pace if math.isfinite(self._pace) else _PACE
         calls = [[some[i] for i in call] for some in kinds.values()
                  for call in batches([bundles[k] for k in some], pace, self.running.crew)]
-        work = [Batch(self.model, lanes[call[0]].outputs, accuracy, self.strict, tuple(bundles[k] for k in call))
+        work = [Batch(self.model, lanes[call[0]].outputs, accuracy, self.strict, tuple(bundles[k] for k in call),
+                      self.nearly)
                 for call in calls]
         with closing(self._done(work)) as running:
             for call, batch, done in zip(calls, work, running, strict=True):
+                self.running.look()
                 self._pace = min(self._pace, done.seconds / batch.cost)
                 for k, signals in zip(call, done.signals, strict=True):
                     lanes[k].take(signals)

@@ -18,7 +18,7 @@ from servotwin.identification.fitting.arrow import Loss, Outcome, Prior, Search
 from servotwin.identification.fitting.batches import FIT_ACCURACY, Running
 from servotwin.identification.fitting.clocks import ticking
 from servotwin.identification.fitting.common_cause import common_cause
-from servotwin.identification.fitting.comparison import BESIDE, compare
+from servotwin.identification.fitting.comparison import BESIDE, ErrorTables, compare
 from servotwin.identification.fitting.counts import counts_of
 from servotwin.identification.fitting.delay_range import delay_range, phase_errors, unsure_commands
 from servotwin.identification.fitting.doubts import Doubts, allowed, prior_share
@@ -32,10 +32,11 @@ from servotwin.identification.fitting.holdout import split
 from servotwin.identification.fitting.intervals import ends
 from servotwin.identification.fitting.judging import with_verdict
 from servotwin.identification.fitting.phases import credible
-from servotwin.identification.fitting.point import FINE, NUISANCES, SHARED, LogPart, Point
-from servotwin.identification.fitting.record import identified_servo, with_record, with_what_logs_say
+from servotwin.identification.fitting.point import FINE, NUISANCES, SHARED, STEP, LogPart, Point
+from servotwin.identification.fitting.record import identified_servo, stopped, with_record, with_what_logs_say
 from servotwin.identification.fitting.remedies import with_remedies
 from servotwin.identification.fitting.robot_registers import as_logs_say
+from servotwin.identification.fitting.stopping import Course, Within
 from servotwin.identification.fitting.task import HUBER, Task
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty, rows_of, uncertainty
 from servotwin.identification.fitting.words import explain, simplest, vague_directions
@@ -67,7 +68,8 @@ def identify(
     sensors: Sequence[str] | None = None,
     starts: int = 3, loss: str = "huber", noise: Mapping[str, float] | None = None, level: float = 0.95,
     intervals: bool = True, compare_with: Sequence[str] = ("slew", "M1"), seed: int = 0, progress: Progress = False,
-    diagnose: bool = True, executor: Any = None, accuracy: float = FIT_ACCURACY, robot: Any = None, **of_robot: Any,
+    diagnose: bool = True, executor: Any = None, accuracy: float = FIT_ACCURACY, within: float | Within | None = None,
+    robot: Any = None, **of_robot: Any,
 ) -> Fit:
     """Fit parameters of a servo to logs.
 
@@ -131,6 +133,8 @@ def identify(
     accuracy : float
         What angles of simulations may be off by where motions are integrated, not solved in closed form [rad], from
         1e-13 to 1e-4.
+    within : float, optional
+        Time that the fit may take [s]; then it stops.
     robot : optional
         Where `logs` are episodes of a whole robot: its MJCF file or model, "so101" or "unknown". `servo` is then that
         of all joints, or one by joint, and what comes back an `ArmFit`.
@@ -140,7 +144,8 @@ def identify(
     Returns
     -------
     Fit
-        After an interrupt (Ctrl-C, or a KeyboardInterrupt out of `progress`) the best so far, without intervals.
+        After a stop (Ctrl-C, a KeyboardInterrupt out of `progress`, or the end of `within`) the best so far; its
+        `unknown` says what was left out.
 
     Raises
     ------
@@ -168,7 +173,7 @@ def identify(
         return found  # type: ignore[no-any-return]
     if of_robot:
         raise InputError("identify", got=", ".join(of_robot), allowed="with robot= only")
-    began = clock.monotonic()
+    began, limit = clock.monotonic(), Within(within)
     read = checks.checked_logs(logs)
     plain = checks.checked_servo(servo, model)
     usual = checks.usual_free(plain, read) if free is None else ()
@@ -180,54 +185,86 @@ def identify(
     seen = checks.checked_sensors(given, sensors, plain)
     space = Space(plain, names, bounds=bounds, priors=priors, load=checks.shared_load(given, names))
     fitted, held_out = split(given, holdout, seed)
-    running = Running(Crew(executor), accuracy_of(accuracy))
+    course = Course(limit, intervals=intervals, beside=len(beside))
+    running = Running(Crew(executor), accuracy_of(accuracy), course.look)
     rig = usual_nuisance(plain) if nuisance is None else checks.checked_words("nuisance", nuisance, NUISANCES)
     forecast = Forecast(given, plain, space, rig, seen, running)
     checks.check_fitted(given, fitted, seen, len(names) + len(rig))
     trials = checks.checked_flag("diagnose", diagnose)
     task = Task(forecast, Loss(checks.checked_loss(loss, HUBER)), fitted, seed,
                 checks.checked_count("starts", starts, least=1), checks.checked_noise(noise, seen))
-    with running.crew, checks.shown(progress) as show, explained(noticed):
-        fit = _run(task, held_out, beside, level, show, intervals=intervals, trials=trials)
+    with running.crew, course.watching(), checks.shown(progress) as show, explained(noticed):
+        course.show = show
+        fit = _run(task, held_out, beside, level, course, intervals=intervals, trials=trials)
     fit = replace(fit, warnings=(*assumed, *noticed, *fit.warnings), seconds=clock.monotonic() - began)
     return with_record(fit, read, fitted, mend)
 
 
-def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: float, show: Callable[[float, str], None],
-         *, intervals: bool, trials: bool) -> Fit:
-    """Search, doubt, and compare; an interrupt ends the stage that it meets and leaves the others out."""
-    forecast, interrupted = task.forecast, False
+def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: float, course: Course, *,
+         intervals: bool, trials: bool) -> Fit:
+    """Search, doubt, and compare; a stop ends the stage that it meets, and those that come after it are left out."""
+    ended: list[Outcome] = []
+    missing: list[str] = []
     try:
-        found, ended = task.search(lambda share, text: show(0.7 * share, text))
+        found, ended = task.search(lambda share, text: course(0.7 * share, text))
     except KeyboardInterrupt:
-        found, ended, interrupted = task.best_so_far(), [], True
+        found, missing = task.best_so_far(), ["whether the search would end elsewhere", "what is left"]
     forecast = task.forecast  # which may have one more number than it began with
-    left: tuple[Dropped, ...] = ()
-    doubts = Doubts()
-    try:
-        if not interrupted:
-            found, left = settle(task, found, lambda share, text: show(0.7 + 0.06 * share, text))
-        if intervals and not interrupted:
-            show(0.76, "intervals")
-            found, doubts = _with_doubts(task, found, level, show)
-    except KeyboardInterrupt:
-        interrupted = True
+    found, left, doubts = _doubted(task, found, level, course, missing, intervals=intervals)
     dropped, wide = yielded(task, found, left, doubts), widened(task, found, left)
     traces = _traces(forecast, with_pulses_of(forecast, task.loss, found.point, held_out, task.fitted), held_out)
     final = identified_servo(forecast.model.servo, forecast.space, found.point.shared, doubts, level,
                              [one.name for one in dropped])
     final = with_what_logs_say(final, [forecast.cases[k].log for k in task.fitted], forecast.space.names)
-    try:
-        show(0.95, "errors")
-        tables = compare(task, held_out, traces, final, () if interrupted else beside,
-                         lambda: show(0.95, "errors of simpler models"))
-    except KeyboardInterrupt:
-        interrupted, tables = True, compare(task, held_out, traces, final, ())
+    tables = _compared(task, held_out, traces, final, beside, course, missing)
     fit = _fit(task, found, doubts, dropped, wide, final, traces, tables, ended)
     middles = {name: 0.5 * (low + high) for name, (low, high) in doubts.spans.items()}
-    fit = replace(fit, level=level, interrupted=interrupted, phased=forecast.phased, ticked=forecast.ticked,
+    fit = replace(fit, level=level, phased=forecast.phased, ticked=forecast.ticked,
                   estimates={**fit.estimates, **middles})
-    return fit if interrupted else with_verdict(task, found.point, fit, show, trials=trials)
+    if "what is left" in missing:
+        return stopped(fit, missing)
+    try:
+        return stopped(with_verdict(task, found.point, fit, course, trials=trials and not missing), missing)
+    except KeyboardInterrupt:
+        return stopped(with_verdict(task, found.point, fit, course, trials=False), ["what may be the matter"])
+
+
+def _doubted(task: Task, found: Outcome, level: float, course: Course, missing: list[str], *,
+             intervals: bool) -> tuple[Outcome, tuple[Dropped, ...], Doubts]:
+    """Return where the fit ends without the priors that the logs contradict, those priors, and its doubts."""
+    left: tuple[Dropped, ...] = ()
+    doubts, prior = Doubts(), task.prior
+    if not missing:
+        try:
+            found, left = settle(task, found, lambda share, text: course(0.7 + 0.06 * share, text))
+        except KeyboardInterrupt:
+            task.prior = prior
+            missing.append("whether priors hold")
+    else:
+        missing.append("whether priors hold")
+    if missing:
+        missing += ["intervals"] if intervals else []
+    elif intervals:
+        try:
+            course(0.76, "intervals")
+            found, doubts = _with_doubts(task, found, level, course)
+        except KeyboardInterrupt:
+            missing.append("intervals")
+    return found, left, doubts
+
+
+def _compared(task: Task, held_out: Sequence[int], traces: tuple[Trace, ...], final: Servo, beside: tuple[str, ...],
+              course: Course, missing: list[str]) -> ErrorTables:
+    """Return errors, beside those of simpler models if nothing has stopped the fit."""
+    if not missing:
+        try:
+            course(0.95, "errors")
+            return compare(task, held_out, traces, final, beside, lambda: course(0.95, "errors of simpler models"))
+        except KeyboardInterrupt:
+            pass
+    missing += ["simpler models"] if beside else []
+    missing.append("what may be the matter")
+    return compare(task, held_out, traces, final, ())
 
 
 def _with_doubts(task: Task, found: Outcome, level: float,
@@ -307,7 +344,8 @@ def _vague(information: Array, inflation: float, sizes: Array, asked: NDArray[np
 
 def _information(task: Task, found: Outcome, beliefs: Sequence[Prior]) -> Array:
     """Return what the logs say of the shared numbers, from differences so fine that what has no effect has none."""
-    parts = task.forecast.at(found.point, step=FINE, cases=task.fitted)
+    jagged = task.forecast.step > STEP  # then fine differences are those of steps, not of what moves the shaft
+    parts = task.forecast.at(found.point, step=None if jagged else FINE, central=jagged, cases=task.fitted)
     rows = [rows_of(part, task.loss, own, found.point.own[k])
             for k, part, own in zip(task.fitted, parts, beliefs, strict=True)]
     return np.asarray(np.sum([(r.slope * r.inside[:, None]).T @ r.slope for r in rows], axis=0))

@@ -7,14 +7,14 @@ Moolgavkar 1988). Whether it is needed is seen from the cost at the two ends of 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.fitting.arrow import Ask, Outcome, Search, together
-from servotwin.identification.fitting.point import LogPart, Point
+from servotwin.identification.fitting.point import STEP, LogPart, Point
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty
 
 Array = NDArray[np.float64]
@@ -24,7 +24,13 @@ _FAR = (2.0, 4.0)  # times as far as the ends: between them the cost of a number
 _RISES, _HIGH = 1.5, 50.0  # by more than this factor, or it is flat behind a cliff; unless it is so much above the ends
 _STAYS = 0.01  # of the root of the rise: farther out the cost is the same
 _DEEPER = 2.0  # of the cost: less than that is what a search leaves
-_ROUNDS = 9  # of the search for an end
+_ROUNDS, _FEW_ROUNDS = 9, 4  # of the search for an end; of one among kinks
+_NEARLY, _ROUGHLY = 0.02, 0.15  # of the distance to an end; among kinks
+_CLOSELY = 0.01  # of the rise that is sought: what a step of a profile's search has to gain
+_FARTHER = (3.0, 6.0)  # times as far as the ends, where kinks are small beside the rise
+_BOWL = (0.05, 4.0)  # of the expected rise between these points: a parabola under the kinks
+_FAR_OFF = 0.7  # of a searched number: farther out no cost is a parabola
+_DEEPEST = 16.0  # times the expected rise: where the search fell into a deeper kink, that is no parabola
 
 
 @dataclass(frozen=True)
@@ -70,20 +76,22 @@ def ends(search: Search, best: Outcome, doubt: Uncertainty, which: Sequence[int]
         Is told of points that cost clearly less than the end of the search: it lies in another valley.
     """
     reaches = {k: doubt.quantile(level, k) for k in which}
-    exact = {k: Ends(-reaches[k], reaches[k], "normal") for k in which if not doubt.std[k] > 0.0}
-    wanted, which = which, [k for k in which if k not in exact]
+    exact = {k: Ends(-reaches[k], reaches[k], "normal") for k in which if not doubt.std[k] > 0.0}  # residuals are 0
+    kinked = search.forecast.step > STEP
+    found: dict[int, Ends] = exact | (_over_kinks(search, best, doubt, {
+        k: reach for k, reach in reaches.items() if k not in exact and _FARTHER[1] * reach * doubt.std[k] < _FAR_OFF
+        and _inside(search, best, doubt, k, _FARTHER[1] * reach)}, rows) if kinked else {})
+    every, which = which, [k for k in which if k not in found]
     both = [(k, side) for k in which for side in (-1.0, 1.0)]
     points = [moved(search, best, doubt, k, side * reaches[k], rows) for k, side in both]
     beyond = [begins(search, best, doubt, k, far * side * reaches[k], rows)[1] for far in _FAR for k, side in both]
     costs = iter(search.costs([*points, *beyond]) if both else [])
     rises, near, far = ({one: next(costs) - best.cost for one in both} for _ in range(3))
-    found = exact  # of residuals that are 0
     bent: list[int] = []
     for k in which:
         reach = reaches[k]
         expected = {side: _expected(doubt, k, reach) for side in (-1.0, 1.0)}
-        inside = all(search.lower[k] <= best.point.shared[k] + side * reach * doubt.std[k] <= search.upper[k]
-                     for side in (-1.0, 1.0))
+        inside = _inside(search, best, doubt, k, reach)
         faithful = all(_FAITHFUL[0] <= rises[k, side] / expected[side] <= _FAITHFUL[1] for side in (-1.0, 1.0))
         flat = any(far[k, side] < _RISES * near[k, side] < _HIGH * expected[side] for side in (-1.0, 1.0))
         if inside and faithful and not flat:
@@ -98,7 +106,36 @@ def ends(search: Search, best: Outcome, doubt: Uncertainty, which: Sequence[int]
         share = (low * of_low + high * of_high) / max(low + high, 1e-300)
         found[k] = Ends(-low, high, "profile", min(max(share, 0.0), 1.0))
         tell(len(found))
-    return {k: found[k] for k in wanted}
+    return {k: found[k] for k in every}
+
+
+def _inside(search: Search, best: Outcome, doubt: Uncertainty, k: int, reach: float) -> bool:
+    """Tell whether all is within the bounds that is within some standard errors."""
+    return all(search.lower[k] <= best.point.shared[k] + side * reach * doubt.std[k] <= search.upper[k]
+               for side in (-1.0, 1.0))
+
+
+def _over_kinks(search: Search, best: Outcome, doubt: Uncertainty, reaches: Mapping[int, float],
+                rows: Sequence[Rows]) -> dict[int, Ends]:
+    """Return ends where the cost is a parabola with kinks in it, as that of a program that samples.
+
+    The search ended in one of the deepest kinks near the bottom. Which one is chance, as far as the parabola rises no
+    higher than that kink is deep: the ends are as much wider. Both are seen from points far out.
+    """
+    both = [(k, far * side) for k in reaches for far in _FARTHER for side in (-1.0, 1.0)]
+    costs = search.costs([moved(search, best, doubt, k, far * reaches[k], rows) for k, far in both])
+    rises = {one: cost - best.cost for one, cost in zip(both, costs, strict=True)}
+    found = {}
+    for k, reach in reaches.items():
+        expected = _expected(doubt, k, reach)
+        near, far = (0.5 * (rises[k, -one] + rises[k, one]) / expected for one in _FARTHER)
+        a, b = (one**2 for one in _FARTHER)
+        slope = (far - near) / (b - a)
+        dip = max(near - a * slope, 0.0)
+        if _BOWL[0] <= slope <= _BOWL[1] and dip <= _DEEPEST:
+            wide = reach * math.sqrt((1.0 + dip) / slope)
+            found[k] = Ends(-wide, wide, "normal")
+    return found
 
 
 def moved(search: Search, best: Outcome, doubt: Uncertainty, k: int, steps: float, rows: Sequence[Rows]) -> Point:
@@ -146,20 +183,22 @@ def _end(search: Search, best: Outcome, doubt: Uncertainty, k: int, side: float,
     wanted = _expected(doubt, k, reach)
     low, of_low, high, of_high = 0.0, 0.0, math.inf, math.inf
     at, share = float(min(reach, farthest)), 0.0
-    for _ in range(_ROUNDS):
+    kinked = search.forecast.step > STEP
+    for _ in range(_FEW_ROUNDS if kinked else _ROUNDS):
         starts, costs = begins(search, best, doubt, k, side * at, rows), [0.0]
         if at > reach:
             costs = []
             for start in starts:
                 costs.append(inner.cost_of(start, (yield Ask(start, False))))
-        there = yield from inner.steps(starts[int(np.argmin(costs))], most=3, tell=lambda *_: tell())
+        there = yield from inner.steps(starts[int(np.argmin(costs))], most=1 if kinked else 3, tell=lambda *_: tell(),
+                                       least_gain=_CLOSELY * wanted)
         rise = there.cost - best.cost
         if rise < -_DEEPER:
             deeper(there)
         of_priors = search.prior.cost(there.point.shared) - search.prior.cost(best.point.shared)
         share = of_priors / max(rise, wanted)
         root = math.sqrt(max(rise, 0.0) / wanted)  # grows in proportion where the cost is a parabola
-        if abs(root - 1.0) < 0.02:
+        if abs(root - 1.0) < (_ROUGHLY if kinked else _NEARLY):
             break
         stays = at > low > 0.0 and abs(root - of_low) < _STAYS
         if root < 1.0:

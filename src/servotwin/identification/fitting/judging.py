@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from servotwin.identification.fitting.diagnosis import diagnose
 from servotwin.identification.fitting.fit import Fit, Trace
 from servotwin.identification.fitting.noise import SensorSeries, noise_of
 from servotwin.identification.fitting.point import Point
+from servotwin.identification.fitting.stopping import Course
 from servotwin.identification.fitting.task import Task
 from servotwin.identification.fitting.uncertainty import Rows, rows_of
 from servotwin.identification.fitting.verdict import UNHELD, Cause, Verdict, intervals_said, judge, shown
@@ -22,7 +23,7 @@ _FINEST = 1e-9  # SI: what no simulation is told to be nearer
 _EFFORT = 3.0  # times that of the fit, for all trials: the verdict itself and their start are not counted
 
 
-def with_verdict(task: Task, point: Point, fit: Fit, show: Callable[[float, str], None], *, trials: bool) -> Fit:
+def with_verdict(task: Task, point: Point, fit: Fit, course: Course, *, trials: bool) -> Fit:
     """Return a fit with its verdict, and with the causes that explain a bad one.
 
     Parameters
@@ -31,7 +32,7 @@ def with_verdict(task: Task, point: Point, fit: Fit, show: Callable[[float, str]
     point : Point
         Where it ended.
     fit : Fit
-    show : callable
+    course : Course
         Told the share done, and what goes on.
     trials : bool
         Whether causes are tried.
@@ -50,11 +51,12 @@ def with_verdict(task: Task, point: Point, fit: Fit, show: Callable[[float, str]
         if trials:
             causes = _outliers(verdict, fitted, sensor)
         if trials and (verdict.undecided or not verdict.holds):
+            course.budget = _EFFORT
             found = diagnose(task, point, fit.traces, verdict, sensor, _EFFORT * effort, _half_widths(fit),
-                             lambda share, text: show(0.96 + 0.04 * share, text))
+                             lambda share, text: course(0.96 + 0.04 * share, text))
             causes, verdict = (*causes, *found.causes), replace(verdict, moved=found.moved)
     except KeyboardInterrupt:
-        trials = False
+        trials, fit = False, replace(fit, warnings=("stopped: not all causes were tried", *fit.warnings))
     if verdict.undecided and any(cause.name != "outliers" for cause in causes):
         # What a number of the model tells of samples that it was not fitted to is no noise
         verdict = replace(verdict, holds=False, sentence=f"residuals are {verdict.ratio:.2g} times the noise of "

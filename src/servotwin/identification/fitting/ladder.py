@@ -21,6 +21,7 @@ from servotwin.identification.fitting.free import nominal
 from servotwin.identification.fitting.gains import gained
 from servotwin.identification.fitting.holdout import LogError, pooled
 from servotwin.identification.fitting.identify import identify
+from servotwin.identification.fitting.stopping import Within
 from servotwin.logs.log import Log
 from servotwin.models.base import Model
 from servotwin.parameters import Servo
@@ -166,7 +167,9 @@ def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] | None
     plain = checks.checked_servo(servo, model)
     others = [name for name in (free or checks.usual_free(plain, given))
               if name not in _TERMS and name not in _BASE and not name.startswith("friction.")]
-    climb = _Climb(given, servo, type(plain), others, {"compare_with": (), **options, "diagnose": False}, [])
+    options = {"compare_with": (), **options, "diagnose": False}  # the ladder is the trial
+    options["within"] = Within(options.get("within"))
+    climb = _Climb(given, servo, type(plain), others, options, [])
     ordered = [name for name in RUNGS if name in rungs]
     wanted = len(ordered) == len(RUNGS) if gives_way is None else gives_way
     extras = may_give_way(plain, given, others) if wanted else ()

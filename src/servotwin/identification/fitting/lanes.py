@@ -18,6 +18,7 @@ from servotwin.identification.fitting.point import (
     PERIOD_SCALE,
     SAG_SCALE,
     SPEED_SCALE,
+    STEP,
     LogPart,
     Point,
 )
@@ -58,6 +59,8 @@ class LogLanes:
         columns = {"output_angle": (self.angle, OFFSET_SCALE), "output_speed": (self.speed, SPEED_SCALE),
                    "control_phase": (self.tick, 1.0)}
         self.steps = _steps(forecast.space, point.shared[:p], numbers, sides, step)
+        if self.shaped:  # a period that is much longer would have other pulses carry the commands
+            self.steps[:, -1] = np.clip(self.steps[:, -1], -STEP, STEP)
         for side in range(sides):
             first = 1 + side * numbers
             self.x[np.arange(first, first + p), np.arange(p)] += self.steps[side, :p]

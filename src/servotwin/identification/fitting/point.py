@@ -18,6 +18,7 @@ SPEED_SCALE = 0.1  # rad/s
 MOST_DELAY = 0.5  # s
 STEP = 1e-4  # of a searched number: over the kinks that sticking makes
 FINE = 1e-6  # so little that hardly a kink lies within
+WIDE = 0.03  # over many steps of counts and duties, and ticks at which a shaft just sticks, of a program that samples
 LATER = 1e-5  # s, for the time derivative of signals that are no angles
 
 

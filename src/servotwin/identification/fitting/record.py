@@ -187,9 +187,17 @@ def with_record(fit: Fit, logs: Sequence[Log], fitted: Sequence[int], mend: Sequ
         record["verdict"] = {"sentence": fit.verdict.sentence, "holds": fit.verdict.holds, "ratio": fit.verdict.ratio,
                              "causes": [cause.name for cause in fit.verdict.causes]}
     if fit.interrupted:
-        record["interrupted"] = True
+        record |= {"interrupted": True, "unknown": list(fit.unknown)}
     servo = replace(fit.servo, fit={key: value for key, value in record.items() if value not in ({}, [])})
     return replace(fit, servo=servo, model=type(fit.model)(servo))
+
+
+def stopped(fit: Fit, missing: Sequence[str]) -> Fit:
+    """Return a fit that a stop has left without something, and that says so."""
+    if not missing:
+        return fit
+    said = f"stopped: the best so far; not known are {', '.join(missing)}"
+    return replace(fit, interrupted=True, unknown=tuple(missing), warnings=(said, *fit.warnings))
 
 
 def _conditions(logs: Sequence[Log]) -> dict[str, Any]:

@@ -179,13 +179,26 @@ class Courses:
 
     def angles(self, numbers: LagNumbers) -> tuple[Array, Array]:
         """Return angle and speed at all wanted times, shape (C, N); the delay is that of the first model."""
+        return self.angles_of([numbers])[0]
+
+    def angles_of(self, several: Sequence[LagNumbers]) -> list[tuple[Array, Array]]:
+        """Return the same of several sets of models, each with a delay of its own: in one go through the changes."""
+        every = LagNumbers(*(np.concatenate(columns) for columns in zip(*several, strict=True)))
+        found, there, first = [], self._at_changes(every), 0
+        for numbers in several:
+            last = first + len(numbers.lag)
+            found.append(self._between(there[:, first:last], numbers))
+            first = last
+        return found
+
+    def _between(self, there: Array, numbers: LagNumbers) -> tuple[Array, Array]:
         delay = float(numbers.delay[0, 0])
         place = np.concatenate([np.searchsorted(events, times - delay, side="right") - 1
                                 for events, times in zip(self.events, self.times, strict=True)])
         before, place = place < 0, np.maximum(place, 0)
         since = np.where(before, 0.0, self.time - delay - self.events[self.log_of, place])
         target = numbers.gain * self.commands[self.log_of, place] + numbers.offset
-        angle, speed = _advance(self._at_changes(numbers)[place, :, self.log_of].T, target, since, numbers)
+        angle, speed = _advance(there[place, :, self.log_of].T, target, since, numbers)
         return angle, np.where(before, 0.0, speed)
 
     def _at_changes(self, numbers: LagNumbers) -> Array:
@@ -206,8 +219,9 @@ def _advance(angle: Array, target: Array, span: Array, numbers: LagNumbers) -> t
     """Return angle and speed after a span of time under a constant target: first at the slew rate, then by the lag."""
     error = target - angle
     half = 0.5 * numbers.deadband
-    way = error - np.clip(error, -half, half)
+    way = error - np.minimum(np.maximum(error, -half), half)
     rate = np.where(way > 0.0, numbers.slew_up, numbers.slew_down)
-    slewing = np.clip(np.abs(way) / rate - numbers.lag, 0.0, span)
-    left = (np.abs(way) - rate * slewing) * np.exp((slewing - span) / numbers.lag)
-    return angle + np.copysign(np.abs(way) - left, way), np.copysign(np.minimum(rate, left / numbers.lag), way)
+    size = np.abs(way)
+    slewing = np.minimum(np.maximum(size / rate - numbers.lag, 0.0), span)
+    left = (size - rate * slewing) * np.exp((slewing - span) / numbers.lag)
+    return angle + np.copysign(size - left, way), np.copysign(np.minimum(rate, left / numbers.lag), way)

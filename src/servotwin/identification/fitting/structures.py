@@ -16,14 +16,8 @@ from servotwin.errors import InputError
 from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.fit import Fit
 from servotwin.identification.fitting.free import LUMPED
-from servotwin.identification.fitting.ladder import (
-    RUNGS,
-    Ladder,
-    Rung,
-    friction_ladder,
-    ladder_of,
-    rung_of,
-)
+from servotwin.identification.fitting.ladder import RUNGS, Ladder, Rung, friction_ladder, ladder_of, rung_of
+from servotwin.identification.fitting.stopping import Within
 from servotwin.loads import Flexible, Load
 from servotwin.logs.log import Log
 from servotwin.models import DigitalServo, Model, PulseServo, PulseServoInductive
@@ -121,6 +115,7 @@ def compare_structures(logs: Sequence[Log], servo: Servo, model: type[Model] | N
     logs_of = {spring: [replace(log, load=as_arm(log.load)) for log in given] if spring == "arm" else given
                for spring in ("", *elastic)}
     options = {"compare_with": (), **options, "diagnose": False}  # the comparison is the trial
+    options["within"] = Within(options.get("within"))
     found: dict[Structure, Rung] = {}
     with checks.shown(progress) as show:
         further = [law for law in laws if law != _BASE]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, cast
@@ -144,6 +145,7 @@ class Task:
 
     def search(self, tell: Told) -> tuple[Outcome, list[Outcome]]:
         """Return the best point, and where the search from each start ended; the way is told after each step."""
+        self.forecast.nearly = self.forecast.bent
         nominal = self._at_likely_delay(self.nominal())
         self._set_noise(self.forecast.at(nominal, derivatives=False, cases=self.fitted), self.fitted)
         self.forecast.strict = False  # from here on, what no servo is counts as failed
@@ -161,6 +163,9 @@ class Task:
         if self.forecast.phased:
             nominal = with_clocks(self, [nominal, *self._elsewhere(ended)], tell, began)
         nominal = self._out_of_nothing(nominal, tell, began)
+        if self.forecast.nearly:
+            nominal = self._refined(nominal, self.fitted, rounds=3, tell=tell, began=began).point
+            self.exactly(nominal)
         best = self._refined(nominal, self.fitted, rounds=6, tell=tell, began=began)
         return best, ended or [best]
 
@@ -205,6 +210,25 @@ class Task:
         search = self._search(self.fitted)
         return together(self.forecast, self.fitted, [
             search.steps(start, most=_MOST["all"], tell=keep, least_gain=least) for start in starts])
+
+    def exactly(self, point: Point) -> None:
+        """Go on by the engine itself from a point, in the noise that it leaves there."""
+        self.forecast.nearly = False
+        self.measure(point)
+
+    @contextmanager
+    def nearly(self, point: Point) -> Generator[None]:
+        """Let searches go fast for a while, in the noise that is left at a point then."""
+        if not self.forecast.bent:
+            yield
+            return
+        noise = self.forecast.noise
+        try:
+            self.forecast.nearly = True
+            self.measure(point)
+            yield
+        finally:
+            self.forecast.nearly, self.forecast.noise = False, noise
 
     def measure(self, point: Point) -> None:
         """Take the noise of each sensor from its residuals at a point."""
@@ -302,6 +326,7 @@ class Task:
 
     def best_so_far(self) -> Outcome:
         """Return where an interrupted search stood, or where an earlier start ended, if that is better."""
+        self.forecast.nearly = False
         known = [*self._ended, *([self._best] if self._best is not None else [])]
         if any(math.isfinite(outcome.cost) for outcome in known[1:]):
             return self._on_one_scale(known, self.few())[0]

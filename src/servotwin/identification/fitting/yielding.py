@@ -168,7 +168,9 @@ def settle(task: Task, found: Outcome, tell: Told) -> tuple[Outcome, tuple[Dropp
     count = int((task.prior.weight > 0.0).sum())
     for k in range(count):
         tell(k / count, "priors")
-        trials = [trial for trial in _trials(task, found) if trial.dropped.which not in [one.which for one in left]]
+        with task.nearly(found.point):
+            trials = [trial for trial in _trials(task, found)
+                      if trial.dropped.which not in [one.which for one in left]]
         if not trials:
             break
         best = max(trial.gain for trial in trials)

@@ -210,7 +210,7 @@ def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: 
         controller.resume(inputs, memory)
     until = instant(pulsed, inputs, memory, memory.point.time + duration)
     if firmware.present(inputs.firmware[0]) and tick_legs.way_of(
-            numbers, inputs, until - memory.point.time) == LEGS:
+            numbers, inputs, until - memory.point.time, False) == LEGS:
         gone = tick_legs.go(numbers, inputs, memory, until, times, done, outputs)
         memory, done = tick_legs.as_gone(memory, gone), gone.done
         if gone.time >= until:
@@ -231,7 +231,7 @@ def _run_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, until:
             until = instant(pulsed, inputs, memory, until - (origin_of(memory) - origin))
             origin = origin_of(memory)
         if firmware.present(inputs.firmware[0]) and tick_legs.way_of(
-                numbers, inputs, until - memory.point.time) == LEGS:
+                numbers, inputs, until - memory.point.time, False) == LEGS:
             gone = tick_legs.go(numbers, inputs, memory, until, times, done, outputs)
             memory, done = tick_legs.as_gone(memory, gone), gone.done
             if memory.point.time >= until or due(memory):

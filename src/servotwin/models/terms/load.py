@@ -42,6 +42,11 @@ def swings(load: Load) -> bool:
     return load.gravity != 0.0
 
 
+def bends(load: Load) -> bool:
+    """Tell whether the torque changes with the angle."""
+    return load.stiffness != 0.0 or load.gravity != 0.0
+
+
 def depends(load: Load) -> int:
     """Return on what the acceleration depends through the load, friction apart."""
     return (ON_Q if load.stiffness != 0.0 else 0) | (CURVED_Q if load.gravity != 0.0 else 0)

@@ -88,6 +88,7 @@ def _of_ticks() -> Mapping[str, tuple[Kind, ...]]:
     from servotwin.models.engine.bus.coupled_units import Coupling, Unit
 
     return {"digital_batch:go_on": (*_GOING, _records(digital_tiles.TILE_TYPE)), "leg_runs:go_on": _GOING,
+            "leg_runs:go_on_nearly": _GOING,
             "coupled_runs:go_on": (*_GOING, _records(record_of(Unit)), _records(record_of(Coupling)))}
 
 
@@ -110,7 +111,8 @@ def _of_buses() -> Mapping[str, tuple[Kind, ...]]:
 
 
 _ELSEWHERE: Mapping[str, Callable[[], Mapping[str, tuple[Kind, ...]]]] = {  # where kinds take more than lanes have
-    "digital_batch:go_on": _of_ticks, "leg_runs:go_on": _of_ticks, "coupled_runs:go_on": _of_ticks,
+    "digital_batch:go_on": _of_ticks, "leg_runs:go_on": _of_ticks, "leg_runs:go_on_nearly": _of_ticks,
+    "coupled_runs:go_on": _of_ticks,
     "bus_batch:go_on": _of_buses, "bus_batch:look": _of_buses, "cosim_lanes:break_up": _of_buses}
 
 

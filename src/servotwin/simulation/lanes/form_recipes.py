@@ -107,6 +107,9 @@ _LEGS = _TICKS | PLAY | TWO_BODIES | BY_SHARE
 BY_LEGS = Recipe("by_legs", ("servotwin.models.engine.legs.leg_runs:go_on",), vector=True, knows=_LEGS,
                  always=PROGRAM | PWM)
 """Digital servos from tick to tick, one after the other; what is left of a call is for `ALL_DIGITAL`."""
+NEARLY_BY_LEGS = Recipe("nearly_by_legs", ("servotwin.models.engine.legs.leg_runs:go_on_nearly",), vector=True,
+                        knows=_LEGS | ON_Q | CURVED_Q, always=PROGRAM | PWM)
+"""The same, and with a spring or a pendulum as if its torque stayed within a tick; only where that is asked for."""
 BY_SERIES = Recipe("by_series", ("servotwin.models.engine.bus.coupled_runs:go_on",),
                    knows=_LEGS & ~TABLE | ON_HEAT | REGULATED, always=PROGRAM | PWM)
 """The same whose windings get warm, or whose supply has a limit; what is left of a call is for `ALL_DIGITAL`."""
@@ -118,6 +121,8 @@ BY_TICKS = Recipe("by_ticks", ("servotwin.models.engine.batch.digital_batch:go_o
 _LEFT_BY_LEGS = AT_STOPS | SHOWN | AT_COMMANDS
 _BY_LEGS = (replace(BY_LEGS, name="ticks_by_legs", knows=_LEGS & ~_LEFT_BY_LEGS, leaves=_LEFT_BY_LEGS),
             ("servotwin.models.engine.legs.tick_legs:go",))
+_NEARLY_BY_LEGS = (replace(NEARLY_BY_LEGS, name="ticks_nearly_by_legs", knows=NEARLY_BY_LEGS.knows & ~_LEFT_BY_LEGS,
+                           leaves=_LEFT_BY_LEGS), ("servotwin.models.engine.legs.tick_legs:go",))
 _BY_SERIES = (replace(BY_SERIES, name="ticks_by_series", knows=BY_SERIES.knows & ~_LEFT_BY_LEGS,
                       leaves=_LEFT_BY_LEGS),
               ("servotwin.models.engine.bus.coupled_ticks:serve", "servotwin.models.engine.bus.coupled_ticks:move"))
@@ -141,8 +146,10 @@ TICKS = Recipe("ticks", (
 """Lanes of all forms between two calls: what is imposed on them, and the way from tiles to records and back."""
 ENDING = Recipe("ending", ("servotwin.models.engine.cosim.final_checks:look_at_lanes",), vector=True, knows=~_DIGITAL)
 _PARTS = {PLAIN_RUNS: ((PLAIN_RUNS, ()), _CALMLY), BY_TICKS: (_BY_TICKS, _BY_LEGS), BY_LEGS: (_BY_LEGS,),
+          NEARLY_BY_LEGS: (_NEARLY_BY_LEGS,),
           BY_SERIES: (_BY_SERIES,), ALL_DIGITAL: ((ALL_DIGITAL, ()), _BY_LEGS)}
 _CHAINS = {BY_TICKS: (BY_TICKS, BY_LEGS, ALL_DIGITAL), BY_LEGS: (BY_LEGS, ALL_DIGITAL),
+           NEARLY_BY_LEGS: (NEARLY_BY_LEGS, ALL_DIGITAL),
            BY_SERIES: (BY_SERIES, ALL_DIGITAL)}
 
 
@@ -160,7 +167,7 @@ def steps_of(recipe: Recipe, ended: Any) -> Iterator[tuple[Recipe, str, tuple[An
     if ahead:
         yield last, "to_first_ticks", ()
     for one in ahead:
-        yield one, "go_on", _room_of(one)
+        yield one, one.entries[0].partition(":")[2], _room_of(one)
     yield last, "go_on", (ended,)
 
 

@@ -124,24 +124,24 @@ class OneByOne(NamedTuple):
     calm: bool = False
 
 
-def kinds_of(packed: Packed, dtype: str) -> list[SideBySide | OneByOne]:
-    """Return how lanes run; `dtype` is that of those that may be of either."""
+def kinds_of(packed: Packed, dtype: str, nearly: bool = False) -> list[SideBySide | OneByOne]:
+    """Return how lanes run; `dtype` is that of those that may be of either, `nearly` as of `kinds_with`."""
     own, recorded = packed.lanes, packed.torque.count > 0
     return kinds_with(own.numbers, own.chips, packed.size, dtype, swept(own), recorded, packed.curve.size > 0,
-                      own.firmware or NO_FIRMWARE)
+                      own.firmware or NO_FIRMWARE, nearly)
 
 
 def kinds_with(numbers: Numbers, chip: Chip, lanes: int, dtype: str, sweeps: Mask, recorded: Mask,
-               curved: bool, firmware: Firmware = NO_FIRMWARE) -> list[SideBySide | OneByOne]:
+               curved: bool, firmware: Firmware = NO_FIRMWARE, nearly: bool = False) -> list[SideBySide | OneByOne]:
     """Return how lanes run, whose numbers are numbers or arrays (lanes,).
 
     `sweeps` is whose command has a chirp, `recorded` whose load is recorded over time, `curved` whether the
-    potentiometers have a table.
+    potentiometers have a table. With `nearly`, what bends the motion within a tick may count by its mean.
     """
     inputs = recorded * RECORDED if recorded.any() else 0
     terms = Terms(numbers, chip, firmware, sweeps.any() and sweeps, inputs | TABLE * curved)
     left = np.ones(lanes, np.bool_)
-    found = list(_alone(terms, left) if np.any(terms.ask(SPRING | PWM)) else _of_analog(terms, left, dtype))
+    found = list(_alone(terms, left, nearly) if np.any(terms.ask(SPRING | PWM)) else _of_analog(terms, left, dtype))
     return [kind for kind in found if len(kind.which)]
 
 
@@ -160,12 +160,13 @@ def _of_analog(terms: Terms, left: Mask, dtype: str) -> Iterator[SideBySide | On
     yield from _at_last(terms, left, recipes.ALL_RUNS)
 
 
-def _alone(terms: Terms, left: Mask) -> Iterator[OneByOne]:
+def _alone(terms: Terms, left: Mask, nearly: bool) -> Iterator[OneByOne]:
     """Return how lanes run of which some have a spring between two bodies, or a program."""
     digital, sprung = np.any(terms.ask(PWM)), left & terms.ask(SPRING)
     left &= ~sprung
     yield from _at_last(terms, sprung, recipes.ALL_RUNS)
-    for recipe in (recipes.BY_TICKS, recipes.BY_LEGS, recipes.BY_SERIES) if digital and not is_plain() else ():
+    fast = (recipes.BY_TICKS, recipes.BY_LEGS, *((recipes.NEARLY_BY_LEGS,) if nearly else ()), recipes.BY_SERIES)
+    for recipe in fast if digital and not is_plain() else ():
         yield OneByOne(_take(terms, left, recipe), recipe)
     yield from _at_last(terms, left, recipes.ALL_DIGITAL if digital else recipes.ALL_RUNS)
 

@@ -127,9 +127,12 @@ def simulate_many(
 def simulate_lanes(
     lanes: LaneInputs, *, duration: float, output_step: float | None = None, output_times: ArrayLike | None = None,
     outputs: Sequence[str] = ("output_angle",), dtype: DTypeLike = "float64", executor: Any = None,
-    chunk: int | None = None, progress: Progress = False, accuracy: float = ACCURACY,
+    chunk: int | None = None, progress: Progress = False, accuracy: float = ACCURACY, nearly: bool = False,
 ) -> Batch:
-    """Return what `simulate_many` does of lanes that were zipped before, without warnings."""
+    """Return what `simulate_many` does of lanes that were zipped before, without warnings.
+
+    With `nearly`, a spring or a pendulum of a digital servo counts with its torque in the middle of each tick.
+    """
     if not (is_finite(duration) and duration > 0.0):
         raise InputError("duration", got=duration, allowed="a positive number of seconds")
     crew = Crew(executor)
@@ -137,7 +140,7 @@ def simulate_lanes(
         raise InputError("progress", got=progress, allowed="True, False or a function of the lanes done and of all")
     times = np.array(times_asked(duration, output_step, output_times))  # a copy: it becomes read-only
     names = _outputs(lanes.model, lanes.loads, outputs)
-    asked = Asked(float(duration), times, names, real_type(dtype), accuracy_of(accuracy))
+    asked = Asked(float(duration), times, names, real_type(dtype), accuracy_of(accuracy), nearly)
     lanes = framed(lanes, asked.duration)
     commands = Commands(lanes)
     packs = _packs(lanes, commands, asked, chunk, crew.workers)

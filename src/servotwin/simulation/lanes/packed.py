@@ -139,6 +139,8 @@ class Asked:
         "float64" or "float32".
     accuracy : float
         Of what is integrated [rad].
+    nearly : bool
+        Whether a spring or a pendulum of a digital servo may count with its torque in the middle of each tick.
     """
 
     duration: float
@@ -146,6 +148,7 @@ class Asked:
     outputs: tuple[str, ...]
     dtype: str
     accuracy: float
+    nearly: bool = False
 
 
 @dataclass(frozen=True)

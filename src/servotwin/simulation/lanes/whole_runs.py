@@ -36,7 +36,7 @@ def run(work: Work) -> Raw:
     """Run all lanes of a chunk: side by side where that is possible, one after the other where not."""
     raw, packed, asked = empty_raw(work), work.packed, work.asked
     lanes = packed.columns()
-    for kind in kinds_of(packed, asked.dtype):
+    for kind in kinds_of(packed, asked.dtype, asked.nearly):
         if isinstance(kind, OneByOne):
             run_one_by_one(work, lanes, kind.which, raw, kind.recipe)
         else:

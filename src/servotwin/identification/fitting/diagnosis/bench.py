@@ -47,15 +47,15 @@ class Purse:
 
     left: float
 
-    def check(self) -> None:
-        """Ask for more simulation.
+    def check(self, at_least: float = 0.0) -> None:
+        """Ask for more simulation, perhaps of so much.
 
         Raises
         ------
         Spent
             If nothing is left.
         """
-        if self.left <= 0.0:
+        if self.left <= at_least:
             raise Spent
 
 
@@ -171,6 +171,7 @@ class TrialBench:
         nuisance = self.old.nuisance if setting.nuisance is None else setting.nuisance
         forecast = Watched(self.purse, setting.price, setting.logs, setting.model, made, nuisance, self.old.sensors)
         forecast.goes_on_from(self.old)  # a search of smaller residuals takes less noise
+        forecast.nearly = forecast.bent
         forecast.seen = tuple(_teaches(forecast, k, alternate=alternate) for k in range(len(forecast.cases)))
         return forecast
 
@@ -273,10 +274,11 @@ class TrialBench:
 
     def copies(self, k: int, logs: Sequence[Log], point: Point) -> list[Array]:
         """Return the residuals of the angle of copies of one log with other commands or times, in one batch (SI)."""
-        self.purse.check()
+        self.purse.check(sum(log.duration for log in logs))
         old = self.base.forecast
         forecast = Watched(self.purse, 1.0, logs, old.model, old.space, old.nuisance, old.sensors)
         forecast.goes_on_from(old)
+        forecast.nearly = forecast.bent
         frames = (point.frames[k],) * len(logs) if point.frames else ()
         return list(self.judged(forecast, Point(point.shared, (point.own[k],) * len(logs), frames)))
 

@@ -127,17 +127,26 @@ def _settled(bench: TrialBench, point: Point, k: int, kind: _Kind, already: list
 
 
 def _chosen(bench: TrialBench, point: Point, k: int, kind: _Kind, already: list[int]) -> list[int]:
-    """Return the events of one log: those that are known, less those that pay no more, and further ones."""
+    """Return the events of one log: those that are known, less those that pay no more, and further ones.
+
+    Where the samples after a place cost less than an event has to gain, none is tried.
+    """
     log = bench.setting.logs[k]
-    every = [place for place in kind.places(log) if abs(place) not in [abs(one) for one in already]]
-    tried = [already, *([*already, place] for place in every),
-             *([place for place in already if place != one] for one in already)]
-    copies = [replace(kind.put(log, places), name=f"{log.name} {i}") for i, places in enumerate(tried)]
-    here, *parts = bench.copies(k, copies, point)
-    if not all(np.isfinite(part).all() for part in (here, *parts)):
+    used, known = np.flatnonzero(log.used(log.angle_name)), [abs(one) for one in already]
+    (here,) = bench.copies(k, [replace(kind.put(log, already), name=f"{log.name} as it is")], point)
+    if not np.isfinite(here).all():
         return already
-    used = np.flatnonzero(log.used(log.angle_name))
     scale = max(bench.noise, _NORMAL * float(np.median(np.abs(here))))
+    every = [place for place in kind.places(log) if abs(place) not in known
+             and _worth(bench, scale, here, np.zeros(len(here)), int(np.searchsorted(used, abs(place)))) > _PAYS]
+    tried = [*([*already, place] for place in every),
+             *([place for place in already if place != one] for one in already)]
+    if not tried:
+        return already
+    copies = [replace(kind.put(log, places), name=f"{log.name} {i}") for i, places in enumerate(tried)]
+    parts = bench.copies(k, copies, point)
+    if not all(np.isfinite(part).all() for part in parts):
+        return already
     worth = [_worth(bench, scale, here, part, int(np.searchsorted(used, abs(place))))
              for part, place in zip(parts, [*every, *already], strict=True)]
     chosen = [place for place, gained in zip(already, worth[len(every):], strict=True) if gained < -_PAYS]

@@ -83,7 +83,7 @@ def diagnose(task: Task, point: Point, traces: Sequence[Trace], verdict: Verdict
         allowed = left if group is groups[-1] else 0.5 * left
         for waiting, (name, try_it) in zip(range(len(group), 0, -1), group, strict=True):
             purse.left = given = min(_SHARES / waiting, 1.0) * allowed
-            tell(k / count, f"trying: {name}")
+            tell(max(k / count, min(1.0 - left / budget, 1.0)), f"trying: {name}")
             told = _told(bench, try_it)
             k += 1
             if told is not None and told.gain.counts:

@@ -127,10 +127,10 @@ def _habit(one: Look, error: float) -> _Habit | None:
     known = np.column_stack([np.ones(len(k)), speed[k], speed[k - 1], np.sin(q[k]), np.cos(q[k]), drives])
     y = speed[k + _AHEAD]
     weight, residual, scale = np.ones(len(k)), y, math.inf
-    little = 1e-3 * math.sqrt(len(k)) * np.eye(known.shape[1])  # commands of neighbouring bins may be the same
+    little = 1e-6 * len(k) * np.eye(known.shape[1])  # commands of neighbouring bins may be the same
     for _ in range(_ROUNDS):
-        line = np.linalg.lstsq(np.vstack([known * weight[:, None], little]),
-                               np.concatenate([y * weight, np.zeros(len(little))]), rcond=None)[0]
+        counted = known * (weight**2)[:, None]
+        line = np.linalg.solve(counted.T @ known + little, counted.T @ y)  # a decomposition of so many rows is slow
         residual, before = y - known @ line, scale
         scale = 1.4826 * float(np.median(np.abs(residual)))
         if abs(scale - before) < _SETTLED * scale:

@@ -3,6 +3,9 @@
 Between two ticks the duty is constant. A leg that surely lasts until the next one is arithmetic: what its exponentials
 are over a whole tick is kept as long as its laws have the same rates. Any other tick goes from event to event. The
 motion of a servo at rest whose duty stays costs a comparison.
+
+A spring or a pendulum bends the motion. Where that may be neglected within a tick it counts with its torque in the
+middle of it (`nearly`): for the searches of a fit, never for a simulation.
 """
 
 from __future__ import annotations
@@ -20,9 +23,9 @@ from servotwin.models.engine.motions import two_mass_series
 from servotwin.models.engine.motions.choice import may_depend
 from servotwin.models.engine.motions.elementary import decay, fma
 from servotwin.models.state.modes import CONDUCTING, INSIDE, Mode, Vector, at_rest
-from servotwin.models.terms import control, duty, elastic, friction, play, sensor, source
+from servotwin.models.terms import control, duty, elastic, friction, load, play, sensor, source
 from servotwin.models.terms.control import NOTHING_SENSED, NOWHERE
-from servotwin.models.terms.dependence import BY_SHARE, TWO_BODIES
+from servotwin.models.terms.dependence import BY_SHARE, CURVED_Q, ON_Q, TWO_BODIES
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.play import with_motor
 from servotwin.models.terms.sensor import sensed_voltage
@@ -71,19 +74,19 @@ class Gone(NamedTuple):
     anew: bool
 
 
-def possible(numbers: Numbers, inputs: Inputs) -> bool:
-    """Tell whether a servo always moves by legs."""
+def possible(numbers: Numbers, inputs: Inputs, nearly: bool) -> bool:
+    """Tell whether a servo always moves by legs, if what bends its load `nearly` does."""
     if source.regulated(numbers.source) or sensor.slack(numbers.sensor) or len(inputs.torque) > 0:
         return False
     on = may_depend(numbers, _GIVEN)
     if elastic.present(numbers.elastic):
         return two_mass_series.linear(numbers, on, _GIVEN, _GIVEN)
-    return on & ~(TWO_BODIES | BY_SHARE) == 0
+    return on & ~(TWO_BODIES | BY_SHARE | (ON_Q | CURVED_Q if nearly else 0)) == 0
 
 
-def way_of(numbers: Numbers, inputs: Inputs, left: float) -> int:
+def way_of(numbers: Numbers, inputs: Inputs, left: float, nearly: bool) -> int:
     """Return which way a servo goes for the time that is left [s]: from tick to tick if that is one at least."""
-    return LEGS if left >= inputs.firmware[0].T_c * (1.0 - SAME) and possible(numbers, inputs) else STEPS
+    return LEGS if left >= inputs.firmware[0].T_c * (1.0 - SAME) and possible(numbers, inputs, nearly) else STEPS
 
 
 def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Floats, done: int,
@@ -95,6 +98,9 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
     firmware, firm, frames, origin = inputs.firmware[0], controller.of(memory), memory.frames, origin_of(memory)
     point, slack, tau = memory.point, SAME * inputs.firmware[0].T_c, inputs.constant_torque
     t, y, T_c = point.time, point.y, inputs.firmware[0].T_c
+    hangs, bends = numbers.load, load.bends(numbers.load)
+    if bends:
+        numbers = level(numbers)
     last, anew = min(until, FRAMES * memory.beat), False
     way = Way(math.nan, numbers, 0.0, Mode(0, 0, point.mode.mesh, 0, 0), _NO_LAWS, spring_legs.NO_LAW)
     output = motor = Fade(math.nan, 0.0, 0.0, 0.0)
@@ -112,9 +118,12 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
         if end > until + slack:
             break
         end = min(end, until)
-        if firm.duty != way.duty:
-            way = at_duty(numbers, firm.duty, tau, y, way)
         time = T_c if abs(end - t - T_c) <= slack else end - t
+        before = tau
+        if bends:
+            tau = load.external_torque(hangs, inputs.constant_torque, y.q + 0.5 * y.w * time)
+        if firm.duty != way.duty or tau != before:
+            way = at_duty(numbers, firm.duty, tau, y, way)
         if done < times.size and (times[done] - origin < end - slack or end >= until):
             done = show(copied(way), tau, inputs.accuracy, y, times, done, t, end, until, origin, outputs, firm)
         if elastic.present(numbers.elastic) or not legs.stands(way.mode):
@@ -141,6 +150,13 @@ def as_gone(memory: Memory, gone: Gone) -> Memory:
     point = Point(gone.time, gone.y, Mode(0, 0, gone.mesh, 0, 0), math.inf, gone.y, memory.point.step, gone.y.q)
     return Memory(memory.frames, memory.beat, point, memory.chip, memory.u, memory.u_end, memory.tau, memory.tau_end,
                   memory.firm)
+
+
+def level(numbers: Numbers) -> Numbers:
+    """Return the numbers of a servo without what bends its load."""
+    plain = load.Load(numbers.load.coulomb, 0.0, 0.0, 0.0, 0.0)
+    return Numbers(numbers.motor, numbers.bridge, numbers.source, numbers.follower, numbers.shaft, numbers.friction,
+                   plain, numbers.stops, numbers.play, numbers.sensor, numbers.heat, numbers.elastic)
 
 
 def at_duty(numbers: Numbers, now: float, tau: float, y: Vector, before: Way) -> Way:

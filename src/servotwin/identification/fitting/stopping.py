@@ -1,0 +1,139 @@
+"""How far a fit is, told by the work that it measured, and what stops it: Ctrl-C, or the time that it was given."""
+
+from __future__ import annotations
+
+import math
+import signal
+import threading
+import time as clock
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any
+
+from servotwin.errors import InputError
+from servotwin.units import is_finite
+
+Show = Callable[[float, str], None]
+
+_STAGES = (0.0, 0.7, 0.76, 0.95, 0.96, 1.0)  # where search, priors, intervals, errors and trials begin, as they say it
+_USUAL = (1.0, 0.05, 0.4, 0.1)  # what the first four of these take, in that of the search
+_BESIDE = 1.0  # more of the last for each simpler model
+_OFTEN = 0.2  # s, between two times that the same is told
+
+
+class Within:
+    """The time that a fit may take, from now on.
+
+    Parameters
+    ----------
+    seconds : float or Within, optional
+        As much as it likes unless given; one that has begun goes on.
+
+    Raises
+    ------
+    InputError
+        If it is no positive time.
+
+    Examples
+    --------
+    >>> Within(1e-9).over, Within().over, Within(Within(60.0)).over
+    (True, False, False)
+    """
+
+    def __init__(self, seconds: float | Within | None = None) -> None:
+        if isinstance(seconds, Within):
+            self.end: float = seconds.end
+            return
+        if seconds is not None and not (is_finite(seconds) and seconds > 0.0):
+            raise InputError("within", got=seconds, allowed="a positive time [s]")
+        self.end = math.inf if seconds is None else clock.monotonic() + float(seconds)
+
+    @property
+    def over(self) -> bool:
+        """Whether it has run out."""
+        return clock.monotonic() > self.end
+
+
+class Course:
+    """The way of a fit: stages say which share of theirs is done, and it is told which share of all work.
+
+    Parameters
+    ----------
+    within : Within
+    intervals : bool
+        Whether they are sought.
+    beside : int
+        How many simpler models are fitted too.
+    """
+
+    def __init__(self, within: Within, *, intervals: bool = True, beside: int = 0) -> None:
+        self.within = within
+        self.show: Show = lambda share, text: None  # told that share; may raise KeyboardInterrupt, which stops the fit
+        self._usual = (*_USUAL[:2], _USUAL[2] * intervals, _USUAL[3] + _BESIDE * beside)
+        self.budget: float | None = None  # of the trials, once they begin, in the work of the search
+        self.stopped = False
+        self._noted = False
+        self._told = (0.0, "")
+        self._looked = -math.inf
+
+    def __call__(self, share: float, text: str) -> None:
+        """Tell how far a stage is; stop if it is time to.
+
+        Raises
+        ------
+        KeyboardInterrupt
+        """
+        known = self._share(share)
+        self._told = (known if self.budget is not None else max(known, self._told[0]), text)
+        self._looked = -math.inf
+        self.look()
+
+    def look(self) -> None:
+        """Stop if it is time to; else say again how far it is, if that was long ago.
+
+        Raises
+        ------
+        KeyboardInterrupt
+        """
+        if self.stopped:
+            return
+        now = clock.monotonic()
+        try:
+            if self._noted or self.within.over:
+                raise KeyboardInterrupt
+            if now - self._looked >= _OFTEN:
+                self._looked = now
+                self.show(*self._told)
+        except KeyboardInterrupt:
+            self.stopped = True
+            raise
+
+    def _share(self, share: float) -> float:
+        """Return the share of all work that is done: what lies ahead is as much as usual beside what was measured."""
+        stage = max(k for k in range(5) if share >= _STAGES[k])
+        inner = (share - _STAGES[stage]) / (_STAGES[stage + 1] - _STAGES[stage])
+        if stage == 4:
+            before, ahead = sum(self._usual), self.budget or 0.0
+            return (before + inner * ahead) / (before + ahead)
+        done = sum(self._usual[:stage]) + inner * self._usual[stage]
+        return done / sum(self._usual)
+
+    @contextmanager
+    def watching(self) -> Iterator[None]:
+        """Let the first Ctrl-C stop the fit where it can be stopped, if nobody else listens to it."""
+        here = threading.current_thread() is threading.main_thread()
+        if not here or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+            yield
+            return
+
+        def noted(number: int, frame: FrameType | None) -> Any:
+            if self._noted or self.stopped:  # a second one ends it wherever it is
+                signal.default_int_handler(number, frame)
+            self._noted = True
+
+        signal.signal(signal.SIGINT, noted)
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -1,0 +1,169 @@
+"""Fits of whole robots: servos, supply, masses, zeros and latency, and what cannot be told apart."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import servotwin as st
+from robots.robots_cases import links
+from servotwin.errors import InputError
+from servotwin.identification.arms import dynamics, identify_arm
+from servotwin.identification.arms.arm_fit import BELIEFS
+from servotwin.identification.arms.rows import Noise, beyond_scatter, whitened
+from servotwin.identification.fitting.words import Unidentifiable
+from servotwin.robots import Motion, Mount, run_motion
+
+mujoco = pytest.importorskip("mujoco", reason="the extra `robots` is not installed")
+JOINTS, RATE, COUNT = ("shoulder", "elbow"), 30.0, 2.0 * math.pi / 4096.0
+PLANT = mujoco.MjModel.from_xml_string(links(dt=2e-3))
+SERVO = st.feetech_sts("lerobot", servo="feetech-sts3215-12v").replace({"gear.backlash": None})
+BUS = st.parameters.Supply(open_circuit_voltage=12.0, internal_resistance=0.15)
+SHARES = {"motor.torque_constant": 1.12, "motor.back_emf_constant": 1.12, "motor.rotor_inertia": 1.3,
+          "friction.coulomb_torque_forward": 1.3, "friction.coulomb_torque_backward": 1.3}
+ZERO, LATENCY = 0.04, 0.008
+
+
+def goals(seed, seconds):
+    rng, time = np.random.default_rng(seed), np.arange(int(seconds * RATE)) / RATE
+    found = {}
+    for joint in JOINTS:
+        at, t = np.zeros(len(time)), 0.3
+        while t < seconds:
+            rise, way = rng.uniform(0.3, 0.9), rng.uniform(-0.7, 0.7) - at[-1]
+            x = np.clip((time - t) / rise, 0.0, 1.0)
+            at = at + way * x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
+            t += rise + rng.uniform(0.1, 0.8)
+        found[joint] = COUNT * np.round(at / COUNT)
+    return time, found
+
+
+def recorded(seed=0, seconds=10.0, *, gain=1.0, hand=None):
+    """Return an episode of an arm whose servos, zeros and masses are not those of the files."""
+    servo = SERVO.replace({name: share * SERVO.get(name) for name, share in SHARES.items()})
+    servo = servo.replace({"firmware.proportional_gain": gain * servo.get("firmware.proportional_gain")})
+    time, angles = goals(seed, seconds)
+    mounts = {joint: Mount(st.DigitalServo(servo), ZERO) for joint in JOINTS}
+    heavy = dynamics.with_masses(PLANT, dynamics.links_of(PLANT, JOINTS), np.array([1.0, 1.1]))
+    run = run_motion(heavy, mounts, Motion(time=time, source="real", angles={
+        joint: values + ZERO for joint, values in angles.items()}), bus=BUS, hold="previous")
+    measured = {joint: COUNT * np.round((np.interp(time - LATENCY, run.time, run.record[joint]["joint_angle"]) - ZERO)
+                                        / COUNT) for joint in JOINTS}
+    if hand is not None:
+        measured["elbow"] = measured["elbow"] + 0.3 * ((time > hand) & (time < hand + 0.8))
+    return Motion(time=time, angles=angles, measured=measured, source=f"episode {seed}")
+
+
+def fitted(motions, **more):
+    return identify_arm(motions, PLANT, SERVO, **{"bus": BUS, **more})
+
+
+@pytest.fixture(scope="module")
+def fit():
+    return fitted([recorded(seed) for seed in range(3)])
+
+
+def test_an_arm_is_found_and_unseen_episodes_are_predicted(fit):
+    assert fit.holdout.rms() < math.radians(0.12)
+    assert fit.before_holdout.rms() > 3.0 * fit.holdout.rms()
+    assert fit.latency == pytest.approx(LATENCY, abs=3e-3)
+    truth = {"output_torque_constant": 1.12 * 345.0 * SERVO.motor.torque_constant, "latency": LATENCY,
+             "output_coulomb_torque": 1.3 * 345.0 * SERVO.friction.coulomb_torque_forward, "zero.shoulder": ZERO,
+             "zero.elbow": ZERO, "supply.open_circuit_voltage": 12.0}
+    spreads = fit.intervals(0.99)
+    for name, value in truth.items():
+        assert spreads[name].lower <= value <= spreads[name].upper, name
+    found = fit.servos["elbow"]
+    assert found.source("motor.torque_constant").origin == "identified"
+    assert found.motor.torque_constant == pytest.approx(fit.estimates["output_torque_constant"] / 345.0)
+    assert not any("held out" in text for text in fit.warnings)
+
+
+def test_what_cannot_be_told_apart_is_named(fit):
+    """All masses, inertia, friction and the resistance are the scale of torque: no current was logged."""
+    assert all(isinstance(one, Unidentifiable) for one in fit.unidentifiable)
+    assert any("mass" in name for name in fit.undetermined)
+    assert fit.intervals()[next(name for name in fit.undetermined if "mass" in name)].method == BELIEFS
+
+
+def test_the_same_fit_twice_is_the_same_and_one_episode_says_so():
+    one, other = (fitted([recorded(5, 6.0)], intervals=False) for _ in range(2))
+    assert one.estimates == other.estimates
+    assert one.holdout is None
+    assert any("nothing was held out" in text for text in one.warnings)
+    assert {interval.method for interval in one.intervals().values()} <= {"not sought"}
+
+
+def test_a_wrong_gain_is_named_first():
+    found = fitted([recorded(7, 8.0, gain=0.5)], intervals=False)
+    assert found.causes[0].name == "proportional gain"
+    assert "8 in the place of 16" in found.causes[0].sentence
+
+
+def test_what_a_hand_did_is_left_out():
+    found = fitted([recorded(8, 8.0, hand=4.0)], intervals=False)
+    window = next(one for one in found.left_out if one.joint == "elbow")
+    assert window.start < 4.2
+    assert window.stop > 4.6
+    assert "neither servo nor arm explains" in str(window)
+    assert not fitted([recorded(8, 8.0)], intervals=False).left_out
+
+
+def test_without_a_robot_each_joint_gets_a_pendulum():
+    found = st.identify([recorded(9, 6.0)], SERVO, robot="unknown", bus=BUS, intervals=False)
+    assert {f"mass.{joint}_{part}" for joint in JOINTS for part in ("weight", "inertia")} <= set(found.names)
+    assert found.training.rms() < 0.7 * found.before.rms()
+    assert any("no robot file" in text for text in found.warnings)
+
+
+def test_inverse_dynamics_are_linear_in_the_masses():
+    rng, bodies = np.random.default_rng(0), dynamics.links_of(PLANT, JOINTS)
+    motion = rng.normal(size=(3, 5, 2))
+    factors = np.array([1.3, 0.8])
+    torque, inertia = dynamics.asked_of(PLANT, JOINTS, bodies, *motion).of(factors)
+    heavy = dynamics.with_masses(PLANT, bodies, factors)
+    data = mujoco.MjData(heavy)
+    for k in range(5):
+        data.qpos[:], data.qvel[:], data.qacc[:] = motion[:, k]
+        mujoco.mj_inverse(heavy, data)
+        np.testing.assert_allclose(torque[k] + inertia[k] * motion[2, k], data.qfrc_inverse, rtol=1e-9, atol=1e-12)
+
+
+def test_rows_are_whitened_by_positions_and_clock():
+    class Row:
+        speed = np.array([[1.0, -2.0, 0.5]])
+
+    noise = Noise(np.array([0.1, 0.2, 0.3]), 0.15)
+    W = whitened(np.eye(3)[None], Row, noise, np.ones((1, 3), bool))[0]
+    cov = np.diag(noise.positions**2) + noise.stamps**2 * np.outer(Row.speed[0], Row.speed[0])
+    np.testing.assert_allclose(W @ cov @ W.T, np.eye(3), atol=1e-12)
+
+
+def test_derivatives_that_are_noise_count_for_nothing():
+    rng = np.random.default_rng(0)
+    noise, true = rng.normal(size=(2, 4000, 2)), 30.0 * rng.normal(size=(4000, 1))
+    slopes, scatter = noise[0] + true * [1.0, 1.0], noise[1]
+    clean = slopes @ beyond_scatter(slopes, scatter)
+    assert np.abs(clean @ [1.0, -1.0]).max() < 0.05 * np.abs(slopes @ [1.0, -1.0]).max()
+    assert clean @ [1.0, 1.0] == pytest.approx(slopes @ [1.0, 1.0], rel=0.1, abs=3.0)
+
+
+@pytest.mark.parametrize(("logs", "servo", "words"), [
+    (lambda: [replace(recorded(0, 2.0), measured={})], SERVO, "joints of episode 0"),
+    (lambda: [recorded(0, 2.0)], None, "servo of a robot"),
+    (lambda: [recorded(0, 2.0)], {"wrist": SERVO}, "wrist"),
+    (lambda: [], SERVO, "logs of a robot"),
+    (lambda: [recorded(0, 0.5)], SERVO, "at least 30"),
+])
+def test_bad_input_is_one_line(logs, servo, words):
+    with pytest.raises(InputError, match=words) as caught:
+        identify_arm(logs(), PLANT, servo)
+    assert "\n" not in str(caught.value)
+
+
+def test_report(fit, tmp_path):
+    page = fit.report(tmp_path / "arm.html").read_text()
+    assert "unseen, before" in page
+    assert "zero.elbow" in page
+    assert str(fit).startswith("the simulated joints are")

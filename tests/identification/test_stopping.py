@@ -1,0 +1,82 @@
+"""Fits that are stopped at any time, by a signal or by the clock: the best so far is kept, what is unknown is said."""
+
+import os
+import signal
+import threading
+import time as clock
+
+import numpy as np
+import pytest
+
+import servotwin as st
+from identification.fits import fitted
+from servotwin.errors import InputError
+from servotwin.identification.fitting.stopping import Course, Within
+
+
+def test_the_time_that_a_fit_may_take_stops_it(logs):
+    began = clock.monotonic()
+    found = fitted(logs, within=0.3, starts=6, seed=3)
+    assert clock.monotonic() - began < 3.0
+    assert found.interrupted
+    assert "intervals" in found.unknown
+    assert found.warnings[0].startswith("stopped: the best so far; not known are ")
+    assert found.servo.fit["unknown"] == list(found.unknown)
+    assert np.isfinite(found.training.total()["PulseServo"])
+
+
+def test_a_fit_that_has_time_is_the_same(logs):
+    short, free = fitted(logs, within=600.0, intervals=False), fitted(logs, intervals=False)
+    assert short.estimates == free.estimates
+    assert short.unknown == ()
+
+
+@pytest.mark.parametrize("within", [0.0, -1.0, "soon", float("inf"), True])
+def test_a_time_has_to_be_one(logs, within):
+    with pytest.raises(InputError, match="within"):
+        fitted(logs, within=within)
+
+
+@pytest.mark.parametrize(("at", "unknown"), [("6 starts", "what is left"), ("all logs", "what is left"),
+                                             ("intervals", "intervals"), ("errors", "what may be the matter")])
+def test_ctrl_c_at_any_time_keeps_the_best_so_far(logs, at, unknown):
+    """The signal is noted, and the fit ends at the next simulation."""
+    if threading.current_thread() is not threading.main_thread():
+        pytest.skip("signals go to the main thread")
+    before, sent = signal.getsignal(signal.SIGINT), []
+
+    def tell(share, text):
+        if text.startswith(at) and not sent:
+            sent.append(text)
+            os.kill(os.getpid(), signal.SIGINT)
+
+    found = fitted(logs, starts=6, seed=3, intervals=True, progress=tell)
+    assert sent
+    assert found.interrupted
+    assert unknown in found.unknown
+    assert found.traces
+    assert (found.verdict is None) == (unknown == "what is left")
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_the_share_that_is_told_is_of_all_work():
+    told = []
+    course = Course(Within(), beside=2)
+    course.show = lambda share, text: told.append(share)
+    for share in (0.0, 0.35, 0.7, 0.76, 0.95, 0.955):
+        course(share, "")
+    assert told == sorted(told)
+    assert told[2] < 0.4  # two simpler models take longer than the search
+    course.budget = 3.0
+    course(0.96, "trying")
+    course(0.98, "trying")
+    assert 0.4 < told[-2] < 0.6  # what the trials may take lies ahead
+    assert told[-2] < told[-1] < 0.8
+
+
+def test_a_ladder_has_one_time_for_all(logs):
+    began = clock.monotonic()
+    found = st.friction_ladder(logs, st.load_servo("hitec-hs-755hb"), free=["output_inertia"], rungs=("M1", "M3"),
+                               within=0.5, starts=2)
+    assert clock.monotonic() - began < 5.0
+    assert found.rungs[-1].fit.interrupted
