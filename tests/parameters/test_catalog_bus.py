@@ -39,7 +39,7 @@ TOLD_BY_LOGS = {  # and nothing else: the rest of a file that was fitted is assu
     "motor.armature_resistance", "motor.torque_constant", "motor.back_emf_constant", "motor.rotor_inertia",
     "friction.coulomb_torque_forward", "friction.coulomb_torque_backward", "friction.load_friction_external",
     "potentiometer.feedback_gain", "firmware.proportional_gain", "firmware.derivative_gain", "firmware.off_state",
-    "firmware.signal_loss"}
+    "firmware.signal_loss", "supply.internal_resistance"}
 NEEDED = ("control_period", "compute_delay", "angle_quantum", "proportional_gain")
 
 
