@@ -42,6 +42,7 @@ Array = NDArray[np.float64]
 
 _PERIOD = "electronics.frame_period"
 _PHASE = "firmware.control_phase"
+_STRIBECK = "friction.stribeck_speed"
 _ANY_TICK = (0.5, 12.0**-0.5)  # of a tick: mean and standard deviation of what may be anywhere in it
 _BEFORE = 5  # pulses: by then a servo hunts as it will
 _HOLDS = 0.5  # of the friction that a servo file says: what it surely holds without drives
@@ -94,7 +95,8 @@ class Forecast:
         delayed = any(name in nuisance for name in ("delay", "log_delay", "frame_phase"))
         self.cases = tuple(make_case(log, model, space, self.sensors, delayed=delayed) for log in logs)
         self.strict = True
-        bent = any(log.load.pendulums or log.load.springs for log in logs)
+        fades = _STRIBECK in space.names or model.value_or(_STRIBECK, 0.0) > 0.0
+        bent = fades or any(log.load.pendulums or log.load.springs for log in logs)
         self.bent = bent and isinstance(model, DigitalServo)  # so that motion is integrated, as there is no closed form
         self.nearly = False  # whether torques of springs and pendulums count by their middle of each tick instead
         self._commands: dict[tuple[Any, ...], Signal] = {}  # points of a search often differ in other numbers only

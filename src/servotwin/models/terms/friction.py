@@ -18,9 +18,12 @@ from servotwin.models.terms.given import Given
 from servotwin.physics.friction import breakaway_torque, coulomb_torque
 from servotwin.physics.load_friction import (
     gear_friction_budget,
+    quadratic_gear_friction,
     share_balance,
     sliding_gear_friction,
     static_gear_friction,
+    stribeck_factor,
+    torque_share,
 )
 
 _FADED = 39.0  # exp(−39) is less than rounding: beyond (w/w_s)^α = 39 no static friction counts
@@ -96,6 +99,16 @@ def shared(friction: Friction) -> bool:
 def fades(friction: Friction) -> bool:
     """Tell whether friction fades as the shaft speeds up, and not at once."""
     return friction.varies > 0.0 and friction.w_s > 0.0
+
+
+def frozen(friction: Friction, w: float, tau_m: float, tau_e: float) -> Friction:
+    """Return friction that fades no more, with what it has faded to at a speed and under torques in +q."""
+    S = stribeck_factor(w, friction.w_s, friction.alpha)
+    ratio = 1.0 + (friction.breakaway - 1.0) * S
+    more = S * (torque_share(tau_m, tau_e, friction.K_ms, friction.K_es)
+                + quadratic_gear_friction(tau_m, tau_e, friction.K_mq, friction.K_eq))
+    return Friction(friction.F_forward * ratio + more, friction.F_backward * ratio + more, 1.0, friction.kappa,
+                    friction.varies, 0.0, 1.0, friction.K_m, friction.K_e, 0.0, 0.0, 0.0, 0.0)
 
 
 def creeping_speed(friction: Friction) -> float:

@@ -108,8 +108,9 @@ BY_LEGS = Recipe("by_legs", ("servotwin.models.engine.legs.leg_runs:go_on",), ve
                  always=PROGRAM | PWM)
 """Digital servos from tick to tick, one after the other; what is left of a call is for `ALL_DIGITAL`."""
 NEARLY_BY_LEGS = Recipe("nearly_by_legs", ("servotwin.models.engine.legs.leg_runs:go_on_nearly",), vector=True,
-                        knows=_LEGS | ON_Q | CURVED_Q, always=PROGRAM | PWM)
-"""The same, and with a spring or a pendulum as if its torque stayed within a tick; only where that is asked for."""
+                        knows=_LEGS | ON_Q | CURVED_Q | FADING, always=PROGRAM | PWM)
+"""The same, and with a spring, a pendulum or friction that fades as if their torques stayed within a tick; only where
+that is asked for."""
 BY_SERIES = Recipe("by_series", ("servotwin.models.engine.bus.coupled_runs:go_on",),
                    knows=_LEGS & ~TABLE | ON_HEAT | REGULATED, always=PROGRAM | PWM)
 """The same whose windings get warm, or whose supply has a limit; what is left of a call is for `ALL_DIGITAL`."""

@@ -31,6 +31,7 @@ _MOST_OF = 0.98  # of the samples, beyond which a larger error counts no more
 _STEPS, _FEW_STEPS = 25, 10  # of what is cheap to simulate, and of what is not
 DEAR = 3.0  # times a simulation of closed form
 _ROUNDS = 4  # of search and noise
+_COPY = 4.0  # s of one lane: about what a log takes that is made ready to be simulated once
 _LEAST = 2e-3  # of the cost: what a step has to gain
 _FINER = 0.7  # of the noise: then a search goes on with less
 _NORMAL = 1.4826  # standard deviation over median magnitude of a normal law
@@ -274,7 +275,8 @@ class TrialBench:
 
     def copies(self, k: int, logs: Sequence[Log], point: Point) -> list[Array]:
         """Return the residuals of the angle of copies of one log with other commands or times, in one batch (SI)."""
-        self.purse.check(sum(log.duration for log in logs))
+        self.purse.check(sum(log.duration + _COPY for log in logs))
+        self.purse.left -= _COPY * len(logs)
         old = self.base.forecast
         forecast = Watched(self.purse, 1.0, logs, old.model, old.space, old.nuisance, old.sensors)
         forecast.goes_on_from(old)

@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 _MOST = 12  # events of a log and round
 _SOON = 10  # samples after an event, by which it is judged
 _ROUNDS, _TIMES = 3, 4  # of choosing and searching, and of choosing in each
+_LOOKED = 200  # places of a log that are tried at once: those after which most is left
 _PAYS = 8.0  # in units of what is left: what one of some hundred places has to gain (their logarithm, twice)
 _MOST_LEFT = 0.5  # of the error
 _NORMAL = 1.4826  # standard deviation over median magnitude of a normal law
@@ -129,7 +130,7 @@ def _settled(bench: TrialBench, point: Point, k: int, kind: _Kind, already: list
 def _chosen(bench: TrialBench, point: Point, k: int, kind: _Kind, already: list[int]) -> list[int]:
     """Return the events of one log: those that are known, less those that pay no more, and further ones.
 
-    Where the samples after a place cost less than an event has to gain, none is tried.
+    None is tried where the samples after it cost less than an event has to gain.
     """
     log = bench.setting.logs[k]
     used, known = np.flatnonzero(log.used(log.angle_name)), [abs(one) for one in already]
@@ -137,8 +138,10 @@ def _chosen(bench: TrialBench, point: Point, k: int, kind: _Kind, already: list[
     if not np.isfinite(here).all():
         return already
     scale = max(bench.noise, _NORMAL * float(np.median(np.abs(here))))
-    every = [place for place in kind.places(log) if abs(place) not in known
-             and _worth(bench, scale, here, np.zeros(len(here)), int(np.searchsorted(used, abs(place)))) > _PAYS]
+    most = {place: _worth(bench, scale, here, np.zeros(len(here)), int(np.searchsorted(used, abs(place))))
+            for place in kind.places(log) if abs(place) not in known}  # that there is to gain
+    dearest = sorted(most, key=lambda place: -most[place])[:_LOOKED]
+    every = [place for place in most if most[place] > _PAYS and place in dearest]
     tried = [*([*already, place] for place in every),
              *([place for place in already if place != one] for one in already)]
     if not tried:

@@ -4,8 +4,9 @@ Between two ticks the duty is constant. A leg that surely lasts until the next o
 are over a whole tick is kept as long as its laws have the same rates. Any other tick goes from event to event. The
 motion of a servo at rest whose duty stays costs a comparison.
 
-A spring or a pendulum bends the motion. Where that may be neglected within a tick it counts with its torque in the
-middle of it (`nearly`): for the searches of a fit, never for a simulation.
+A spring or a pendulum bends the motion, and so does friction that fades. Where that may be neglected within a tick the
+load counts with its torque in the middle of it, and friction as it is at its start (`nearly`): for the searches of a
+fit, never for a simulation.
 """
 
 from __future__ import annotations
@@ -25,10 +26,11 @@ from servotwin.models.engine.motions.elementary import decay, fma
 from servotwin.models.state.modes import CONDUCTING, INSIDE, Mode, Vector, at_rest
 from servotwin.models.terms import control, duty, elastic, friction, load, play, sensor, source
 from servotwin.models.terms.control import NOTHING_SENSED, NOWHERE
-from servotwin.models.terms.dependence import BY_SHARE, CURVED_Q, ON_Q, TWO_BODIES
+from servotwin.models.terms.dependence import BY_SHARE, CURVED_Q, FADING, ON_Q, TWO_BODIES
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.play import with_motor
 from servotwin.models.terms.sensor import sensed_voltage
+from servotwin.physics.load_friction import torque_on_gear
 from servotwin.physics.motor import back_emf
 from servotwin.physics.pieces import Piece
 
@@ -81,7 +83,7 @@ def possible(numbers: Numbers, inputs: Inputs, nearly: bool) -> bool:
     on = may_depend(numbers, _GIVEN)
     if elastic.present(numbers.elastic):
         return two_mass_series.linear(numbers, on, _GIVEN, _GIVEN)
-    return on & ~(TWO_BODIES | BY_SHARE | (ON_Q | CURVED_Q if nearly else 0)) == 0
+    return on & ~(TWO_BODIES | BY_SHARE | (ON_Q | CURVED_Q | FADING if nearly else 0)) == 0
 
 
 def way_of(numbers: Numbers, inputs: Inputs, left: float, nearly: bool) -> int:
@@ -101,6 +103,7 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
     hangs, bends = numbers.load, load.bends(numbers.load)
     if bends:
         numbers = level(numbers)
+    fades, speed = friction.fades(numbers.friction), math.nan
     last, anew = min(until, FRAMES * memory.beat), False
     way = Way(math.nan, numbers, 0.0, Mode(0, 0, point.mode.mesh, 0, 0), _NO_LAWS, spring_legs.NO_LAW)
     output = motor = Fade(math.nan, 0.0, 0.0, 0.0)
@@ -122,7 +125,10 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
         before = tau
         if bends:
             tau = load.external_torque(hangs, inputs.constant_torque, y.q + 0.5 * y.w * time)
-        if firm.duty != way.duty or tau != before:
+        if fades:
+            if firm.duty != way.duty or tau != before or y.w_m != speed:
+                way, speed = at_duty(frozen(numbers, firm.duty, tau, y), firm.duty, tau, y, way), y.w_m
+        elif firm.duty != way.duty or tau != before:
             way = at_duty(numbers, firm.duty, tau, y, way)
         if done < times.size and (times[done] - origin < end - slack or end >= until):
             done = show(copied(way), tau, inputs.accuracy, y, times, done, t, end, until, origin, outputs, firm)
@@ -157,6 +163,16 @@ def level(numbers: Numbers) -> Numbers:
     plain = load.Load(numbers.load.coulomb, 0.0, 0.0, 0.0, 0.0)
     return Numbers(numbers.motor, numbers.bridge, numbers.source, numbers.follower, numbers.shaft, numbers.friction,
                    plain, numbers.stops, numbers.play, numbers.sensor, numbers.heat, numbers.elastic)
+
+
+def frozen(numbers: Numbers, now: float, tau: float, y: Vector) -> Numbers:
+    """Return the numbers of a servo whose friction fades no more, with what is left of it in a state at a duty."""
+    at = duty.at_duty(numbers, now)
+    u = duty.voltage(at.source, now)
+    torque = contacts.drive_torque(at, currents.zone_of(at, u, 0.0, y.q, y.w_m, 0.0), u, y)
+    own = friction.frozen(numbers.friction, y.w_m, torque, torque_on_gear(tau, y.w, numbers.shaft.b_out))
+    return Numbers(numbers.motor, numbers.bridge, numbers.source, numbers.follower, numbers.shaft, own,
+                   numbers.load, numbers.stops, numbers.play, numbers.sensor, numbers.heat, numbers.elastic)
 
 
 def at_duty(numbers: Numbers, now: float, tau: float, y: Vector, before: Way) -> Way:
