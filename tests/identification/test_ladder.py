@@ -77,7 +77,9 @@ def test_a_supply_is_tried_only_where_nobody_knows_it():
     assert may_give_way(st.BoundedServo(TRUTH), some, FREE) == ()
     assert may_give_way(model, some, [*FREE, "supply.internal_resistance"]) == ("soft bridge",)
     known = replace(some[0], parameters={"supply.internal_resistance": 0.1})
+    seen = replace(some[0], measured={**some[0].measured, "bus_voltage": np.full(len(some[0].time), 6.0)})
     assert may_give_way(model, [some[1], known], FREE) == ("soft bridge",)
+    assert may_give_way(model, [some[1], seen], FREE) == ("soft bridge",)
 
 
 @pytest.mark.slow

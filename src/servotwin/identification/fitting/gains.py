@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,12 +55,11 @@ def _percent(change: float) -> str:
     return f"{100.0 * abs(change):.0f} %"
 
 
-def _change(before: object, after: object) -> float:
+def _change(before: Iterable[Array], after: Iterable[Array]) -> float:
     """Return by which share the root mean square changes; of rows of sums of squares and counts."""
     roots = []
     for rows in (before, after):
-        table = np.array([np.atleast_2d(np.asarray(row)).sum(axis=0) for row in rows])  # type: ignore[attr-defined]
-        total = table.sum(axis=0)
+        total = np.sum([np.atleast_2d(row).sum(axis=0) for row in rows], axis=0)
         roots.append(math.sqrt(total[0] / total[1]) if total[1] else math.nan)
     return roots[1] / roots[0] - 1.0 if roots[0] > 0.0 else 0.0
 

@@ -54,6 +54,7 @@ EXTRAS: dict[str, str] = {
     "soft supply": "supply.internal_resistance", "soft bridge": "supply.bridge_drop_resistance"}
 """What gives way beside friction, and what is searched of it; the name of such a rung is "M4, soft supply"."""
 
+_ON_THE_BUS = "soft supply"
 _SOFT_SHARE = 0.2  # of the armature's resistance, where that of what gives way begins: nearer to 0 it may stay there
 _STIFFER = 0.9  # of the armature's resistance, that then begins lower
 _FEWEST = 3  # held out logs, whose scatter is believed
@@ -146,7 +147,8 @@ def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] | None
     gives_way : bool, optional
         Whether the law that is chosen is fitted once more with an internal resistance of the supply and once with one
         of the bridge, and where one of these is chosen the richer laws with it too: "M4, soft supply". Unless given,
-        where all laws are tried. What logs or `free` say already, or the model does not read, is not tried.
+        where all laws are tried. What logs or `free` say already, or the model does not read, is not tried; nor is a
+        supply whose bus was measured.
     progress : bool or callable
         As of `identify`, over all rungs.
     **options
@@ -226,6 +228,8 @@ class _Climb(NamedTuple):
 def may_give_way(model: Model, logs: Sequence[Log], free: Sequence[str]) -> tuple[str, ...]:
     """Return what may give way and is worth a trial: the model reads it, and nobody knows how much it does.
 
+    A bus that was measured says how far its supply gives way; that is not left to the angles then.
+
     Parameters
     ----------
     model : Model
@@ -233,7 +237,8 @@ def may_give_way(model: Model, logs: Sequence[Log], free: Sequence[str]) -> tupl
     free : sequence of str
     """
     return tuple(extra for extra, name in EXTRAS.items() if name in (*model.requires, *model.optional)
-                 and name not in free and not any(name in log.parameters for log in logs))
+                 and name not in free and not any(name in log.parameters for log in logs)
+                 and not (extra == _ON_THE_BUS and any("bus_voltage" in log.measured for log in logs)))
 
 
 def ladder_of(rungs: Sequence[Rung], select: str) -> Ladder:
