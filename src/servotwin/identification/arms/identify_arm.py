@@ -44,7 +44,7 @@ from servotwin.robots import Motion, RobotValidation, validate_robot
 
 Array = NDArray[np.float64]
 _ROUNDS, _STEPS = 2, 8  # of the first stage
-_WHOLE_TURNS, _WHOLE_STEPS = 2, 4  # of the second: derivatives, and steps by them
+_WHOLE_TURNS, _WHOLE_STEPS = 2, 6  # of the second: derivatives, and steps by them
 _FAR = 1.0  # widths of a belief, over which derivatives change
 _HELD_OUT = 4  # episodes for each that is held out
 _PUSHED = 2.5  # widths of a belief
