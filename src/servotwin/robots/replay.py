@@ -97,7 +97,7 @@ class RobotValidation:
     windows : tuple of Window
         The worst second of each joint, the worst first.
     said : tuple of str
-        What was assumed.
+        What was assumed, and what the robot's model runs into.
     """
 
     replays: tuple[Replay, ...]
@@ -166,7 +166,8 @@ def validate_robot(model: Any, servos: Mapping[str, Model | Mount], motions: Mot
     replays = tuple(_replay(run, own, late, joints) for run, own in zip(runs, courses, strict=True))
     errors = {name: {joint: {kind: _error(replays, name, joint, kind) for kind in KINDS} for joint in joints}
               for name in names}
-    said = tuple(dict.fromkeys(text for run in runs for text in run.said))
+    said = tuple(dict.fromkeys(text for run in runs for text in (
+        *run.said, *(f"{run.motion.source}: {touch.words}" for touch in run.ideal.touches))))
     return RobotValidation(replays=replays, latency=late, errors=errors, windows=_windows(replays, joints), said=said)
 
 

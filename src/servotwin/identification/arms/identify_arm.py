@@ -44,10 +44,10 @@ from servotwin.robots import Motion, RobotValidation, validate_robot
 
 Array = NDArray[np.float64]
 _ROUNDS, _STEPS = 2, 8  # of the first stage
-_WHOLE_TURNS, _WHOLE_STEPS = 2, 4  # of the second: derivatives, and steps by them
+_WHOLE_TURNS, _WHOLE_STEPS = 2, 6  # of the second: derivatives, and steps by them
 _FAR = 1.0  # widths of a belief, over which derivatives change
 _HELD_OUT = 4  # episodes for each that is held out
-_PUSHED = 2.5  # widths of a belief
+_PUSHED, _TRIED = 2.5, 1.5  # widths of a belief, that are said and that make causes be tried
 _NOISY = 2e-3  # rad at rest: more than counts and a clock leave
 
 
@@ -192,7 +192,7 @@ def _left(simulated: Any, what: Whole, x: Array) -> list[Array]:
 def _causes(what: Whole, noise: Noise, x: Array, make: Any) -> Any:
     """Return causes where a belief is pushed far, or what is left is no noise."""
     off = np.abs(x - what.numbers.start) * what.numbers.weight
-    if off.max() < _PUSHED and noise.positions.max() < _NOISY:
+    if off.max() < _TRIED and noise.positions.max() < _NOISY:
         return ()
     return causes_of(what.plant, what.numbers, what.links, what.episodes, what.used, noise, x, make)
 

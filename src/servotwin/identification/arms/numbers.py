@@ -25,7 +25,7 @@ _ZERO_STD = 0.05  # rad: how far a horn may sit off
 _VOLTAGE_STD = 0.03
 _LEAST_STD, _ANY_STD = 0.1, 0.7  # of logarithms: of what a file says how far it may be off, and of all else
 _LATENCIES = (-0.03, 0.2)  # s
-_MOST_ZERO, _MOST_OHMS = 0.35, 2.0  # rad, ohm
+_MOST_ZERO, _MOST_OHMS, _USUAL_OHMS = 0.35, 2.0, 0.1  # rad, ohm: at most, and of wires that nobody has measured
 
 
 class Number(NamedTuple):
@@ -101,7 +101,7 @@ class Numbers:
         if bus is not None and bus.open_circuit_voltage is not None:
             volts = float(bus.open_circuit_voltage)
             numbers.append(Number(VOLTAGE, "V", 0.0, -0.4, 0.4, _VOLTAGE_STD, volts, True))
-            ohms, most = (bus.internal_resistance or 0.0) / OHM_SCALE, _MOST_OHMS / OHM_SCALE
+            ohms, most = (bus.internal_resistance or _USUAL_OHMS) / OHM_SCALE, _MOST_OHMS / OHM_SCALE
             numbers.append(Number(RESISTANCE, "ohm", ohms, 0.0, most, max(ohms, 1.0), OHM_SCALE, False))
         if masses > 0.0:
             numbers += [Number(f"mass.{link}", "1", 0.0, -3.0 * masses, 3.0 * masses, masses, 1.0, True)

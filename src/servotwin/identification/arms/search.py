@@ -15,6 +15,7 @@ from servotwin.identification.fitting.arrow import Loss, Prior, block
 Array = NDArray[np.float64]
 _DAMPINGS = (1e-4, 0.1, 10.0)  # tried side by side
 _LEAST_GAIN = 3e-3  # of the cost: servos that count make it rough
+_LEAST_GAIN_ALONG = 3e-4  # likewise, where a step costs little
 _RETRIES, _FIRMER = 2, 300.0  # of steps that gained nothing, with so many times the damping
 
 
@@ -79,7 +80,7 @@ class ArmSearch:
             best = self.cost(x, found)
             trials, costs = self.tried(x, *self.normal(x, found, slopes), scale)
             k = int(np.argmin(costs))
-            if not costs[k] < best * (1.0 - _LEAST_GAIN):
+            if not costs[k] < best * (1.0 - _LEAST_GAIN_ALONG):
                 break
             x, scale = trials[k], scale * (1.0 if k < 2 else 10.0)
         return x

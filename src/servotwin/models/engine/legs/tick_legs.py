@@ -100,10 +100,11 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
     firmware, firm, frames, origin = inputs.firmware[0], controller.of(memory), memory.frames, origin_of(memory)
     point, slack, tau = memory.point, SAME * inputs.firmware[0].T_c, inputs.constant_torque
     t, y, T_c = point.time, point.y, inputs.firmware[0].T_c
-    hangs, bends = numbers.load, load.bends(numbers.load)
+    sprung = elastic.present(numbers.elastic)  # then what bends is in its law
+    hangs, bends = numbers.load, not sprung and load.bends(numbers.load)
     if bends:
         numbers = level(numbers)
-    fades, speed = friction.fades(numbers.friction), math.nan
+    fades, speed = not sprung and friction.fades(numbers.friction), math.nan
     last, anew = min(until, FRAMES * memory.beat), False
     way = Way(math.nan, numbers, 0.0, Mode(0, 0, point.mode.mesh, 0, 0), _NO_LAWS, spring_legs.NO_LAW)
     output = motor = Fade(math.nan, 0.0, 0.0, 0.0)
