@@ -6,6 +6,7 @@ import math
 import time as clock
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,6 +42,7 @@ from servotwin.parameters import Servo, Supply
 from servotwin.parameters.output_side import OUTPUT_SIDE
 from servotwin.parameters.quantity import Quantity
 from servotwin.robots import Motion, RobotValidation, validate_robot
+from servotwin.robots.episode import joints_of_dataset
 
 Array = NDArray[np.float64]
 _ROUNDS, _STEPS = 2, 8  # of the first stage
@@ -119,8 +121,8 @@ def identify_arm(logs: Any, robot: Any, servos: Any = None, *, bus: Supply | Non
         On bad input: no servo, joints that do not match, nothing measured.
     """
     began = clock.process_time()
-    first = motions_of(logs, plant_of("so101", ())[0] if robot == UNKNOWN and not _are_motions(logs) else
-                       plant_of(robot, ())[0])
+    named = joints_of_dataset(Path(logs)) if robot == UNKNOWN and isinstance(logs, str | Path) else ()
+    first = motions_of(logs, plant_of(robot, named)[0])
     plant, said = plant_of(robot, tuple(first[0].measured))
     mounts, assumed = mounts_of(servos, robot, plant, first)
     supply = supply_of(bus, mounts)
@@ -154,10 +156,6 @@ def identify_arm(logs: Any, robot: Any, servos: Any = None, *, bus: Supply | Non
         "one episode: nothing was held out, so nothing says how well another one is predicted",)))
     return _fit(what, x, noise, doubts, windows=windows, causes=causes, warnings=warnings, tables=tables,
                 stages=stages, level=level)
-
-
-def _are_motions(logs: Any) -> bool:
-    return not isinstance(logs, str) and not hasattr(logs, "exists")
 
 
 def _held_out(count: int, asked: int | None) -> int:

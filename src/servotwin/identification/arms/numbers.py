@@ -24,6 +24,7 @@ ZERO_SCALE, LATENCY_SCALE, OHM_SCALE = 0.02, 0.01, 0.1  # rad, s, ohm
 _ZERO_STD = 0.05  # rad: how far a horn may sit off
 _VOLTAGE_STD = 0.03
 _LEAST_STD, _ANY_STD = 0.1, 0.7  # of logarithms: of what a file says how far it may be off, and of all else
+_MOTOR, _MOTOR_STD = ("motor.armature_resistance", "output_torque_constant"), 0.15  # that sheets tell fairly
 _LATENCIES = (-0.03, 0.2)  # s
 _MOST_ZERO, _MOST_OHMS, _USUAL_OHMS = 0.35, 2.0, 0.1  # rad, ohm: at most, and of wires that nobody has measured
 
@@ -136,7 +137,8 @@ class Numbers:
         found = []
         for p in group.space.parameters:
             said = p.scaled_prior
-            std = max(said[1], _LEAST_STD) if said is not None and p.logarithmic else _ANY_STD
+            usual = _MOTOR_STD if p.name in _MOTOR else _ANY_STD
+            std = max(said[1], _LEAST_STD) if said is not None and p.logarithmic else usual
             found.append(Number(prefix + p.name, p.unit, p.scaled(p.start), p.scaled(p.lower) if p.lower > 0.0
                                 or not p.logarithmic else -20.0, p.scaled(p.upper),
                                 std if p.logarithmic else 2.0, p.scale, p.logarithmic))

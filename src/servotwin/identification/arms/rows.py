@@ -169,6 +169,5 @@ def parts_of(episode: Episode, residual: Array, slopes: Array | None, noise: Noi
     """Return what an episode says, joint by joint, in units of noise."""
     r = whitened(residual, episode, noise, used)
     s = np.zeros((*residual.shape, 0)) if slopes is None else whitened(slopes, episode, noise, used)
-    nothing = np.zeros((0, 0))
-    return [LogPart(r[mask, j], s[mask, j], nothing.reshape(0, 0) if not mask.any() else np.zeros((int(mask.sum()), 0)))
-            for j, mask in enumerate(used.T) if mask.any()]
+    return [LogPart(r[mask, j], s[mask, j], np.zeros((int(mask.sum()), 0))) for j, mask in enumerate(used.T)
+            if mask.any()]
