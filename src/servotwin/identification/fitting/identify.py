@@ -199,7 +199,9 @@ def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: fl
     except KeyboardInterrupt:
         interrupted = True
     dropped = yielded(task, found, left, doubts)
-    traces = _traces(forecast, with_pulses_of(forecast, task.loss, found.point, held_out, task.fitted), held_out)
+    with task.nearly(found.point):
+        point = with_pulses_of(forecast, task.loss, found.point, held_out, task.fitted)
+    traces = _traces(forecast, point, held_out)
     final = identified_servo(forecast.model.servo, forecast.space, found.point.shared, doubts, level,
                              [one.name for one in dropped])
     final = with_what_logs_say(final, [forecast.cases[k].log for k in task.fitted], forecast.space.names)
