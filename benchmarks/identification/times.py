@@ -17,18 +17,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "benchmarks" / "measured")]
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "measured"))
 
 import miuzei
 import xl330
+
+import servotwin as st
 from reference import rig
 from reference import rig_draws as draws
 from reference.rig_logs import REDUCTION, log_of
 
-import servotwin as st
-
-DATA = next((folder / "shared" / "data" for folder in ROOT.parents if (folder / "shared" / "data").is_dir()), None)
+DATA = next((one for up in Path(__file__).resolve().parents if (one := up / "shared" / "data").is_dir()), None)
 FIRST = {"intervals": False, "diagnose": False, "compare_with": ()}
 PLANT = ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque")
 ENCODER = 2.0 * math.pi / 4096.0  # rad
@@ -118,7 +118,8 @@ def mg996r() -> Row:
 def _other(file: st.Servo, factors: dict[str, float]) -> st.Servo:
     """Return a servo that differs from its file by some factors."""
     names = {"R": ("motor.armature_resistance",), "K": ("motor.torque_constant", "motor.back_emf_constant"),
-             "J": ("motor.rotor_inertia",), "F": ("friction.coulomb_torque_forward", "friction.coulomb_torque_backward")}
+             "J": ("motor.rotor_inertia",),
+             "F": ("friction.coulomb_torque_forward", "friction.coulomb_torque_backward")}
     return file.replace({name: factor * file.get(name) for key, factor in factors.items() for name in names[key]})
 
 

@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 _LEAST_STEP = 1e-7  # of a searched number
 _PATIENCE = 6  # small gains one after the other
 _LEAST_GAIN = 1e-3  # of the cost, half a sum of squares in units of noise: a twentieth of a standard error
+_KINK = 0.3  # the same where the cost has kinks: less than one of these is deep
 
 
 @dataclass(frozen=True)
@@ -197,6 +198,8 @@ class Search:
         self.own = [Prior(mean, weight) for mean, weight in beliefs]
         self.own_reach = [forecast.own_reach(forecast.cases[k]) for k in self.cases]
         self.held = np.zeros(forecast.size, np.bool_) if held is None else held
+        kinked = forecast.step > STEP
+        self.least_gain = _KINK if kinked else _LEAST_GAIN
         self.least_step = _LEAST_STEP * forecast.step / STEP  # what differences over wider steps do not see
 
     def cost_of(self, point: Point, parts: Sequence[LogPart]) -> float:
@@ -220,11 +223,11 @@ class Search:
         return NormalEquations(blocks, g, H)
 
     def run(self, start: Point, *, most: int = 60, tell: Tell | None = None,
-            least_gain: float = _LEAST_GAIN) -> Outcome:
+            least_gain: float | None = None) -> Outcome:
         """Search from a point; the best so far is told after each step."""
         return together(self.forecast, self.cases, [self.steps(start, most=most, tell=tell, least_gain=least_gain)])[0]
 
-    def steps(self, start: Point, *, most: int = 60, tell: Tell | None = None, least_gain: float = _LEAST_GAIN,
+    def steps(self, start: Point, *, most: int = 60, tell: Tell | None = None, least_gain: float | None = None,
               least_share: float = 0.0) -> Steps:
         """Search from a point step by step, asking for what the logs say; `least_share` is that of the first cost."""
         point = start._replace(shared=np.clip(start.shared, self.lower, self.upper))
@@ -232,7 +235,7 @@ class Search:
         best = Outcome(point, self.cost_of(point, parts), False, 0)
         if not math.isfinite(best.cost):
             return best
-        least_gain = max(least_gain, least_share * best.cost)
+        least_gain = max(self.least_gain if least_gain is None else least_gain, least_share * best.cost)
         damping, small = 1e-3, 0
         scale = np.zeros(self.forecast.size)
         for k in range(1, most + 1):

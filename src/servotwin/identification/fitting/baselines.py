@@ -177,10 +177,10 @@ class _Fitted:
                        math.log(lag), offset / self.scale["offset"], 0.1, gain / self.scale["gain"]][:len(self.free)]
                       for lag in _LAGS for slew in _SLEWS]
             grids.append(np.array(points))
-        for points, (angle, _) in zip(grids, self.courses.angles_of([*map(self.numbers, grids)]), strict=True):
+        for grid, (angle, _) in zip(grids, self.courses.angles_of([*map(self.numbers, grids)]), strict=True):
             costs = np.abs(angle - self.measured).mean(axis=1)
             k = int(np.argmin(costs))
-            found.append((float(costs[k]), points[k]))
+            found.append((float(costs[k]), grid[k]))
         return [x for _, x in sorted(found, key=lambda each: each[0])[:_STARTS]]
 
     def _line(self, delay: float) -> tuple[float, float]:

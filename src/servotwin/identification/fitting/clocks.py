@@ -26,6 +26,7 @@ _ROUNDS = 2  # of assignment and search
 _MOST_ROUNDS, _FALLS = 6, 0.95  # of pulses of another period, while the cost falls to less than that share
 _PERIOD_LOGS = 4  # that a far period is sought on
 _EXPLAINS = 0.75  # of the cost: a period that is nearly right leaves less
+_FIRST_STEPS = 5  # of searches of which the best goes on
 _TICKS_PAY = 1.0  # of the cost
 _HELD_PAYS = 3.0  # of the cost: an odds ratio of 20
 _NEAR_PAYS = 4.0  # of the cost, for each independent residual: what one more number has to gain, a chance of 0.5 %
@@ -56,13 +57,14 @@ def with_clocks(task: Task, starts: Sequence[Point], tell: Told, began: float) -
 def _with_phases(task: Task, start: Point, tell: Told, began: float) -> tuple[Point, float]:
     """Return where a search ends that finds the pulses of each log, and the logarithm of the noise there."""
     task.forecast.own_phases = False
-    point = task.ran(start, tell, began).point
+    point = task.ran_roughly(start, tell, began)
     task.measure(point)
     task.forecast.own_phases = True
-    for _ in range(_ROUNDS):
+    for k in range(_ROUNDS):
         before = [task.forecast.frames_of(point, k) for k in task.fitted]
         tell(began, "pulses")
-        point = task.ran(settled(task.scan(point), task.fitted), tell, began).point
+        there = settled(task.scan(point), task.fitted)
+        point = task.ran(there, tell, began).point if k else task.ran_roughly(there, tell, began)
         task.measure(point)
         if [task.forecast.frames_of(point, k) for k in task.fitted] == before:
             break
@@ -97,8 +99,9 @@ def ticking(task: Task, point: Point, tell: Told, began: float) -> Point:
     for _ in range(_MOST_ROUNDS):
         tell(began, "ticks")
         better = giving_way(task.scan(point), task.prior, task.held, task.fitted)
-        found = task.ran_all(better, tell, began)
+        found = task.ran_all(better, tell, began, _FIRST_STEPS)
         best = min(found, key=lambda outcome: outcome.cost, default=None)
+        best = best and task.ran(best.point, tell, began)
         if best is None or not best.cost < cost - _TICKS_PAY:
             break
         point = best.point

@@ -212,7 +212,9 @@ def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: fl
     forecast = task.forecast  # which may have one more number than it began with
     found, left, doubts = _doubted(task, found, level, course, missing, intervals=intervals)
     dropped, wide = yielded(task, found, left, doubts), widened(task, found, left)
-    traces = _traces(forecast, with_pulses_of(forecast, task.loss, found.point, held_out, task.fitted), held_out)
+    with task.nearly(found.point):
+        point = with_pulses_of(forecast, task.loss, found.point, held_out, task.fitted)
+    traces = _traces(forecast, point, held_out)
     final = identified_servo(forecast.model.servo, forecast.space, found.point.shared, doubts, level,
                              [one.name for one in dropped])
     final = with_what_logs_say(final, [forecast.cases[k].log for k in task.fitted], forecast.space.names)

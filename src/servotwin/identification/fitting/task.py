@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.identification.fitting.arrow import Loss, Outcome, Prior, Search, together
-from servotwin.identification.fitting.case import Case
 from servotwin.identification.fitting.clocks import ticking, with_clocks
+from servotwin.identification.fitting.first_offset import first_offset
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.phases import Scan, widening
 from servotwin.identification.fitting.point import (
@@ -25,12 +23,12 @@ from servotwin.identification.fitting.point import (
     OFFSET_SCALE,
     PERIOD_SCALE,
     SAG_SCALE,
+    STEP,
     LogPart,
     Point,
 )
 from servotwin.identification.fitting.scatter import scatter_of
 from servotwin.logs.log import ANGLES
-from servotwin.models import Model
 
 Array = NDArray[np.float64]
 
@@ -40,16 +38,17 @@ _FIRST_LOGS = 8  # of the first, rough searches
 _ALIKE, _NEARLY = 1.03, 1.3  # times the least cost of the rough searches, in which pulses do not come when they do
 _APART = 0.3  # the logarithm of a factor, between ends that are in different valleys
 _CLOSELY = 1e-4  # of the cost, for each residual: what a step has to gain between the rough searches and the last one
+_AMONG_KINKS = 1e-3  # the same of a servo with a program
 _ROUGH = 0.003  # of the cost: what a step of a rough search has to gain
 _BLIND = 1e3  # times the noise: a sensor that does not count yet
 _MOST_OFFSET = 12.0  # rad, nearly two turns: an encoder's zero may be anywhere
-_NEAR = 0.3  # rad, an offset that the search finds by itself
-_LOOKS = 25  # of each log, for a first offset
 _MOST_SAG = 3.0  # rad/V
 _DELAY = 0.02  # s, where the search for it begins, or at the best of some others
 _DELAYS = (_DELAY, 0.0, 0.04, 0.06, 0.09)
 _STARTS = 0.6  # of the way: rough searches from several starts
-_MOST = {"rough": 12, "all": 25}  # steps
+_MOST = {"rough": 12, "all": 25, "few": 10}  # steps
+_FEW_ROUNDS = 2  # of search and noise among kinks, where a search wanders on for ever
+_MANY_LOGS = 16  # from which on not all are needed to come near
 _ABOUT = 0.3  # of a searched number: how far off a servo file may be, while clocks are sought
 _NOTHING = 0.35  # of what a search began with
 _PAYS = 10.0  # of the cost, for each independent residual: what another clock has to gain
@@ -98,7 +97,8 @@ class Task:
 
     def nominal(self) -> Point:
         """Return where the servo's values stand."""
-        first = {"delay": _DELAY / DELAY_SCALE, "angle_offset": self._offset() / OFFSET_SCALE, "angle_sag": 0.0,
+        offset = first_offset(self.forecast, self.fitted) / OFFSET_SCALE
+        first = {"delay": _DELAY / DELAY_SCALE, "angle_offset": offset, "angle_sag": 0.0,
                  "frame_period": self.period / PERIOD_SCALE}
         shared = np.concatenate([self.forecast.space.start, [first[name] for name in self.forecast.extra]])
         return Point(np.clip(shared, self.lower, self.upper),
@@ -116,32 +116,6 @@ class Task:
         found = self.forecast.at_all(tried, cases=self.few())
         sizes = [sum(float(np.abs(part.residual).sum()) for part in parts) for parts in found]
         return tried[int(np.argmin([size if math.isfinite(size) else math.inf for size in sizes]))]
-
-    def _offset(self) -> float:
-        """Return how far the measured angles lie from the commanded ones in the middle; 0 where that is near [rad]."""
-        if "angle_offset" not in self.forecast.extra:
-            return 0.0
-        gaps: list[float] = []
-        for case in (self.forecast.cases[k] for k in self.fitted):
-            place = case.places.get("output_angle", np.zeros(0, np.int64))
-            model = self._model_of(case)
-            drive = model.command(case.signal)
-            some = np.arange(0, len(place), max(1, len(place) // _LOOKS))
-            asked = np.asarray(model.start_angle(cast("Any", drive(case.times[place[some]]))))
-            gaps += (case.values["output_angle"][some] - asked).tolist() if len(some) else []
-        middle = float(np.median(gaps)) if gaps else 0.0
-        return middle if abs(middle) > _NEAR else 0.0
-
-    def _model_of(self, case: Case) -> Model:
-        """Return the model with what a log says of its servo."""
-        model = self.forecast.model
-        own = {name: value for name, value in case.log.parameters.items()
-               if name in (*model.requires, *model.optional)}
-        if not own:
-            return model
-        with warnings.catch_warnings():  # of two calibrations that differ: it was said of the servo itself
-            warnings.simplefilter("ignore")
-            return type(model)(model.servo.replace(own))
 
     def search(self, tell: Told) -> tuple[Outcome, list[Outcome]]:
         """Return the best point, and where the search from each start ended; the way is told after each step."""
@@ -199,17 +173,24 @@ class Task:
         here, other = self.ran_all([point, begun.point], tell, began)
         return ticking(self, other.point, tell, began) if other.cost < here.cost else here.point
 
+    def ran_roughly(self, start: Point, tell: Told, began: float) -> Point:
+        """Search from a point as `ran` does; of many logs, on some of every kind of motion."""
+        if len(self.fitted) <= _MANY_LOGS:
+            return self.ran(start, tell, began).point
+        return self._search(self.few(_MANY_LOGS // 2)).run(start, most=_MOST["rough"]).point
+
     def ran(self, start: Point, tell: Told, began: float) -> Outcome:
         """Search from a point on all logs that are fitted, as closely as is needed to choose between points."""
         return self.ran_all([start], tell, began)[0]
 
-    def ran_all(self, starts: Sequence[Point], tell: Told, began: float) -> list[Outcome]:
-        """Search from several points, side by side."""
+    def ran_all(self, starts: Sequence[Point], tell: Told, began: float, most: int = _MOST["all"]) -> list[Outcome]:
+        """Search from several points, side by side, with so many steps at most."""
         keep = self._kept(tell, began, began, "all", "all logs")
-        least = _CLOSELY * sum(self.forecast.cases[k].count for k in self.fitted)
+        closely = _CLOSELY if self.forecast.step <= STEP else _AMONG_KINKS
+        least = closely * sum(self.forecast.cases[k].count for k in self.fitted)
         search = self._search(self.fitted)
         return together(self.forecast, self.fitted, [
-            search.steps(start, most=_MOST["all"], tell=keep, least_gain=least) for start in starts])
+            search.steps(start, most=most, tell=keep, least_gain=least) for start in starts])
 
     def exactly(self, point: Point) -> None:
         """Go on by the engine itself from a point, in the noise that it leaves there."""
@@ -294,17 +275,18 @@ class Task:
 
     def _refined(self, start: Point, cases: Sequence[int], *, rounds: int, tell: Told, began: float) -> Outcome:
         """Search, estimate the noise anew, and search on until it stays."""
-        best = Outcome(start, math.inf, False, 0)
+        best, kinked = Outcome(start, math.inf, False, 0), self.forecast.step > STEP
+        rounds = min(rounds, _FEW_ROUNDS) if kinked else rounds
         share = (1.0 - began) / rounds
         for k in range(rounds):
             search = self._search(cases)
-            best = search.run(best.point, most=_MOST["all"], tell=self._kept(
+            best = search.run(best.point, most=_MOST["few" if kinked else "all"], tell=self._kept(
                 tell, began + k * share, began + (k + 1) * share, "all", "all logs"))
             if not math.isfinite(best.cost):
                 return best
             tell(began + (k + 1) * share, "all logs")
             change = self._set_noise(self.forecast.at(best.point, derivatives=False, cases=cases), cases)
-            if change < 0.02 and best.converged:
+            if change < 0.02 and (best.converged or kinked):
                 break
         search = self._search(cases)
         return replace(best, cost=search.costs([best.point])[0])
@@ -312,10 +294,6 @@ class Task:
     def again(self, start: Point, tell: Told) -> Outcome:
         """Return where a search on all logs ends that begins at the end of another one."""
         return self._refined(start, self.fitted, rounds=6, tell=tell, began=0.0)
-
-    def take_noise(self, point: Point) -> None:
-        """Take the noise of each sensor from its residuals at a point."""
-        self._set_noise(self.forecast.at(point, derivatives=False, cases=self.fitted), self.fitted)
 
     def _kept(self, tell: Told, begin: float, end: float, stage: str, text: str) -> Callable[[int, Outcome], None]:
         """Return what keeps the best so far after each step, and tells how far the search is."""
@@ -347,7 +325,7 @@ class Task:
     def _candidates(self, nominal: Point, few: Sequence[int]) -> list[Point]:
         """Return the nominal point, and the best of many random ones."""
         rng = np.random.default_rng(self.seed)
-        tried, offset = [], self._offset() / OFFSET_SCALE
+        tried, offset = [], first_offset(self.forecast, self.fitted) / OFFSET_SCALE
         for _ in range(_TRIED * (self.starts - 1)):
             extra = {"delay": rng.choice(_DELAYS) / DELAY_SCALE, "angle_offset": offset, "angle_sag": 0.0,
                      "frame_period": self.period / PERIOD_SCALE}

@@ -309,7 +309,7 @@ def _judged(task: Task, found: Outcome, k: int, end: Outcome, base: float) -> _T
     if base - end.cost < _HINT * _PUSH or off < PUSHED * std:
         return None
     alone, before = _without(task.prior, [k]), task.forecast.noise
-    task.take_noise(end.point)
+    task.measure(end.point)
     try:
         gain = _search(task, task.prior).costs([found.point])[0] - _search(task, alone).costs([end.point])[0]
         widening = _doubt(task, end.point, alone)[0].inflation

@@ -170,7 +170,7 @@ def frozen(numbers: Numbers, now: float, tau: float, y: Vector) -> Numbers:
     """Return the numbers of a servo whose friction fades no more, with what is left of it in a state at a duty."""
     at = duty.at_duty(numbers, now)
     u = duty.voltage(at.source, now)
-    torque = contacts.drive_torque(at, currents.zone_of(at, u, 0.0, y.q, y.w_m, 0.0), u, y)
+    torque = currents.drive_torque(at, currents.zone_of(at, u, 0.0, y.q, y.w_m, 0.0), u, y)
     own = friction.frozen(numbers.friction, y.w_m, torque, torque_on_gear(tau, y.w, numbers.shaft.b_out))
     return Numbers(numbers.motor, numbers.bridge, numbers.source, numbers.follower, numbers.shaft, own,
                    numbers.load, numbers.stops, numbers.play, numbers.sensor, numbers.heat, numbers.elastic)
