@@ -1,8 +1,9 @@
-"""Part 4: whether the verdict of a fit names what is wrong, for fourteen defects of an independent bench.
+"""Part 4: whether the verdict of a fit names what is wrong, for the defects of two independent benches.
 
 Each defect on several random benches, from hardly to be seen to gross. The table says how often the verdict finds no
 fault, and where it does, how often the true cause is the first that it names, among the first three, or not among them.
-A cause may be found in more than one way: lost pulses and late stamps are both frames that came otherwise.
+Registers for P are those of a bus servo, which another reference moves. A cause may be found in more than one way: lost
+pulses and late stamps are both frames that came otherwise.
 """
 
 import sys
@@ -11,7 +12,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
 
 from reference.rig_defects import DEFECTS
-from reference.rig_fits import place, seen
+from reference.rig_fits import OF_BUS, place, seen
 
 STRENGTHS = (0.2, 0.5, 0.8)
 
@@ -20,7 +21,7 @@ def main(*seeds: int, only: tuple[str, ...] = ()) -> None:
     chosen = range(seeds[0] if seeds else 4) if len(seeds) < 2 else seeds
     print(f"{len(chosen)} random benches, strengths {', '.join(f'{s:g}' for s in STRENGTHS)} of 1")
     rows = []
-    for name in only or DEFECTS:
+    for name in only or (*DEFECTS, *OF_BUS):
         every = [seen(name, strength, seed) for strength in STRENGTHS for seed in chosen]
         said = [one for one in every if not one.holds or place(name, one) == 0]
         places = [place(name, one) for one in said]

@@ -87,9 +87,10 @@ def warming(truth: Truth, strength: float, rng: Rng) -> list[Run]:
 
 
 def rounded(truth: Truth, strength: float, rng: Rng) -> list[Run]:
-    """Pulses in steps of 1 to 12 us (1.2 degrees) where the logs say what was asked for."""
-    step = _between(1e-6, 1.2e-5, strength)
-    return runs(truth, lambda rng: {"rounds": step})
+    """Pulses in whole microseconds, counts of a PCA9685 or whole degrees where the logs say what was asked for."""
+    steps = {"rounds": 1e-6} if strength < 0.35 else {"rounds": 0.02 / 4096.0} if strength < 0.65 else {
+        "rounds": 1856e-6 / 180.0, "rounds_from": 544e-6}  # Arduino's Servo library
+    return runs(truth, lambda rng: dict(steps))
 
 
 def lost_pulses(truth: Truth, strength: float, rng: Rng) -> list[Run]:

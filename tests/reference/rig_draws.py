@@ -97,7 +97,8 @@ def runs(truth: Truth, taking: Callable[[np.random.Generator], Taking], *, durat
         if "clock" in told:
             told["clock"] *= truth.crystal
         step = told.pop("rounds", 0.0)  # s: what is sent is a multiple of it, and the log says what was asked for
-        sent = step * np.round(widths / step) if step else widths
+        begin = told.pop("rounds_from", 0.0)
+        sent = begin + step * np.round((widths - begin) / step) if step else widths
         said = record(truth.servo, truth.load, sent, **told, seed=int(rng.integers(2**31)))._replace(command=widths)
         found.append(Run(kind, truth.load, said))
     return found

@@ -11,6 +11,7 @@ import numpy as np
 
 import servotwin as st
 
+from . import bus_rig
 from . import rig_draws as draws
 from .rig_defects import with_defect
 from .rig_logs import log_of, servo_of
@@ -26,11 +27,16 @@ RIGHT = {  # names of causes that are right for a defect
     "dropped samples": ("dropped samples", "stamps"), "bent potentiometer": ("bent potentiometer",),
     "falling supply": ("supply that changes",), "dropping supply": ("supply that changes",),
     "warming": ("warming", "supply that changes"), "rounded commands": ("rounded commands",),
+    "wrong P register": ("P register",), "mixed P register": ("P register",),
 }
 SAID = {  # what names a defect in the sentence or the warnings, before anything is tried
     "reversed sign": "turns against the command", "wrapped angle": "wrap", "outliers 5 %": "lie far off alone",
     "5 % wrong stamps": "stamp", "dropped samples": "missing",
 }
+
+
+OF_BUS = {  # defects of a bus servo: by which factors P is larger than its file says, log by log
+    "wrong P register": lambda factor: (factor,) * 4, "mixed P register": lambda factor: (1.0, factor, 1.0, factor)}
 
 
 class Judged(NamedTuple):
@@ -51,6 +57,7 @@ class Seen(NamedTuple):
     causes: tuple[str, ...]
     warnings: tuple[str, ...]
     seconds: float
+    ratio: float = 1.0  # of what is left, in noise
 
 
 def truths_of(truth: draws.Truth) -> dict[str, float]:
@@ -94,13 +101,20 @@ def judged(condition: str, seed: int, **more: Any) -> Judged:
 
 def seen(name: str, strength: float, seed: int, **more: Any) -> Seen:
     """Fit the logs of a bench with a defect, and return what is said of it."""
-    truth = draws.random_truth(seed)
-    found = with_defect(truth, name, strength)
-    began = clock.process_time()
-    fit = fitted(truth, found, **more)
+    if name in OF_BUS:
+        factor = (1.2 * 2.5 ** strength) ** (1.0 if seed % 2 else -1.0)
+        servo = bus_rig.truth(seed)
+        logs, file = bus_rig.logs(servo, seed, OF_BUS[name](factor)), bus_rig.file_of(servo, seed)
+        began = clock.process_time()
+        fit = st.identify(logs, file, **{"free": bus_rig.FREE, "priors": None, "compare_with": (), **more})
+    else:
+        truth = draws.random_truth(seed)
+        found = with_defect(truth, name, strength)
+        began = clock.process_time()
+        fit = fitted(truth, found, **more)
     verdict = fit.verdict
     return Seen(verdict.sentence, verdict.holds, tuple(cause.name for cause in verdict.causes), tuple(fit.warnings),
-                clock.process_time() - began)
+                clock.process_time() - began, verdict.ratio)
 
 
 def place(name: str, found: Seen) -> int | None:

@@ -34,6 +34,15 @@ def test_what_is_wrong_is_named(name):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("name", ["bent potentiometer", "falling supply", "dropping supply", "warming",
+                                  "rounded commands", "wrong P register", "mixed P register"])
+def test_what_changes_or_bends_is_named_first_or_harmless(name):
+    for strength in (0.1, 0.6):
+        found = seen(name, strength, 30, starts=1)
+        assert found.ratio <= 1.2 or place(name, found) == 0, (strength, found)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", UNSEEN)
 def test_what_only_scales_is_not_told(name):
     """Voltage and load act on angles as other resistances and inertias do: the fit is good, the numbers are not."""

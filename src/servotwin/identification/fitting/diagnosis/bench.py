@@ -282,7 +282,10 @@ class TrialBench:
         forecast.goes_on_from(old)
         forecast.nearly = forecast.bent
         frames = (point.frames[k],) * len(logs) if point.frames else ()
-        return list(self.judged(forecast, Point(point.shared, (point.own[k],) * len(logs), frames)))
+        known = dict(zip(old.names_of_own(old.cases[k]), point.own[k], strict=True))
+        own = tuple(np.array([known.get(name, value) for name, value in zip(
+            forecast.names_of_own(case), forecast.own_start(case), strict=True)]) for case in forecast.cases)
+        return list(self.judged(forecast, Point(point.shared, own, frames)))
 
     def promise(self, setting: Setting) -> float:
         """Return the cost of what teaches at the start of a setting, the other numbers moved along to first order."""

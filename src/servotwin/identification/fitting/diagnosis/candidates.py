@@ -9,6 +9,7 @@ import numpy as np
 
 from servotwin.errors import ServotwinError
 from servotwin.identification.fitting.diagnosis.bench import Setting, TrialBench
+from servotwin.identification.fitting.diagnosis.shapes import bent, rounded, wrong_gain
 from servotwin.identification.fitting.frames import has_pulses
 from servotwin.identification.fitting.free import LUMPED, nominal
 from servotwin.loads import Load
@@ -190,6 +191,12 @@ TABLE: tuple[Candidate, ...] = (
               clocks(("frame_phase", "frame_period"))),
     Candidate("stamps", "stamps that run at another rate: samples and pulses would be in step", "check the clock that "
               "stamps the samples, or the sampling rate", stretched),
+    Candidate("rounded commands", "commands that were rounded on their way", "record what is sent, or send more finely",
+              rounded),
+    Candidate("P register", "another gain of the loop than registers or logs say", "read the register for P back, or "
+              "search firmware.proportional_gain", wrong_gain),
+    Candidate("bent potentiometer", "a potentiometer that is not linear", "measure some angles by hand, and give "
+              "potentiometer.linearity_angle and linearity_error", bent),
     Candidate("minimum drive time", "a minimum drive time of the chip", "search electronics.minimum_drive_time",
               numbers(({"electronics.minimum_drive_time": 2e-4}, {"electronics.minimum_drive_time": 8e-4}))),
     Candidate("coast", "a bridge that opens between pulses where the file brakes, or brakes where it opens",

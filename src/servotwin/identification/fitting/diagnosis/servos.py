@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from servotwin.identification.fitting.arrow import Prior
 from servotwin.identification.fitting.diagnosis.bench import Told, TrialBench, gain
+from servotwin.identification.fitting.diagnosis.shapes import GAIN, own_gains
 from servotwin.identification.fitting.uncertainty import rows_of
 
 Array = NDArray[np.float64]
@@ -35,6 +36,22 @@ def two_servos(bench: TrialBench) -> Told | None:
     named = ", ".join(logs[k].name for k in min(one, other, key=len))
     return Told("two servos", f"two servos among the logs, or one that changed: {named} and the others, fitted apart",
                 "fit these logs apart", gain(bench.base.residuals, residuals, bench.noise))
+
+
+def mixed_gains(bench: TrialBench) -> Told | None:
+    """Return what another P in some of the logs gains."""
+    said = [log.parameters.get(GAIN) for log in bench.setting.logs]
+    setting = own_gains(bench)
+    if setting is None:
+        return None
+    trial = bench.searched(setting, bench.base.point)
+    if not all(np.isfinite(r).all() for r in trial.residuals):
+        return None
+    usual = bench.setting.model.value_or(GAIN, 0.0)
+    other = [log.name for log, before in zip(setting.logs, said, strict=True)
+             if log.parameters.get(GAIN, usual) != (usual if before is None else before)]
+    return Told("P register", f"another gain of the loop in some logs than they say: {', '.join(other)}", "read the "
+                "register for P back before each run", gain(bench.base.residuals, trial.residuals, bench.noise))
 
 
 def _groups(bench: TrialBench) -> tuple[list[int], list[int]]:

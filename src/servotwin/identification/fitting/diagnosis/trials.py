@@ -11,9 +11,10 @@ import numpy as np
 from servotwin.errors import ServotwinError
 from servotwin.identification.fitting.diagnosis.bench import DEAR, Purse, Setting, Spent, Told, TrialBench, gain
 from servotwin.identification.fitting.diagnosis.candidates import TABLE, Candidate, mended_logs, possible
+from servotwin.identification.fitting.diagnosis.drifts import changing_supply, warming
 from servotwin.identification.fitting.diagnosis.events import dropped_samples, lost_pulses
 from servotwin.identification.fitting.diagnosis.holds import moved
-from servotwin.identification.fitting.diagnosis.servos import two_servos
+from servotwin.identification.fitting.diagnosis.servos import mixed_gains, two_servos
 from servotwin.identification.fitting.findings import findings
 from servotwin.identification.fitting.fit import Trace
 from servotwin.identification.fitting.point import Point
@@ -35,6 +36,7 @@ _KINDS = {"sign": ("sign", "an angle that counts against the command", 'mend=("s
 
 
 _SPECIAL: dict[str, Try] = {
+    "mixed P register": mixed_gains, "supply that changes": changing_supply, "warming": warming,
     "lost pulses": lost_pulses, "dropped samples": dropped_samples, "two servos": two_servos}
 """Candidates that are tried in ways of their own."""
 
