@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.fitting.arrow import Loss, Prior
+from servotwin.identification.fitting.first_offset import first_offset
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.frames import changes, gaps, has_pulses
 from servotwin.identification.fitting.phases import settled
@@ -116,7 +117,7 @@ def _likely(task: RigTask, there: Point) -> Point:
     size, extra = len(task.forecast.space), task.forecast.extra
     tried = [there]
     for delay in DELAYS if "delay" in task.asked else (None,):
-        for offset in {None, task._offset()} if "angle_offset" in task.asked else (None,):
+        for offset in {None, first_offset(task.forecast, task.fitted)} if "angle_offset" in task.asked else (None,):
             shared = there.shared.copy()
             if delay is not None:
                 shared[size + extra.index("delay")] = delay / DELAY_SCALE
