@@ -106,7 +106,8 @@ def seen(name: str, strength: float, seed: int, **more: Any) -> Seen:
         servo = bus_rig.truth(seed)
         logs, file = bus_rig.logs(servo, seed, OF_BUS[name](factor)), bus_rig.file_of(servo, seed)
         began = clock.process_time()
-        fit = st.identify(logs, file, **{"free": bus_rig.FREE, "priors": None, "compare_with": (), **more})
+        fit = st.identify(logs, file, st.DigitalServo,
+                          **{"free": bus_rig.FREE, "priors": None, "compare_with": (), **more})
     else:
         truth = draws.random_truth(seed)
         found = with_defect(truth, name, strength)
