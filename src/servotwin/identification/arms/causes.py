@@ -19,8 +19,8 @@ from servotwin.identification.fitting.arrow import Loss, Prior
 
 Array = NDArray[np.float64]
 GAIN = "firmware.proportional_gain"
-_LEAST_GAIN = 12.0  # of the cost
-_LEAST_SHARE = 0.03  # of the cost
+_LEAST_GAIN = 8.0  # of the cost
+_LEAST_SHARE = 0.008  # of the cost
 _APART = 0.12  # of a logarithm
 _STEPS = 8
 _GAINS = (0.25, 0.5, 0.7, 1.0, 1.4, 2.0, 4.0)  # times the registers'
@@ -92,7 +92,7 @@ def _lets_go(candidate: str, name: str) -> bool:
 
 def _gain_words(numbers: Numbers, x: Array, loose: Sequence[int]) -> str:
     ratios = {numbers.names[k].removesuffix(GAIN).removesuffix(": "): math.exp(x[k] - numbers.start[k]) for k in loose}
-    if all(abs(math.log(ratio)) < _APART for ratio in ratios.values()):
+    if all(abs(math.log(ratio)) < 2.0 * _APART for ratio in ratios.values()):
         return ""
     said = ", ".join(f"{ratio:.2g} times" + (f" ({name})" if name else "") for name, ratio in ratios.items())
     return (f"the proportional gain of the servos looks like {said} what their registers say: a P register other than "

@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 _DAMPINGS = (1e-4, 0.1, 10.0)  # tried side by side
 _LEAST_GAIN = 3e-3  # of the cost: servos that count make it rough
 _LEAST_GAIN_ALONG = 3e-4  # likewise, where a step costs little
+_ROUGH = 2e-3  # of the cost: what counting servos scatter it by
 _RETRIES, _FIRMER = 2, 300.0  # of steps that gained nothing, with so many times the damping
 
 
@@ -73,14 +74,15 @@ class ArmSearch:
 
     def along(self, x: Array, slopes: Sequence[Array], *, most: int) -> Array:
         """Return the best point that steps by the same derivatives come to."""
-        best = math.inf
         scale = 1.0
-        for _ in range(most):
+        for turn in range(most):
             found = [residuals(self.simulated, episode, x[None])[0] for episode in self.episodes]
             best = self.cost(x, found)
             trials, costs = self.tried(x, *self.normal(x, found, slopes), scale)
             k = int(np.argmin(costs))
-            if not costs[k] < best * (1.0 - _LEAST_GAIN_ALONG):
+            if turn == 0 and costs[0] < best * (1.0 + _ROUGH):  # what no data hold goes back to what is believed
+                k = 0
+            elif not costs[k] < best * (1.0 - _LEAST_GAIN_ALONG):
                 break
             x, scale = trials[k], scale * (1.0 if k < 2 else 10.0)
         return x
