@@ -150,6 +150,18 @@ class Log:
         turns = (np.diff(self.held) != 0.0) | (self.sent[1:] != self.sent[:-1])
         return check.frozen(np.flatnonzero(turns) + 1)
 
+    def rows_at(self, time: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Return the samples nearest to some times [s]: those of the log itself, whatever rounding makes of them.
+
+        Examples
+        --------
+        >>> log = Log(name="a", time=[0.1, 0.2, 0.3], command=[0.0, 0.5, 0.5], command_kind="angle",
+        ...           measured={"output_angle": [0.0, 0.1, 0.5]})
+        >>> log.rows_at(0.1 + (log.time - 0.1)).tolist()
+        [0, 1, 2]
+        """
+        return np.searchsorted(0.5 * (self.time[1:] + self.time[:-1]), time)
+
     @property
     def angle_name(self) -> str:
         """The signal that tells best where the shaft is: `output_angle`, else `feedback_voltage`."""

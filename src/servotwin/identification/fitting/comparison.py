@@ -87,8 +87,7 @@ def _of_slew(logs: Sequence[Log], fitted: Sequence[int], traces: Sequence[Trace]
         if simple.signal != trace.signal or simple.command_kind != log.command_kind:
             return {}
         predicted = np.asarray(simple.predict(log))
-        at = np.searchsorted(log.time, trace.time)
-        difference = predicted[at] - trace.measured
+        difference = predicted[log.rows_at(trace.time)] - trace.measured
         known = np.isfinite(difference) & trace.judged
         found[k] = log_error(log, difference[known] if known.any() else np.array([math.nan]))
     return found

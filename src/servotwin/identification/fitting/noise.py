@@ -175,8 +175,7 @@ def bends(one: SensorSeries) -> Array:
 
 def _windows(one: SensorSeries) -> list[Array]:
     """Return the scatter while the shaft stood, in stretches of some samples: the command has been the same long."""
-    at = np.searchsorted(one.log.time, one.time)
-    place = np.minimum(at, len(one.log) - 1)
+    place = one.log.rows_at(one.time)
     changed = np.append(True, np.diff(np.searchsorted(one.log.changes, place, side="right")) != 0)
     changed |= ~one.joined
     first = np.maximum.accumulate(np.where(changed, np.arange(len(place)), 0))
