@@ -29,6 +29,8 @@ from reference import rig_draws as draws
 from reference.rig_logs import REDUCTION, log_of
 
 DATA = next((one for up in Path(__file__).resolve().parents if (one := up / "shared" / "data").is_dir()), None)
+XL330 = ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque",
+         "motor.motor_viscous_friction", "friction.load_friction")
 FIRST = {"intervals": False, "diagnose": False, "compare_with": ()}
 PLANT = ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque")
 ENCODER = 2.0 * math.pi / 4096.0  # rad
@@ -162,7 +164,7 @@ def of_xl330() -> Row:
     """XL330, twelve logs of BAM's, one law (M3)."""
     servo = st.load_servo("dynamixel-xl330-m288").replace({"supply.open_circuit_voltage": 7.4})
     return Row(xl330.logs(_data()), servo, {
-        "free": xl330.FREE, "priors": None, "noise": xl330.NOISE, "sensors": ["output_angle"]}, {})
+        "free": XL330, "priors": None, "noise": xl330.NOISE, "sensors": ["output_angle"]}, {})
 
 
 def of_miuzei() -> Row:

@@ -95,7 +95,8 @@ def judged(truth: rig.Truth, folder: Path, *, duration: float = 20.0, episodes: 
     kinds = ("mixed", "smooth", "steps")
     made = [recorder.record(truth, duration, kinds[k % 3], episode=k, stamps=stamps) for k in range(episodes)]
     data = recorder.write_dataset(made, truth, folder / "episodes", robot_type="of_the_rig")
-    motions = [read_motion(data, truth.robot.joints, unit="deg", episode=k) for k in range(episodes)]
+    unit = {"*": "deg", **{joint: "deg" for joint in truth.robot.joints if joint == "gripper"}}
+    motions = [read_motion(data, truth.robot.joints, unit=unit, episode=k) for k in range(episodes)]
     file = folder / f"{truth.robot.name}.xml"
     file.write_text(rig.mjcf(truth.robot), encoding="utf-8")
     began = clock.process_time()
