@@ -26,11 +26,12 @@ HALF = 0.5  # of what is known of a number
 
 
 class ArmCause(NamedTuple):
-    """What would explain more: its name, a sentence, and by how much the cost of the first stage falls."""
+    """What would explain more: its name, a sentence, by how much the cost of the first stage falls, its joints."""
 
     name: str
     sentence: str
     gain: float
+    joints: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -18,7 +18,7 @@ from servotwin.identification.arms.causes import causes_of
 from servotwin.identification.arms.dynamics import link_names, links_of, with_masses
 from servotwin.identification.arms.episodes import Episode, episodes_from, motions_of
 from servotwin.identification.arms.lanes import JointLanes
-from servotwin.identification.arms.numbers import RESISTANCE, VOLTAGE, Numbers, arm_free
+from servotwin.identification.arms.numbers import GAIN, RESISTANCE, VOLTAGE, Numbers
 from servotwin.identification.arms.plant import UNKNOWN, mounts_of, plant_of, supply_of
 from servotwin.identification.arms.rows import (
     Linear,
@@ -129,11 +129,8 @@ def identify_arm(logs: Any, robot: Any, servos: Any = None, *, bus: Supply | Non
     joints = list(mounts)
     links = links_of(plant, joints)
 
-    def make(more: Sequence[str] = ()) -> Numbers:
-        names = free
-        if more:
-            names = [*(free or arm_free(next(iter(mounts.values())).model)), *more]
-        return Numbers(mounts, link_names(plant, links), supply, each=each, free=names, zeros=zeros,
+    def make(gains: Sequence[str] = ()) -> Numbers:
+        return Numbers(mounts, link_names(plant, links), supply, each=each, free=free, zeros=zeros, gains=gains,
                        masses=max(masses, 2.0) if robot == UNKNOWN else masses)
 
     numbers = make()
@@ -146,6 +143,9 @@ def identify_arm(logs: Any, robot: Any, servos: Any = None, *, bus: Supply | Non
         x, noise, what, windows = _first_stage(what, show)
         stages = {"first": clock.process_time() - began}
         causes = _causes(what, noise, x, make) if diagnose else ()
+        if causes and causes[0].joints:  # what the wrong gain has bent is found anew with that gain searched
+            what = what._replace(numbers=make(causes[0].joints), used=[used_rows(one) for one in fitted])
+            x, noise, what, windows = _first_stage(what, show)
         stages["causes"] = clock.process_time() - began - sum(stages.values())
         x, noise, doubts = _second_stage(what, x, noise, show, intervals=intervals)
         stages["second"] = clock.process_time() - began - sum(stages.values())
@@ -340,5 +340,13 @@ def _servos(fit: ArmFit) -> dict[str, Servo]:
                                                      "upper": max(upper / factor, value)}
                 quantities[member] = Quantity(value=value, unit=servo.quantities[member].unit, origin="identified",
                                               source=f"fit to episodes of a robot; as {name}, {method}", **ends)
+        if f"gain.{joint}" in spreads:
+            lower, upper, method = spreads[f"gain.{joint}"]
+            said, value = servo.quantities[GAIN], float(servo.get(GAIN))  # type: ignore[arg-type]
+            ends = {} if math.isnan(lower) else {"lower": value * lower / fit.estimates[f"gain.{joint}"],
+                                                 "upper": value * upper / fit.estimates[f"gain.{joint}"]}
+            quantities[GAIN] = Quantity(value=value, unit=said.unit, origin="identified", source=(
+                f"fit to episodes of a robot: {fit.estimates[f'gain.{joint}']:.3g} times what its register says, "
+                f"{method}"), **ends)
         found[joint] = replace(servo, quantities=quantities)
     return found

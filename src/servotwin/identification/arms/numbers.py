@@ -19,6 +19,7 @@ from servotwin.robots import Mount
 Array = NDArray[np.float64]
 
 VOLTAGE, RESISTANCE, LATENCY = "supply.open_circuit_voltage", "supply.internal_resistance", "latency"
+GAIN = "firmware.proportional_gain"
 QUANTUM, FINER = "firmware.angle_quantum", 64.0
 ZERO_SCALE, LATENCY_SCALE, OHM_SCALE = 0.02, 0.01, 0.1  # rad, s, ohm
 _ZERO_STD = 0.05  # rad: how far a horn may sit off
@@ -26,6 +27,7 @@ _VOLTAGE_STD = 0.03
 _LEAST_STD, _ANY_STD = 0.1, 0.7  # of logarithms: of what a file says how far it may be off, and of all else
 _MOTOR, _MOTOR_STD = ("motor.armature_resistance", "output_torque_constant"), 0.15  # that sheets tell fairly
 _LATENCIES = (-0.03, 0.2)  # s
+_GAINS, GAIN_STD = math.log(10.0), 1.5  # how far a gain may be off its register's, either way, and is believed to be
 _MOST_ZERO, _MOST_OHMS, _USUAL_OHMS = 0.35, 2.0, 0.1  # rad, ohm: at most, and of wires that nobody has measured
 
 
@@ -87,10 +89,13 @@ class Numbers:
         Of the servos; what angles can tell unless given.
     zeros : bool
         Whether the joints' zeros are searched.
+    gains : sequence of str
+        Joints whose servos' proportional gain may be other than their registers say.
     """
 
     def __init__(self, mounts: Mapping[str, Mount], links: Sequence[str], bus: Supply | None, *, each: bool = False,
-                 masses: float = 0.1, free: Sequence[str] | None = None, zeros: bool = True) -> None:
+                 masses: float = 0.1, free: Sequence[str] | None = None, zeros: bool = True,
+                 gains: Sequence[str] = ()) -> None:
         self.mounts, self.joints, self.bus = dict(mounts), tuple(mounts), bus
         self.links = tuple(links)
         self.groups = self._groups(each, free)
@@ -110,6 +115,7 @@ class Numbers:
         if zeros:
             numbers += [Number(f"zero.{joint}", "rad", 0.0, -_MOST_ZERO / ZERO_SCALE, _MOST_ZERO / ZERO_SCALE,
                                _ZERO_STD / ZERO_SCALE, ZERO_SCALE, False) for joint in self.joints]
+        numbers += [Number(f"gain.{joint}", "1", 0.0, -_GAINS, _GAINS, GAIN_STD, 1.0, True) for joint in gains]
         numbers.append(Number(LATENCY, "s", 1.0, _LATENCIES[0] / LATENCY_SCALE, _LATENCIES[1] / LATENCY_SCALE, math.inf,
                               LATENCY_SCALE, False))
         self.all = tuple(numbers)
@@ -175,8 +181,11 @@ class Numbers:
         group = next(one for one in self.groups if joint in one.joints)
         servo = self.mounts[self.joints[joint]].model.servo
         columns = group.space.columns(x[None, self._at[group.name]])
-        return servo.replace({name: float(column[0]) for name, column in columns.items()},
-                             source="where a search of a fit stands")
+        values = {name: float(column[0]) for name, column in columns.items()}
+        share = self._value(x, f"gain.{self.joints[joint]}", 1.0)
+        if share != 1.0:
+            values[GAIN] = share * float(servo.get(GAIN))  # type: ignore[arg-type]
+        return servo.replace(values, source="where a search of a fit stands")
 
     def mounts_at(self, x: Array, *, fine: bool = False) -> dict[str, Mount]:
         """Return all servos at a point, as they sit at their joints; zeros are in the mounts, for servos count.
@@ -209,6 +218,10 @@ class Numbers:
             ohms = np.array([self._value(one, RESISTANCE, 0.0) for one in x])
             for one in found:
                 one |= {VOLTAGE: volts, RESISTANCE: ohms}
+        if any(name.startswith("gain.") for name in self.names):
+            for joint, mount, one in zip(self.joints, self.mounts.values(), found, strict=True):
+                said = float(mount.model.servo.get(GAIN))  # type: ignore[arg-type]
+                one[GAIN] = said * np.array([self._value(at, f"gain.{joint}", 1.0) for at in x])
         return found
 
     def value(self, k: int, x: float) -> float:
