@@ -53,7 +53,7 @@ def test_without_the_extra(cli, monkeypatch):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize(("how", "codes", "said"), [
-    (signal.SIGINT, {130}, "servotwin: interrupted\n"), (signal.SIGTERM, {143, -signal.SIGTERM}, "")])
+    (signal.SIGINT, {130}, "servotwin: interrupted\n"), (signal.SIGTERM, {143}, "servotwin: interrupted\n")])
 @pytest.mark.parametrize("busy", [False, True])
 def test_it_ends_when_it_is_told_to(child_environment, tmp_path, how, codes, said, busy):
     command = [sys.executable, "-m", "servotwin", "web", "--port", "0", "--no-open", "--json"]

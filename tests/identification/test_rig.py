@@ -75,7 +75,7 @@ def test_a_search_that_wanders_beyond_the_stops_is_no_error():
 
 
 def test_the_rig_of_a_catalog_servo_is_not_that_of_other_logs():
-    """Its author's bench had a delay of 32 ms and a zero 2.7 degrees off; a log of that very servo was off by it."""
+    """Its author's bench had a delay of 34 ms and a zero 2.8 degrees off; a log of that very servo was off by it."""
     servo, time = st.load_servo("miuzei-25kg"), np.arange(0.0, 3.0, 0.02)
     width = 1500.0 + np.repeat(np.random.default_rng(0).uniform(-300.0, 300.0, 10), 15)
     run = st.simulate(st.DigitalServo(servo), st.signals.samples(time, width, unit="us"), duration=float(time[-1]),
@@ -85,4 +85,4 @@ def test_the_rig_of_a_catalog_servo_is_not_that_of_other_logs():
     found = validate([log], servo)
     assert found.total < 1e-9
     assert not found.nuisance
-    assert servo.fit["rig"]["delay"] == pytest.approx(0.032, abs=1e-3)  # it is told beside the fit
+    assert servo.fit["rig"]["delay"] == pytest.approx(0.034, abs=1e-3)  # it is told beside the fit

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 import servotwin as st
+from servotwin.simulation.lanes.inputs import lanes_of
+from servotwin.simulation.lanes.many import simulate_lanes
 from simulation.recorded.ticks import by_c, in_mujoco, on_bus, ticked
 
 ANALOG = {
@@ -114,8 +116,8 @@ def commands(rng: np.random.Generator, lanes: int, duration: float, digital: boo
 
 def many(changes: dict[str, Any], kind: type = st.PulseServo, load: Any = PLAIN_LOAD, lanes: int = 32,
          duration: float = 0.5, seed: int = 1, more: dict[str, Any] | None = None, given: Any = None,
-         **options: Any) -> Callable[..., dict[str, np.ndarray]]:
-    """Return what runs lanes by `simulate_many`; all signals, status and how they end.
+         nearly: bool = False, **options: Any) -> Callable[..., dict[str, np.ndarray]]:
+    """Return what runs lanes by `simulate_many`, or as a fit searches; all signals, status and how they end.
 
     `more` are numbers of lanes by name, and `given` a command for all lanes.
     """
@@ -128,10 +130,13 @@ def many(changes: dict[str, Any], kind: type = st.PulseServo, load: Any = PLAIN_
         told = given if given is not None else commands(rng, lanes, duration, digital)
         numbers |= {name: np.resize(values, lanes) for name, values in (more or {}).items()}
         start = float(model.start_angle(0.0 if digital else 1.5e-3)) if kind is not st.BoundedServo else 0.6
-        batch = st.simulate_many(
-            model, told, duration=duration, load=load, parameters=numbers, seeds=np.arange(lanes) + 5,
-            output_times=duration * np.sort(rng.uniform(0.0, 1.0, 12)), outputs=model.signals_with(load),
-            initial={"output_angle": start + rng.uniform(-0.3, 0.3, lanes)}, **options, **how)
+        asked = {"duration": duration, "output_times": duration * np.sort(rng.uniform(0.0, 1.0, 12)),
+                 "outputs": model.signals_with(load), **options, **how}
+        initial = {"output_angle": start + rng.uniform(-0.3, 0.3, lanes)}
+        batch = (simulate_lanes(lanes_of(model, told, [load] * lanes, numbers, initial, np.arange(lanes) + 5), **asked,
+                                nearly=True) if nearly else
+                 st.simulate_many(model, told, load=load, parameters=numbers, seeds=np.arange(lanes) + 5,
+                                  initial=initial, **asked))
         found = {name: batch[name] for name in model.signals_with(load)}
         remarks = [(lane, sum(map(ord, kind)), time) for lane, kind, time in batch.remarks]
         return found | {"status": batch.status, "remarks": np.array(remarks).reshape(-1, 3)}
@@ -182,6 +187,7 @@ LANES = {
     "program": many({}, PROGRAMMED),
     "program, drops": many(PROGRAM | DROPS, PROGRAMMED),
     "program, diode": many(PROGRAM | DROPS | {"firmware.off_state": "diode"}, PROGRAMMED, DRY),
+    "program, pendulum, nearly": many(PROGRAM, PROGRAMMED, PENDULUM, nearly=True),
     "program, M6, heat, play": many(PROGRAM | M6 | HEAT | GAP, PROGRAMMED, lanes=24, duration=0.3),
     "elastic": many(SPRING, lanes=24, load=DRY),
     "elastic arm": many({}, load=ARM + PLAIN_LOAD, lanes=24),

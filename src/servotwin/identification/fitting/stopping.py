@@ -102,7 +102,7 @@ class Course:
         try:
             if self._noted or self.within.over:
                 raise KeyboardInterrupt
-            if now - self._looked >= _OFTEN:
+            if self._told[1] and now - self._looked >= _OFTEN:
                 self._looked = now
                 self.show(*self._told)
         except KeyboardInterrupt:
