@@ -49,7 +49,8 @@ def servo_of(name: str, servo: Servo, V_oc: float, *, registers: Servo | None = 
         MOTOR: servo.R, "motor.torque_constant": servo.K / N, "motor.back_emf_constant": servo.K / N,
         "motor.rotor_inertia": servo.J / N**2, "motor.motor_viscous_friction": servo.B / N**2,
         "friction.coulomb_torque_forward": servo.forward / N, "friction.coulomb_torque_backward": servo.backward / N,
-        **friction, "supply.bridge_drop_voltage": servo.drop, "supply.bridge_drop_resistance": None, "supply.open_circuit_voltage": V_oc,
+        **friction, "supply.bridge_drop_voltage": servo.drop, "supply.bridge_drop_resistance": None,
+        "supply.open_circuit_voltage": V_oc,
         "gear.backlash": servo.play or None, "gear.output_inertia": servo.wheel if servo.play else None,
         "firmware.control_phase": servo.phase, "firmware.duty_slew": servo.slew or None})
 
