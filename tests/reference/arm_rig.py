@@ -124,7 +124,7 @@ SO101 = Robot("so101", (
          (-0.00157495, -0.0300244, 0.0192755),
          (6.61427e-06, 1.89032e-06, 5.28738e-06, -3.19807e-07, -5.90717e-09, -1.09945e-07)),
 ), {"feetech": 6 * ("feetech-sts3215-12v",), "dynamixel": (*3 * ("dynamixel-xl430-w250",), *3 * (_SMALL,))},
-    {"feetech": 12.0, "dynamixel": 12.0})
+    {"feetech": 12.0, "dynamixel": 7.4})
 
 TWO_LINK = Robot("two_link", (
     Link("upper", "shoulder", (0.0, 0.0, 0.4), _FLAT, (-3.0, 3.0), 0.15, (0.075, 0.0, 0.0), _rod(0.15, 0.15)),

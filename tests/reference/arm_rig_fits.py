@@ -19,6 +19,7 @@ from .arm_rig_servo import DELTA, USUAL, Servo
 MOTOR = "motor.armature_resistance"
 FREE = (MOTOR, "output_torque_constant", "output_inertia", "output_coulomb_torque", "motor.motor_viscous_friction",
         "friction.load_friction")
+WRITTEN, SAMPLED = 5e-4, 2e-4  # s, by which the recorder's goals and positions come later in the mean
 _COUNTED = DELTA / math.sqrt(12.0)  # rad, rms of an angle less its count
 
 
@@ -72,7 +73,7 @@ def truths_of(truth: rig.Truth) -> dict[str, float]:
         values = (servo.R, servo.K, servo.J, servo.forward, servo.B / reduction**2, servo.load_motor)
         found |= {prefix + key: value for key, value in zip(FREE, values, strict=True)}
     found |= {"supply.open_circuit_voltage": truth.V_oc, "supply.internal_resistance": truth.R_b,
-              "latency": truth.write_after - truth.read_after}
+              "latency": truth.write_after + WRITTEN - truth.read_after - SAMPLED}
     found |= {f"mass.{link.name}": float(share) for link, share in zip(truth.robot.links, truth.masses, strict=True)}
     return found | {f"zero.{joint}": -servo.zero for joint, servo in zip(truth.robot.joints, truth.servos, strict=True)}
 
@@ -80,9 +81,9 @@ def truths_of(truth: rig.Truth) -> dict[str, float]:
 def left_by(truth: rig.Truth, episode: recorder.Episode) -> float:
     """Return the rms that the rig itself leaves of an episode: counts, and a clock that is the stamps' [rad]."""
     start = -recorder.SETTLING
-    written = np.append(start, episode.time + truth.write_after + 5e-4)
+    written = np.append(start, episode.time + truth.write_after + WRITTEN)
     again = rig.simulated(truth, written, np.vstack([episode.action[:1], episode.action]),
-                          episode.time + truth.read_after + 2e-4, start=start, pushes=episode.pushes)
+                          episode.time + truth.read_after + SAMPLED, start=start, pushes=episode.pushes)
     off = again.angle + np.array([servo.zero for servo in truth.servos]) - episode.state
     return float(math.hypot(np.sqrt(np.mean(off**2)), _COUNTED))
 

@@ -16,6 +16,7 @@ from servotwin.models import Model
 from servotwin.parameters.groups import Supply
 from servotwin.robots.mount import Joint
 from servotwin.robots.told import told
+from servotwin.robots.unlike import OF_THE_BUS, differing, of_one_form
 from servotwin.simulation import VectorSimulator
 from servotwin.simulation.compile.joints_layout import BOOKS, GROUP, INSTANCE, RECORD, ROOM
 from servotwin.simulation.lanes.c_entry import CEntry
@@ -105,19 +106,11 @@ def _sharing(joints: Sequence[Joint], buses: list[tuple[Supply, list[int]]]) -> 
             raise InputError(f"servo of joint {joints[k].name} on a bus", got=type(model).__name__,
                              allowed=f"{type(first).__name__}, as joint {joints[which[0]].name}: servos on shared "
                              "supplies are of one kind")
-    parameters: dict[str, Any] = {}
-    for name in (*first.requires, *first.optional):
-        values = [model.servo.get(name) for model in models]
-        if all(value == values[0] for value in values) or name.startswith("supply."):
-            continue
-        if any(value is None or not isinstance(value, int | float | str) for value in values):
-            absent = next(joints[k].name for k, value in zip(which, values, strict=True)
-                          if value is None or not isinstance(value, int | float | str))
-            raise InputError(f"{name} of servos on a bus", got=f"none at joint {absent}",
-                             allowed="a number of each servo, or of none: give it in its file")
-        parameters[name] = values
+    alike = of_one_form(models)
+    parameters = {name: values for name, values in differing(alike, [joints[k].name for k in which]).items()
+                  if name not in OF_THE_BUS}
     places = {k: n for n, k in enumerate(which)}
-    return Crew(first, np.array(which), parameters, [(supply, [places[k] for k in own]) for supply, own in buses])
+    return Crew(alike[0], np.array(which), parameters, [(supply, [places[k] for k in own]) for supply, own in buses])
 
 
 class Berth:

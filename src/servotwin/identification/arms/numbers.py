@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from servotwin.identification.fitting.free import Space
 from servotwin.models import Model
 from servotwin.parameters import Servo, Supply
 from servotwin.robots import Mount
+from servotwin.robots.unlike import differing, of_one_form
 
 Array = NDArray[np.float64]
 
@@ -96,7 +97,10 @@ class Numbers:
     def __init__(self, mounts: Mapping[str, Mount], links: Sequence[str], bus: Supply | None, *, each: bool = False,
                  masses: float = 0.1, free: Sequence[str] | None = None, zeros: bool = True,
                  gains: Sequence[str] = ()) -> None:
-        self.mounts, self.joints, self.bus = dict(mounts), tuple(mounts), bus
+        alike = of_one_form([mount.model for mount in mounts.values()])
+        self.mounts = {joint: Mount(model, mount.zero, mount.direction, mount.ratio)
+                       for (joint, mount), model in zip(mounts.items(), alike, strict=True)}
+        self.joints, self.bus = tuple(mounts), bus
         self.links = tuple(links)
         self.groups = self._groups(each, free)
         numbers: list[Number] = []
@@ -219,9 +223,9 @@ class Numbers:
             for one in found:
                 one |= {VOLTAGE: volts, RESISTANCE: ohms}
         if any(name.startswith("gain.") for name in self.names):
-            for joint, mount, one in zip(self.joints, self.mounts.values(), found, strict=True):
+            for name, mount, own in zip(self.joints, self.mounts.values(), found, strict=True):
                 said = float(mount.model.servo.get(GAIN))  # type: ignore[arg-type]
-                one[GAIN] = said * np.array([self._value(at, f"gain.{joint}", 1.0) for at in x])
+                own[GAIN] = said * np.array([self._value(at, f"gain.{name}", 1.0) for at in x])
         return found
 
     def value(self, k: int, x: float) -> float:
@@ -237,7 +241,7 @@ def arm_free(model: Model) -> list[str]:
 
 
 def model_columns(models: Sequence[Model], columns: Sequence[Mapping[str, Array]], copies: int, *,
-                  fine: bool = False) -> dict[str, Array]:
+                  fine: bool = False) -> dict[str, Any]:
     """Return parameters of lanes, copies by joints: what is searched, and what differs among the joints' servos.
 
     Parameters
@@ -250,16 +254,14 @@ def model_columns(models: Sequence[Model], columns: Sequence[Mapping[str, Array]
     fine : bool
         With counts so fine that derivatives do not show them.
     """
-    first, made = models[0], {}
-    for name in (*first.requires, *first.optional):
-        if name in columns[0]:
-            made[name] = np.stack([one[name] for one in columns], axis=1).ravel()
-            continue
-        values = [model.servo.get(name) for model in models]
-        if fine and name == QUANTUM and all(isinstance(value, float) for value in values):
-            made[name] = np.tile(np.array(values, dtype=np.float64) / FINER, copies)
-            continue
-        if all(value == values[0] for value in values) or not all(isinstance(v, int | float) for v in values):
-            continue
-        made[name] = np.tile(np.array(values, dtype=np.float64), copies)
+    joints = [f"{k + 1}" for k in range(len(models))]
+    searched = list(dict.fromkeys(name for one in columns for name in one))
+    unlike = differing(models, joints)
+    made: dict[str, Any] = {name: np.tile(np.array(unlike[name]), copies) for name in unlike if name not in searched}
+    for name in searched:
+        said = [np.full(copies, model.value_or(name, 0.0)) for model in models]
+        made[name] = np.stack([one.get(name, said[k]) for k, one in enumerate(columns)], axis=1).ravel()
+    counts = [model.value_or(QUANTUM, 0.0) for model in models]
+    if fine and all(count > 0.0 for count in counts):
+        made[QUANTUM] = np.tile(np.array(counts) / FINER, copies)
     return made
