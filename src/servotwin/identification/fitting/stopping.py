@@ -74,7 +74,7 @@ class Course:
         self.budget: float | None = None  # of the trials, once they begin, in the work of the search
         self.stopped = False
         self._noted = False
-        self._told = (0.0, "")
+        self._told, self._begun = (0.0, ""), False
         self._looked = -math.inf
 
     def __call__(self, share: float, text: str) -> None:
@@ -85,7 +85,7 @@ class Course:
         KeyboardInterrupt
         """
         known = self._share(share)
-        self._told = (known if self.budget is not None else max(known, self._told[0]), text)
+        self._told, self._begun = (known if self.budget is not None else max(known, self._told[0]), text), True
         self._looked = -math.inf
         self.look()
 
@@ -102,7 +102,7 @@ class Course:
         try:
             if self._noted or self.within.over:
                 raise KeyboardInterrupt
-            if self._told[1] and now - self._looked >= _OFTEN:
+            if self._begun and now - self._looked >= _OFTEN:
                 self._looked = now
                 self.show(*self._told)
         except KeyboardInterrupt:
