@@ -25,7 +25,9 @@ _SOON = 10  # samples after an event, by which it is judged
 _ROUNDS, _TIMES = 3, 4  # of choosing and searching, and of choosing in each
 _LOOKED = 200  # places of a log that are tried at once: those after which most is left
 _PAYS = 8.0  # in units of noise: what one of some hundred places has to gain (their logarithm, twice)
+_LEFT = 0.25  # of what is left in a log, where that is more than noise: a model that lacks something takes any event
 _MOST_LEFT = 0.5  # of the error
+_NORMAL = 1.4826  # standard deviation over median magnitude of a normal law
 
 
 @dataclass(frozen=True)
@@ -136,7 +138,8 @@ def _chosen(bench: TrialBench, point: Point, k: int, kind: _Kind, already: list[
     (here,) = bench.copies(k, [replace(kind.put(log, already), name=f"{log.name} as it is")], point)
     if not np.isfinite(here).all():
         return already
-    most = {place: _worth(bench, here, np.zeros(len(here)), int(np.searchsorted(used, abs(place))))
+    scale = max(bench.noise, _LEFT * _NORMAL * float(np.median(np.abs(here))))
+    most = {place: _worth(bench, scale, here, np.zeros(len(here)), int(np.searchsorted(used, abs(place))))
             for place in kind.places(log) if abs(place) not in known}  # that there is to gain
     dearest = sorted(most, key=lambda place: -most[place])[:_LOOKED]
     every = [place for place in most if most[place] > _PAYS and place in dearest]
@@ -148,7 +151,7 @@ def _chosen(bench: TrialBench, point: Point, k: int, kind: _Kind, already: list[
     parts = bench.copies(k, copies, point)
     if not all(np.isfinite(part).all() for part in parts):
         return already
-    worth = [_worth(bench, here, part, int(np.searchsorted(used, abs(place))))
+    worth = [_worth(bench, scale, here, part, int(np.searchsorted(used, abs(place))))
              for part, place in zip(parts, [*every, *already], strict=True)]
     chosen = [place for place, gained in zip(already, worth[len(every):], strict=True) if gained < -_PAYS]
     for i in np.argsort(worth[:len(every)])[::-1]:
@@ -158,9 +161,9 @@ def _chosen(bench: TrialBench, point: Point, k: int, kind: _Kind, already: list[
     return sorted(chosen)
 
 
-def _worth(bench: TrialBench, before: Array, after: Array, first: int) -> float:
+def _worth(bench: TrialBench, scale: float, before: Array, after: Array, first: int) -> float:
     """Return by how much an event lowers the cost of the samples soon after it: later ones may be of others."""
     soon = slice(first, first + _SOON)
     teaches = teaching(np.arange(len(before), dtype=np.float64), alternate=True)[soon]
-    costs = [bench.task.loss.cost(r[soon][teaches] / bench.noise) for r in (before, after)]
+    costs = [bench.task.loss.cost(r[soon][teaches] / scale) for r in (before, after)]
     return costs[0] - costs[1]
