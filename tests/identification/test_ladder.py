@@ -89,7 +89,7 @@ def test_the_criterion_chooses_the_same_here():
         ladder = friction_ladder(logs(servo, count=6), TRUTH, free=FREE, rungs=rungs, select="criterion", holdout=0,
                                  **PLAIN)
         assert ladder.chosen == expected
-        assert ladder.reason == "smallest information criterion"
+        assert ladder.reason.startswith("smallest information criterion")
         assert all(math.isnan(rung.holdout) for rung in ladder.rungs)
 
 
