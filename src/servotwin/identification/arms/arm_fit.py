@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.errors import InputError
 from servotwin.identification.arms.numbers import Numbers
 from servotwin.identification.arms.windows import LeftOut
+from servotwin.identification.fitting.checks import checked_level
 from servotwin.identification.fitting.fit import Interval
 from servotwin.identification.fitting.uncertainty import Uncertainty
 from servotwin.identification.fitting.words import Unidentifiable
@@ -117,9 +117,7 @@ class ArmFit:
         InputError
             If the level is not between 0 and 1.
         """
-        wanted = self.level if level is None else level
-        if not 0.0 < wanted < 1.0:
-            raise InputError("level", got=level, allowed="a number between 0 and 1, such as 0.95")
+        wanted = self.level if level is None else checked_level(level)
         return {name: self._interval(k, name, wanted) for k, name in enumerate(self.names)}
 
     def _interval(self, k: int, name: str, level: float) -> Interval:

@@ -82,7 +82,7 @@ def _odd_gains(search: ArmSearch, make: Callable[[Sequence[str]], Numbers]) -> d
     own = make(list(known.joints))
     points = np.repeat(own.start[None], len(_GAINS), axis=0)
     points[:, [own.names.index(f"gain.{joint}") for joint in known.joints]] += np.log(_GAINS)[:, None]
-    lanes = JointLanes(search.simulated.plant, own, search.simulated.links)  # type: ignore[attr-defined]
+    lanes = JointLanes(search.simulated.plant, own, search.simulated.links)
     off = _off(ArmSearch(lanes, search.episodes, search.used, search.noise, search.loss,
                          Prior(own.start, own.weight), np.zeros(len(own), np.bool_)), points)
     best = np.argmin(off, axis=0)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.identification.arms.copies import Copies
 from servotwin.identification.arms.dynamics import Asked, asked_of
 from servotwin.identification.arms.episodes import Episode
 from servotwin.identification.arms.numbers import Numbers, model_columns
@@ -23,26 +24,18 @@ _PARTS = 2  # of a sample: over each of them the torque stays
 _NUDGE, _NEAR = 0.01, 0.05  # rad
 
 
-class JointLanes:
-    """Lanes of the joints of a robot.
-
-    Parameters
-    ----------
-    plant : MjModel
-    numbers : Numbers
-    links : sequence of int
-        Bodies whose masses are searched.
-    """
+class JointLanes(Copies):
+    """Lanes of the joints of a robot; parameters as of `Copies`."""
 
     def __init__(self, plant: Any, numbers: Numbers, links: Sequence[int]) -> None:
-        self.plant, self.numbers, self.links = plant, numbers, list(links)
+        super().__init__(plant, numbers, links)
         self.models = [mount.model for mount in numbers.mounts.values()]
         self._gain = np.array([mount.gain for mount in numbers.mounts.values()])
         self._zero = np.array([mount.zero for mount in numbers.mounts.values()])
         self._known: dict[tuple[int, ...], tuple[Array, Asked, list[Array]]] = {}
 
     def angles(self, episode: Episode, points: Array, *, fine: bool = False) -> Array:
-        """Return where the joints are at the stamps of an episode, shape (copies, n, joints); nan of a failed lane."""
+        """Return where the joints are, shape (copies, n, joints) [rad]; nan of a failed lane."""
         copies, joints = len(points), len(self.models)
         time = episode.time
         grid = np.interp(np.arange(_PARTS * (len(time) - 1) + 1) / _PARTS, np.arange(len(time)), time)

@@ -10,13 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.identification.arms.copies import Copies
 from servotwin.identification.arms.episodes import Episode
-from servotwin.identification.arms.numbers import LATENCY, Numbers
+from servotwin.identification.arms.numbers import LATENCY
 from servotwin.identification.fitting.point import LogPart
 
 Array = NDArray[np.float64]
@@ -29,16 +30,6 @@ _FAST = 0.3  # rad/s
 _SURE = 2.0  # times its noise, of a derivative's power: nothing below
 _MOST_OFF = 0.02  # s
 _COARSE, _COUNTED = 0.01, 0.05  # rad, of a count
-
-
-class Simulated(Protocol):
-    """What simulates the joints of an episode at several points."""
-
-    numbers: Numbers
-
-    def angles(self, episode: Episode, points: Array, *, fine: bool = False) -> Array:
-        """Return angles, shape (copies, n, joints); `fine` without the counts of the servos."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +88,7 @@ def whitened(values: Array, episode: Episode, noise: Noise, used: Mask) -> Array
     return np.asarray((flat - share[:, None, None] * u[..., None] * along[:, None, :]).reshape(values.shape))
 
 
-def residuals(simulated: Simulated, episode: Episode, points: Array) -> Array:
+def residuals(simulated: Copies, episode: Episode, points: Array) -> Array:
     """Return simulated less measured angles at several points, shape (copies, n, joints)."""
     return simulated.angles(episode, points) - episode.measured
 
@@ -120,7 +111,7 @@ class Linear(NamedTuple):
     scatter: Array
 
 
-def linear_at(simulated: Simulated, episode: Episode, x: Array, held: Mask, *, central: bool = False) -> Linear:
+def linear_at(simulated: Copies, episode: Episode, x: Array, held: Mask, *, central: bool = False) -> Linear:
     """Return residuals at a point and their derivatives by differences, one way or central."""
     numbers = simulated.numbers
     moved = [k for k in range(len(x)) if not held[k] and numbers.names[k] != LATENCY]

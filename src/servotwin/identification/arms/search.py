@@ -8,8 +8,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.identification.arms.copies import Copies
 from servotwin.identification.arms.episodes import Episode
-from servotwin.identification.arms.rows import Linear, Mask, Noise, Simulated, linear_at, parts_of, residuals
+from servotwin.identification.arms.rows import Linear, Mask, Noise, linear_at, parts_of, residuals
 from servotwin.identification.fitting.arrow import Loss, Prior, block
 
 Array = NDArray[np.float64]
@@ -25,7 +26,7 @@ class ArmSearch:
 
     Parameters
     ----------
-    simulated : Simulated
+    simulated : Copies
     episodes : sequence of Episode
     used : sequence of ndarray of bool
         Which samples of each count.
@@ -36,7 +37,7 @@ class ArmSearch:
         Numbers that stay.
     """
 
-    def __init__(self, simulated: Simulated, episodes: Sequence[Episode], used: Sequence[Mask], noise: Noise,
+    def __init__(self, simulated: Copies, episodes: Sequence[Episode], used: Sequence[Mask], noise: Noise,
                  loss: Loss, prior: Prior, held: Mask) -> None:
         self.simulated, self.episodes, self.used = simulated, list(episodes), list(used)
         self.noise, self.loss, self.prior, self.held = noise, loss, prior, held

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.identification.arms.copies import Copies
 from servotwin.identification.arms.dynamics import with_masses
 from servotwin.identification.arms.episodes import Episode
-from servotwin.identification.arms.numbers import Numbers
 from servotwin.robots import ServoDrive
 from servotwin.robots.coupling import couple
 from servotwin.robots.places import load_mujoco
@@ -19,22 +16,11 @@ Array = NDArray[np.float64]
 _SETTLE = 0.5  # s, at the first goals
 
 
-class WholeArm:
-    """A robot with its servos.
-
-    Parameters
-    ----------
-    plant : MjModel
-    numbers : Numbers
-    links : sequence of int
-        Bodies whose masses are searched.
-    """
-
-    def __init__(self, plant: Any, numbers: Numbers, links: Sequence[int]) -> None:
-        self.plant, self.numbers, self.links = plant, numbers, list(links)
+class WholeArm(Copies):
+    """A robot with its servos, driven by goals."""
 
     def angles(self, episode: Episode, points: Array, *, fine: bool = False) -> Array:
-        """Return where the joints are at the stamps of an episode, shape (copies, n, joints)."""
+        """Return where the joints are, shape (copies, n, joints) [rad]."""
         return np.stack([self._one(episode, x, fine=fine) for x in points])
 
     def _one(self, episode: Episode, x: Array, *, fine: bool) -> Array:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
+from servotwin.identification.fitting.checks import checked_level
 from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.holdout import ErrorTable, LogError, log_error
 from servotwin.identification.fitting.words import Unidentifiable
@@ -230,9 +231,7 @@ class Fit:
         InputError
             If the level is not between 0 and 1.
         """
-        wanted = self.level if level is None else level
-        if not 0.0 < wanted < 1.0:
-            raise InputError("level", got=level, allowed="a number between 0 and 1, such as 0.95")
+        wanted = self.level if level is None else checked_level(level)
         return {name: self._interval(k, name, wanted) for k, name in enumerate(self.names)}
 
     def __str__(self) -> str:

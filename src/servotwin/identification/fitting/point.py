@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -72,3 +73,10 @@ class LogPart(NamedTuple):
     shared: Array
     own: Array
     later: Array = np.zeros(0)
+
+
+def joined(parts: Sequence[LogPart]) -> Array:
+    """Return the derivatives of some logs in one matrix, by shared numbers and those of each log."""
+    from scipy.linalg import block_diag
+
+    return np.column_stack([np.concatenate([part.shared for part in parts]), block_diag(*(part.own for part in parts))])

@@ -14,7 +14,7 @@ from servotwin.identification.fitting.arrow import Search
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.phases import settled
-from servotwin.identification.fitting.point import LogPart, Point
+from servotwin.identification.fitting.point import LogPart, Point, joined
 from servotwin.identification.fitting.scatter import by_sensor
 from servotwin.identification.fitting.task import Task
 from servotwin.logs.log import ANGLES, Log
@@ -309,13 +309,6 @@ class TrialBench:
         if not hasattr(self, "_J"):
             self._J = joined(self.base.forecast.at(self.base.point))
         return self._J
-
-
-def joined(parts: Sequence[LogPart]) -> Array:
-    """Return the derivatives of some logs in one matrix, by shared numbers and those of each log."""
-    from scipy.linalg import block_diag
-
-    return np.column_stack([np.concatenate([part.shared for part in parts]), block_diag(*(part.own for part in parts))])
 
 
 def _finer(forecast: Watched, point: Point) -> bool:

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.diagnosis.bench import Told, TrialBench, Watched, gain, joined
+from servotwin.identification.fitting.diagnosis.bench import Told, TrialBench, Watched, gain
 from servotwin.identification.fitting.free import Space, nominal
-from servotwin.identification.fitting.point import Point
+from servotwin.identification.fitting.point import Point, joined
 
 Array = NDArray[np.float64]
 

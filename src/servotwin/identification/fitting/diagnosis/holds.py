@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import ServotwinError
-from servotwin.identification.fitting.diagnosis.bench import Setting, TrialBench, joined
+from servotwin.identification.fitting.diagnosis.bench import Setting, TrialBench
 from servotwin.identification.fitting.diagnosis.candidates import TABLE, possible
+from servotwin.identification.fitting.point import joined
 
 Array = NDArray[np.float64]
 
