@@ -99,6 +99,11 @@ def test_a_wrong_gain_is_named_first():
     found = fitted([recorded(7, 8.0, gain=0.5)], intervals=False)
     assert found.causes[0].name == "proportional gain"
     assert "8 in the place of 16" in found.causes[0].sentence
+    assert set(found.causes[0].joints) == set(JOINTS)
+    for joint in JOINTS:  # and the fit goes on with it
+        gain = found.servos[joint].get("firmware.proportional_gain")
+        assert gain == pytest.approx(0.5 * SERVO.get("firmware.proportional_gain"), rel=0.15)
+    assert found.training.rms() < 0.3 * found.before.rms()
 
 
 def test_what_a_hand_did_is_left_out():

@@ -46,6 +46,17 @@ def test_pulses_are_sought_where_a_log_leaves_them_open(step, unknown):
     assert has_unknown_phase(exact(step, name="one"), st.PulseServo(SERVO)) is unknown
 
 
+@pytest.mark.parametrize("offset", [0.05, -0.4])
+def test_an_offset_is_found_where_pulses_are_too(offset):
+    """Of two logs whose pulses come at other times: the second one begins three samples later."""
+    log = exact()
+    moved = [st.Log(name=f"{first}", time=log.time[first:], command=log.command[first:], command_kind="pulse_width",
+                    measured={"output_angle": log.measured["output_angle"][first:] + offset}) for first in (0, 3)]
+    found = validate(moved, SERVO, nuisance=("angle_offset",))
+    assert found.nuisance["angle_offset"] == pytest.approx(offset, abs=1e-5)
+    assert found.total < 1e-5
+
+
 @pytest.mark.parametrize("delay", [0.0, 0.035, 0.1])
 def test_delay_and_offset_are_found_from_anywhere(delay):
     log = late(exact(0.02), delay, 0.05, 1e-3)

@@ -12,11 +12,9 @@ from servotwin.identification.fitting.arrow import Loss, Prior
 from servotwin.identification.fitting.first_offset import first_offset
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.frames import changes, gaps, has_pulses
-from servotwin.identification.fitting.phases import settled
 from servotwin.identification.fitting.point import DELAY_SCALE, OFFSET_SCALE, SHARED, Point
-from servotwin.identification.fitting.scatter import by_sensor
 from servotwin.identification.fitting.task import HUBER, Task
-from servotwin.logs.log import ANGLES, Log
+from servotwin.logs.log import Log
 from servotwin.models import Model
 
 Array = NDArray[np.float64]
@@ -73,7 +71,7 @@ def with_known(forecast: Forecast, known: Mapping[str, float]) -> Point:
 
 
 def fitted_rig(forecast: Forecast, start: Point, asked: Sequence[str], show: Callable[[float, str], None]) -> Point:
-    """Return the point of the servo with the rig that the logs say.
+    """Return the point of the servo with the rig that the logs say, pulses coming alike for all of them.
 
     Parameters
     ----------
@@ -90,8 +88,6 @@ def fitted_rig(forecast: Forecast, start: Point, asked: Sequence[str], show: Cal
     task.asked = tuple(asked)
     task.lower, task.upper = np.minimum(task.lower, start.shared), np.maximum(task.upper, start.shared)
     found = _searched(task, start, show)
-    if forecast.phased:
-        found = _with_pulses(task, found, show)
     return found if "initial_state" in asked else _as_measured(forecast, found, start)
 
 
@@ -106,7 +102,7 @@ def _searched(task: RigTask, there: Point, show: Callable[[float, str], None]) -
     task.forecast.own_phases = "delay" not in task.forecast.extra
     found = _likely(task, there)
     for k in range(_ROUNDS):
-        show(k / (2.0 * _ROUNDS), "fitting " + ", ".join(task.asked))
+        show(k / _ROUNDS, "fitting " + ", ".join(task.asked))
         task.measure(found)
         found = task._search(task.fitted).run(found, most=_MOST).point
     return found
@@ -128,22 +124,6 @@ def _likely(task: RigTask, there: Point) -> Point:
     return tried[int(np.argmin([one if math.isfinite(one) else math.inf for one in sizes]))]
 
 
-def _with_pulses(task: RigTask, found: Point, show: Callable[[float, str], None]) -> Point:
-    """Return the point with each log's own pulses, where that is nearer."""
-    task.forecast.own_phases = True
-    best, least = found, _size(task, found)
-    for k in range(_ROUNDS):
-        show(0.5 + k / (2.0 * _ROUNDS), "pulses")
-        before = [task.forecast.frames_of(found, i) for i in task.fitted]
-        task.measure(found)
-        found = task._search(task.fitted).run(settled(task.scan(found), task.fitted), most=_MOST).point
-        size = _size(task, found)
-        best, least = (found, size) if size < least else (best, least)
-        if [task.forecast.frames_of(found, i) for i in task.fitted] == before:
-            break
-    return best
-
-
 def _as_measured(forecast: Forecast, point: Point, start: Point) -> Point:
     """Return a point whose logs begin where they were measured, though they keep their own delays and pulses."""
     own = []
@@ -151,13 +131,3 @@ def _as_measured(forecast: Forecast, point: Point, start: Point) -> Point:
         keeps = [name in ("log_delay", "frame_phase") for name in forecast.names_of_own(case)]
         own.append(np.where(keeps, found, first))
     return point._replace(own=tuple(own))
-
-
-def _size(task: Task, point: Point) -> float:
-    """Return the rms error of the angle over all logs (SI); inf where a simulation failed."""
-    forecast, every = task.forecast, []
-    for k, part in enumerate(forecast.at(point, derivatives=False)):
-        residuals = by_sensor(forecast, k, part)
-        every.append(residuals[next(name for name in ANGLES if name in residuals)])
-    size = float(np.sqrt(np.mean(np.concatenate(every) ** 2)))
-    return size if math.isfinite(size) else math.inf
