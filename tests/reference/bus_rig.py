@@ -1,6 +1,7 @@
 """Logs of bus servos by the independent reference, whose register for P is not what the logs say.
 
 Nothing of the package moves anything here; a log's goals are those of a loop of 50 Hz, its encoder has 1 mrad of noise.
+A loop of 30 Hz is one like that of LeRobot: turns are late, and stamps are the number of the turn over 30.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import servotwin as st
 
 from .digital import run
 
-SAMPLE = 0.02  # s
+SAMPLE, PERIOD = 0.02, 1.0 / 30.0  # s
 MOTIONS = ("steps", "prbs", "triangle", "small steps")
 FREE = ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque",
         "motor.motor_viscous_friction")
@@ -46,12 +47,21 @@ def file_of(servo: dict[str, dict[str, Any]], seed: int) -> st.Servo:
     return st.servo_from_values("bus rig", changed)
 
 
-def logs(servo: dict[str, dict[str, Any]], seed: int, factors: tuple[float, ...] = (1.0,) * 4) -> list[st.Log]:
-    """Return a log of each motion, in which P is larger by a factor than the file says."""
+def logs(servo: dict[str, dict[str, Any]], seed: int, factors: tuple[float, ...] = (1.0,) * 4, *,
+         waking: float = 0.0) -> list[st.Log]:
+    """Return a log of each motion, in which P is larger by a factor than the file says.
+
+    With `waking` [s] it is one of a loop of 30 Hz, 10 s long, whose turns are too long by so much in the mean.
+    """
     found = []
     for k, (motion, factor) in enumerate(zip(MOTIONS, factors, strict=True)):
         rng = np.random.default_rng([seed, 13, k])
         time = SAMPLE * np.arange(round(rng.uniform(2.0, 3.0) / SAMPLE) + 1)
+        stamps = time
+        if waking:
+            stamps = PERIOD * np.arange(300)
+            long = (rng.random(300) < 0.005) * rng.uniform(5e-3, 25e-3, 300)
+            time = stamps + np.append(0.0, np.cumsum(rng.exponential(waking, 300) + long)[:-1])
         goals = _goals(motion, time, rng)
         there = {**servo, "firmware": {**servo["firmware"], "proportional_gain":
                                        factor * servo["firmware"]["proportional_gain"]}}
@@ -60,7 +70,7 @@ def logs(servo: dict[str, dict[str, Any]], seed: int, factors: tuple[float, ...]
         said = run(there, {"kind": "goal", "pieces": pieces}, {"inertia": 4e-3, "torque": 0.25}, float(time[-1]), time,
                    initial_angle=float(goals[0]))
         noise = 1e-3 * rng.standard_normal(len(time))
-        found.append(st.Log(name=f"{k + 1} {motion}", motion=motion, time=time, command=goals, command_kind="angle",
+        found.append(st.Log(name=f"{k + 1} {motion}", motion=motion, time=stamps, command=goals, command_kind="angle",
                             measured={"output_angle": said.output_angle + noise},
                             load=st.loads.Inertia(4e-3) + st.loads.Constant(0.25)))
     return found

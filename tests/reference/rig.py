@@ -307,9 +307,9 @@ def frames(commands: Array, arrivals: Array, first: float, last: float, *, phase
 
 def record(
     servo: Servo, load: Load, command: Array, *, sample: float = SAMPLE, noise: float = 1e-3, ar: float = 0.0,
-    counts: float | None = None, stamp_jitter: float = 0.0, loop_jitter: float = 0.0, clock: float = 0.0,
-    phase: float = 0.0, period: float = 0.02, delay: float = 0.0, angle_offset: float = 0.0, lost: float = 0.0,
-    before: float = BEFORE, seed: int = 0,
+    counts: float | None = None, stamp_jitter: float = 0.0, loop_jitter: float = 0.0, waking: float = 0.0,
+    clock: float = 0.0, phase: float = 0.0, period: float = 0.02, delay: float = 0.0, angle_offset: float = 0.0,
+    lost: float = 0.0, before: float = BEFORE, seed: int = 0,
 ) -> Recording:
     """Return what a loop writes down that sets a pulse width and reads the encoder every `sample` seconds.
 
@@ -327,6 +327,8 @@ def record(
         Of the stamps alone, rms [s]; they stay in order.
     loop_jitter : float
         By how much a turn of the loop begins late or early, rms [s]; stamps say so.
+    waking : float
+        By how much each turn is longer than `sample` in the mean, and one of 200 by 5 to 25 ms [s]; stamps say so.
     clock : float
         The log's clock runs faster than the generator's by this share.
     phase : float
@@ -346,6 +348,9 @@ def record(
     turns = sample * np.arange(len(command))
     if loop_jitter:
         turns = turns + np.clip(loop_jitter * rng.standard_normal(len(turns)), -0.4 * sample, 0.4 * sample)
+    if waking:
+        long = (rng.random(len(turns)) < 0.005) * rng.uniform(5e-3, 25e-3, len(turns))
+        turns = turns + np.append(0.0, np.cumsum(rng.exponential(waking, len(turns)) + long)[:-1])
     arrivals = turns + delay
     start = turns[0] - before
     edges, widths = frames(command, arrivals, start if before else arrivals[0] + phase - _SAME, turns[-1] + sample,

@@ -84,7 +84,7 @@ def motion(kind: str, duration: float, rng: np.random.Generator, sample: float =
 
 
 def runs(truth: Truth, taking: Callable[[np.random.Generator], Taking], *, duration: float | None = None,
-         motions: tuple[str, ...] = MOTIONS) -> list[Run]:
+         motions: tuple[str, ...] = MOTIONS, sample: float = SAMPLE) -> list[Run]:
     """Return a log of each motion, taken as a condition says, which is asked anew for each.
 
     A clock is one of the bench's parts and runs alike in all its logs.
@@ -92,8 +92,8 @@ def runs(truth: Truth, taking: Callable[[np.random.Generator], Taking], *, durat
     found = []
     for k, kind in enumerate(motions):
         rng = np.random.default_rng([truth.seed, 2, k])
-        widths = motion(kind, rng.uniform(2.0, 4.0) if duration is None else duration, rng)
-        told = {"delay": truth.delay, "angle_offset": truth.angle_offset, **taking(rng)}
+        widths = motion(kind, rng.uniform(2.0, 4.0) if duration is None else duration, rng, sample)
+        told = {"delay": truth.delay, "angle_offset": truth.angle_offset, "sample": sample, **taking(rng)}
         if "clock" in told:
             told["clock"] *= truth.crystal
         step = told.pop("rounds", 0.0)  # s: what is sent is a multiple of it, and the log says what was asked for

@@ -13,7 +13,7 @@ import servotwin as st
 
 from . import bus_rig
 from . import rig_draws as draws
-from .rig_defects import with_defect
+from .rig_defects import WAKING, between, with_defect
 from .rig_logs import log_of, servo_of
 
 FREE = ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque",
@@ -28,6 +28,7 @@ RIGHT = {  # names of causes that are right for a defect
     "falling supply": ("supply that changes",), "dropping supply": ("supply that changes",),
     "warming": ("warming", "supply that changes"), "rounded commands": ("rounded commands",),
     "wrong P register": ("P register",), "mixed P register": ("P register",),
+    "counted stamps": ("stamps", "frame period"), "counted stamps of a bus servo": ("stamps",),
 }
 SAID = {  # what names a defect in the sentence or the warnings, before anything is tried
     "reversed sign": "turns against the command", "wrapped angle": "wrap", "outliers 5 %": "lie far off alone",
@@ -36,7 +37,8 @@ SAID = {  # what names a defect in the sentence or the warnings, before anything
 
 
 OF_BUS = {  # defects of a bus servo: by which factors P is larger than its file says, log by log
-    "wrong P register": lambda factor: (factor,) * 4, "mixed P register": lambda factor: (1.0, factor, 1.0, factor)}
+    "wrong P register": lambda factor: (factor,) * 4, "mixed P register": lambda factor: (1.0, factor, 1.0, factor),
+    "counted stamps of a bus servo": lambda factor: (1.0,) * 4}
 
 
 class Judged(NamedTuple):
@@ -104,7 +106,8 @@ def seen(name: str, strength: float, seed: int, **more: Any) -> Seen:
     if name in OF_BUS:
         factor = (1.2 * 2.5 ** strength) ** (1.0 if seed % 2 else -1.0)
         servo = bus_rig.truth(seed)
-        logs, file = bus_rig.logs(servo, seed, OF_BUS[name](factor)), bus_rig.file_of(servo, seed)
+        late = {"waking": between(*WAKING, strength)} if name.startswith("counted stamps") else {}
+        logs, file = bus_rig.logs(servo, seed, OF_BUS[name](factor), **late), bus_rig.file_of(servo, seed)
         began = clock.process_time()
         fit = st.identify(logs, file, st.DigitalServo,
                           **{"free": bus_rig.FREE, "priors": None, "compare_with": (), **more})

@@ -9,6 +9,7 @@ import numpy as np
 
 from servotwin.identification.fitting.arrow import Prior
 from servotwin.identification.fitting.diagnosis import diagnose
+from servotwin.identification.fitting.diagnosis.counted import counted_stamps
 from servotwin.identification.fitting.fit import Fit, Trace
 from servotwin.identification.fitting.noise import SensorSeries, noise_of
 from servotwin.identification.fitting.point import Point
@@ -55,6 +56,8 @@ def with_verdict(task: Task, point: Point, fit: Fit, course: Course, *, trials: 
             found = diagnose(task, point, fit.traces, verdict, sensor, _EFFORT * effort, _half_widths(fit),
                              lambda share, text: course(0.96 + 0.04 * share, text))
             causes, verdict = (*causes, *found.causes), replace(verdict, moved=found.moved)
+            if not causes and not verdict.holds and (counted := counted_stamps(fitted, sensor, verdict.noise[sensor])):
+                causes = (counted,)
     except KeyboardInterrupt:
         trials, fit = False, replace(fit, warnings=("stopped: not all causes were tried", *fit.warnings))
     if verdict.undecided and any(cause.name != "outliers" for cause in causes):
