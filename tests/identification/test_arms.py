@@ -11,7 +11,10 @@ from robots.robots_cases import links
 from servotwin.errors import InputError
 from servotwin.identification.arms import dynamics, identify_arm
 from servotwin.identification.arms.arm_fit import BELIEFS
+from servotwin.identification.arms.episodes import episodes_from
+from servotwin.identification.arms.numbers import Numbers
 from servotwin.identification.arms.rows import Noise, beyond_scatter, whitened
+from servotwin.identification.arms.whole import WholeArm
 from servotwin.identification.fitting.words import Unidentifiable
 from servotwin.robots import Motion, Mount, run_motion
 
@@ -133,6 +136,21 @@ def test_inverse_dynamics_are_linear_in_the_masses():
         data.qpos[:], data.qvel[:], data.qacc[:] = motion[:, k]
         mujoco.mj_inverse(heavy, data)
         np.testing.assert_allclose(torque[k] + inertia[k] * motion[2, k], data.qfrc_inverse, rtol=1e-9, atol=1e-12)
+
+
+def test_a_fit_simulates_what_a_run_does():
+    """Rows of 30 Hz between ticks of 2 ms act at their time in both, not with the next tick."""
+    motion = recorded(0, 3.0)
+    episode = episodes_from([motion], JOINTS, dict.fromkeys(JOINTS, SERVO))[0]
+    numbers = Numbers({joint: Mount(st.DigitalServo(SERVO)) for joint in JOINTS}, (), BUS)
+    found = WholeArm(PLANT, numbers, []).angles(episode, numbers.start[None])[0]
+    run = run_motion(PLANT, numbers.mounts, motion, bus=BUS, hold="previous", assume_heat=False)
+    at = motion.time - numbers.latency(numbers.start)
+    for j, joint in enumerate(JOINTS):
+        np.testing.assert_allclose(found[:, j], np.interp(at, run.time, run.record[joint]["joint_angle"]), atol=1e-5)
+        told = run.record[joint]["joint_command"]
+        begun = run.time - run.model.opt.timestep
+        np.testing.assert_allclose(told[np.searchsorted(begun, motion.time - 1e-6)], motion.angles[joint], atol=1e-9)
 
 
 def test_rows_are_whitened_by_positions_and_clock():
