@@ -13,7 +13,8 @@ from servotwin.identification.arms import dynamics, identify_arm
 from servotwin.identification.arms.arm_fit import BELIEFS
 from servotwin.identification.arms.episodes import episodes_from
 from servotwin.identification.arms.numbers import Numbers
-from servotwin.identification.arms.rows import Noise, beyond_scatter, whitened
+from servotwin.identification.arms.problem import Problem
+from servotwin.identification.arms.rows import Noise, beyond_scatter, used_rows, whitened
 from servotwin.identification.arms.whole import WholeArm
 from servotwin.identification.fitting.words import Unidentifiable
 from servotwin.robots import Motion, Mount, run_motion
@@ -91,11 +92,19 @@ def test_what_cannot_be_told_apart_is_named(fit):
 
 
 def test_the_same_fit_twice_is_the_same_and_one_episode_says_so():
-    one, other = (fitted([recorded(5, 6.0)], intervals=False) for _ in range(2))
+    motion = recorded(5, 6.0)
+    one, other = (fitted([motion]) for _ in range(2))
     assert one.estimates == other.estimates
+    np.testing.assert_array_equal([*one.intervals().values()], [*other.intervals().values()])
+    assert one.training.rms() == other.training.rms()
     assert one.holdout is None
     assert any("nothing was held out" in text for text in one.warnings)
-    assert {interval.method for interval in one.intervals().values()} <= {"not sought"}
+
+
+def test_without_intervals_none_are_sought():
+    found = fitted([recorded(5, 6.0)], intervals=False)
+    assert {interval.method for interval in found.intervals().values()} == {"not sought"}
+    assert found.unknown == ()
 
 
 def test_a_wrong_gain_is_named_first():
@@ -170,6 +179,25 @@ def test_derivatives_that_are_noise_count_for_nothing():
     clean = slopes @ beyond_scatter(slopes, scatter)
     assert np.abs(clean @ [1.0, -1.0]).max() < 0.05 * np.abs(slopes @ [1.0, -1.0]).max()
     assert clean @ [1.0, 1.0] == pytest.approx(slopes @ [1.0, 1.0], rel=0.1, abs=3.0)
+
+
+def test_derivatives_are_of_steps_that_an_arm_answers_by_about_its_noise():
+    """An arm that its servos hardly lift answers a tenth more resistance otherwise than ten times a hundredth more."""
+    low = st.parameters.Supply(open_circuit_voltage=2.0, internal_resistance=None)
+    numbers = Numbers({joint: Mount(st.DigitalServo(SERVO)) for joint in JOINTS}, (), low)
+    episode = episodes_from([recorded(3, 8.0)], JOINTS, dict.fromkeys(JOINTS, SERVO))[0]
+    problem = Problem(PLANT, numbers, [], [episode], [used_rows(episode)], lambda: None)
+    search = problem.search(problem.lanes(), Noise(np.full(2, 5e-4), 0.0))
+    k = numbers.names.index("motor.armature_resistance")
+
+    def slope():
+        return search.linear(numbers.start, central=True)[0].slopes[..., k]
+
+    coarse, own = slope(), slope()
+    search.steps = np.full(len(numbers), 1e-3)
+    true = slope()
+    assert np.linalg.norm(coarse - true) > 0.1 * np.linalg.norm(true)
+    assert np.linalg.norm(own - true) < 0.05 * np.linalg.norm(true)
 
 
 @pytest.mark.parametrize(("logs", "servo", "words"), [

@@ -25,6 +25,7 @@ class WholeArm(Copies):
         return np.stack([self._one(episode, x, fine=fine) for x in points])
 
     def _one(self, episode: Episode, x: Array, *, fine: bool) -> Array:
+        self.look()
         mujoco, numbers = load_mujoco(), self.numbers
         model = with_masses(self.plant, self.links, numbers.masses(x))
         drive = ServoDrive(model, numbers.mounts_at(x, fine=fine), bus=numbers.supply(x), joint_friction="keep",
