@@ -122,10 +122,24 @@ def test_a_time_keeps_the_best_so_far(cli, arm):
     (("robot", "fit", "so101", "arm.csv"), "joint of the robot"),
     (("robot", "fit", "nobody.xml", "arm.csv"), "nobody.xml is no file"),
     (("robot", "fit", "arm.xml", "arm.csv"), "servos of the robot"),
-    ((*WORDS, "--holdout", "2"), "holdout: got 2"),
+    ((*WORDS, "--holdout", "2"), "--holdout: got 2"),
+    ((*WORDS, "--masses", "-1"), "--masses: got -1"),
+    ((*WORDS, "--masses", "nan"), "--masses: got nan"),
+    (("robot", "fit", "arm.xml", "goals.csv", *WORDS[4:]), "goals.csv: columns: got 'timestamp, action.shoulder_rad, "
+     "action.elbow_rad', allowed: a time, and an action and a state"),
+    (("robot", "validate", "arm.xml", "goals.csv", *WORDS[4:6]), "goals.csv: columns"),
+    (("robot", "fit", "arm.xml", "header.csv", *WORDS[4:]), "at least one row"),
+    (("robot", "validate", "arm.xml", "nan.csv", *WORDS[4:6]), "elbow in episode 0: got nan, allowed: finite numbers"),
+    (("robot", "fit", "arm.xml", "nan.csv", *WORDS[4:]), "elbow in episode 0: got nan, allowed: finite numbers"),
+    (("robot", "fit", "unknown", "empty", *WORDS[4:]), "empty: got 'no dataset of LeRobot'"),
     (("robot", "fit", "arm.xml", "none.csv", "--servo", "*=feetech-sts3215-12v"), "none.csv"),
 ])
 def test_bad_input(cli, arm, words, said):
+    lines = (arm / "arm.csv").read_text().splitlines()
+    (arm / "header.csv").write_text(lines[0] + "\n")
+    (arm / "goals.csv").write_text("\n".join(",".join(line.split(",")[1:4]) for line in lines[:40]))
+    (arm / "nan.csv").write_text("\n".join([*lines[:20], lines[20].rpartition(",")[0] + ",nan", *lines[21:80]]))
+    (arm / "empty").mkdir()
     ended = cli(*words)
     assert ended.code == 2
     assert said in ended.err

@@ -28,9 +28,11 @@ from servotwin.parameters.output_side import OUTPUT_SIDE
 from servotwin.parameters.quantity import Quantity
 from servotwin.robots import Motion, RobotValidation, validate_robot
 from servotwin.robots.episode import joints_of_dataset
+from servotwin.units import is_finite
 
 Array = NDArray[np.float64]
 _HELD_OUT = 4  # episodes for each that is held out
+_MOST_SHARE = 3.0  # of masses: beyond, a bound of three times that is none
 _PUSHED = 2.5  # widths of a belief, that are said
 
 
@@ -87,7 +89,7 @@ def identify_arm(logs: Any, robot: Any, servos: Any = None, *, bus: Supply | Non
     InputError
         On bad input: no servo, joints that do not match, nothing measured; a time in which nothing is found.
     """
-    limit = Within(within)
+    limit, masses = Within(within), _checked_share(masses)
     named = joints_of_dataset(Path(logs)) if robot == UNKNOWN and isinstance(logs, str | Path) else ()
     first = motions_of(logs, plant_of(robot, named)[0])
     plant, said = plant_of(robot, tuple(first[0].measured))
@@ -118,6 +120,12 @@ def identify_arm(logs: Any, robot: Any, servos: Any = None, *, bus: Supply | Non
     warnings = (*_stopped(way), *said, *assumed, *_pushed(way), *(() if count else (
         "one episode: nothing was held out, so nothing says how well another one is predicted",)))
     return _fit(way, warnings=warnings, tables=tables, level=level)
+
+
+def _checked_share(masses: float) -> float:
+    if not (is_finite(masses) and 0.0 <= masses <= _MOST_SHARE):
+        raise InputError("masses", got=masses, allowed=f"a share from 0 to {_MOST_SHARE:g}")
+    return float(masses)
 
 
 def _check_found(way: Way, limit: Within) -> None:
