@@ -10,7 +10,8 @@ import servotwin as st
 from robots.robots_cases import links
 from servotwin.errors import InputError
 from servotwin.identification.arms import dynamics, identify_arm
-from servotwin.identification.arms.arm_fit import BELIEFS
+from servotwin.identification.arms.arm_fit import BELIEFS, ArmCause
+from servotwin.identification.arms.causes import confirmed
 from servotwin.identification.arms.episodes import episodes_from
 from servotwin.identification.arms.numbers import Numbers
 from servotwin.identification.arms.problem import Problem
@@ -43,13 +44,13 @@ def goals(seed, seconds):
     return time, found
 
 
-def recorded(seed=0, seconds=10.0, *, gain=1.0, hand=None):
+def recorded(seed=0, seconds=10.0, *, gain=1.0, hand=None, payload=1.0):
     """Return an episode of an arm whose servos, zeros and masses are not those of the files."""
     servo = SERVO.replace({name: share * SERVO.get(name) for name, share in SHARES.items()})
     servo = servo.replace({"firmware.proportional_gain": gain * servo.get("firmware.proportional_gain")})
     time, angles = goals(seed, seconds)
     mounts = {joint: Mount(st.DigitalServo(servo), ZERO) for joint in JOINTS}
-    heavy = dynamics.with_masses(PLANT, dynamics.links_of(PLANT, JOINTS), np.array([1.0, 1.1]))
+    heavy = dynamics.with_masses(PLANT, dynamics.links_of(PLANT, JOINTS), np.array([1.0, 1.1 * payload]))
     run = run_motion(heavy, mounts, Motion(time=time, source="real", angles={
         joint: values + ZERO for joint, values in angles.items()}), bus=BUS, hold="previous")
     measured = {joint: COUNT * np.round((np.interp(time - LATENCY, run.time, run.record[joint]["joint_angle"]) - ZERO)
@@ -116,6 +117,20 @@ def test_a_wrong_gain_is_named_first():
         gain = found.servos[joint].get("firmware.proportional_gain")
         assert gain == pytest.approx(0.5 * SERVO.get("firmware.proportional_gain"), rel=0.15)
     assert found.training.rms() < 0.3 * found.before.rms()
+
+
+def test_a_payload_is_named_and_none_where_only_single_joints_look_like_one():
+    found = fitted([recorded(seed, 8.0, payload=2.0) for seed in range(2)])
+    assert found.causes[0].name == "masses"
+    assert "times as heavy" in found.causes[0].sentence
+    healthy = fitted([recorded(seed, 8.0) for seed in range(2)])
+    episodes = episodes_from([recorded(0, 8.0)], JOINTS, dict.fromkeys(JOINTS, SERVO))
+    what = Problem(PLANT, healthy.numbers, dynamics.links_of(PLANT, JOINTS), episodes,
+                   [used_rows(one) for one in episodes], lambda: None)
+    arm, noise = what.whole(), Noise(np.array([healthy.noise[joint] for joint in JOINTS]), healthy.noise["clock"])
+    slopes = [one.slopes for one in what.search(arm, noise).linear(healthy.best, central=True)]
+    assert confirmed([ArmCause("masses", "as the first stage has it", 99.0)], what, arm, noise, healthy.best,
+                     slopes) == ()
 
 
 def test_what_a_hand_did_is_left_out():

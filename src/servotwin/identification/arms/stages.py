@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.arms.arm_fit import ArmCause
-from servotwin.identification.arms.causes import causes_of
+from servotwin.identification.arms.causes import causes_of, confirmed
 from servotwin.identification.arms.doubts import Doubts, doubts_of
 from servotwin.identification.arms.numbers import Numbers
 from servotwin.identification.arms.problem import Problem
@@ -156,6 +156,7 @@ def _second_stage(way: Way, show: Show, *, intervals: bool) -> None:
         if far < _FAR:
             break
     way.missing.remove(WHOLE)
+    way.causes = confirmed(way.causes, what, arm, noise, way.x, slopes)
     show(0.85, "intervals")
     found = what.left(arm, way.x)
     way.noise = noise_of(what.episodes, found, what.used)
