@@ -69,6 +69,10 @@ class Way:
         self.what, self.x, self.noise, self.steps, self.found = other.what, best, other.noise, other.steps, True
         self.left_out = other.left_out
 
+    def know(self, what: str) -> None:
+        """Note that something is no longer missing."""
+        self.missing = [one for one in self.missing if one != what]
+
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
         """Note the CPU time of a stage."""
@@ -118,7 +122,7 @@ def _first_stage(way: Way, what: Problem, show: Show) -> None:
             windows = strange_windows(what.episodes, left, what.used, noise, what.numbers.joints)
             what = what._replace(used=without(what.used, what.episodes, windows, what.numbers.joints))
     way.keep(Way(what, x, noise_of(what.episodes, what.left(lanes, x), what.used), steps, left_out=windows), x)
-    way.missing = [one for one in way.missing if one != JOINTS_ALONE]
+    way.know(JOINTS_ALONE)
 
 
 def _look_for_causes(way: Way, make: Callable[[Sequence[str]], Numbers], show: Show) -> None:
@@ -131,7 +135,6 @@ def _look_for_causes(way: Way, make: Callable[[Sequence[str]], Numbers], show: S
     if way.causes and way.causes[0].joints:  # what the wrong gain has bent is found anew with that gain searched
         _first_stage(way, what._replace(numbers=make(way.causes[0].joints),
                                         used=[used_rows(one) for one in what.episodes]), show)
-    way.missing.remove(CAUSES)
 
 
 def _second_stage(way: Way, show: Show, *, intervals: bool) -> None:
@@ -140,6 +143,7 @@ def _second_stage(way: Way, show: Show, *, intervals: bool) -> None:
     arm = what.whole()
     noise = way.noise = noise_of(what.episodes, what.left(arm, way.x), what.used)
     if not intervals:
+        way.know(CAUSES)
         return
 
     for turn in range(_WHOLE_TURNS):
@@ -155,13 +159,14 @@ def _second_stage(way: Way, show: Show, *, intervals: bool) -> None:
         far = float(np.abs((way.x - x) * np.where(what.numbers.weight > 0.0, what.numbers.weight, 1.0)).max())
         if far < _FAR:
             break
-    way.missing.remove(WHOLE)
+    way.know(WHOLE)
     way.causes = confirmed(way.causes, what, arm, noise, way.x, slopes)
+    way.know(CAUSES)
     show(0.85, "intervals")
     found = what.left(arm, way.x)
     way.noise = noise_of(what.episodes, found, what.used)
     way.doubts = doubts_of(what, way.x, way.noise, found, slopes)
-    way.missing.remove(INTERVALS)
+    way.know(INTERVALS)
 
 
 def _clean(what: Problem, linear: Sequence[Linear], noise: Noise) -> list[Array]:
