@@ -15,11 +15,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
 
+import servotwin as st
 from reference import bus_rig, rig_fits
 from reference import rig_draws as draws
 from reference.rig_defects import with_defect
-
-import servotwin as st
 
 FROM = 2.0  # s
 AT = (0.1, 0.25, 0.5, 0.75)  # of the whole time

@@ -75,8 +75,9 @@ def record(
         job = OneServo(AnalogRig(SerialBackend(words.port_from(port)), words.wiring_from(wiring), rate=rate), files)
     else:
         job = SeveralServos(bus_of(bus, words.port_from(port), identity or [], baud, period), files)
-    files.make()
-    _report(recorded(job, made), out, servo, job, as_json=as_json)
+    with files.made():
+        done = recorded(job, made)
+    _report(done, out, servo, job, as_json=as_json)
 
 
 def rehearse(
@@ -139,9 +140,10 @@ def rehearse(
                                 noise=quantity("--noise", noise, "voltage"), seed=seed)
     if remark:
         warnings.warn(remark, stacklevel=2)
-    files.make()
     job = OneServo(rig, files)
-    _report(recorded(job, made), out, servo, job, as_json=as_json)
+    with files.made():
+        done = recorded(job, made)
+    _report(done, out, servo, job, as_json=as_json)
 
 
 def _offered(model: Model, load: Load, wiring: Wiring, *, noise: float, seed: int) -> None:
