@@ -1,6 +1,10 @@
 """`servotwin robot fit`: its files, and what is refused in one line."""
 
 import json
+import signal
+import subprocess
+import sys
+import time as clock
 
 import numpy as np
 import pytest
@@ -35,8 +39,7 @@ def test_servo_files_a_page_and_numbers(cli, arm):
     assert ended.code == 0, ended.err
     told = json.loads(ended.out)
     assert told["unseen"]["rms"] < 0.5 * told["before_unseen"]["rms"]
-    assert {path.name for path in (arm / "out").iterdir()} == {
-        "shoulder.toml", "elbow.toml", "summary.json", "errors.png", "windows.png", "index.html"}
+    assert {path.name for path in (arm / "out").iterdir()} == FILES
     servo = st.load_servo(arm / "out" / "elbow.toml")
     assert servo.source("motor.armature_resistance").origin == "identified"
     checked = cli("robot", "validate", "arm.xml", "arm.csv", "--servo", "*=out/elbow.toml", "--json")
@@ -54,14 +57,89 @@ def test_what_is_printed(cli, arm):
     assert "no robot file" in unknown.out
 
 
+STOPPED = """
+import contextlib, signal, sys
+from servotwin.identification.fitting import checks
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore them
+number, stage = int(sys.argv.pop(1)), sys.argv.pop(1)
+
+@contextlib.contextmanager
+def shown(progress):
+    if callable(progress):
+        yield progress
+        return
+    begun, sent = [], []
+
+    def tell(share, text):
+        if begun and text.startswith(stage) and not sent:
+            sent.append(text)
+            signal.raise_signal(number)
+        begun.extend([share] if share > 0.0 else [])
+
+    yield tell
+
+checks.shown = shown
+from servotwin.cli import main
+main()
+"""
+FILES = {"shoulder.toml", "elbow.toml", "summary.json", "errors.png", "windows.png", "index.html"}
+
+
+@pytest.mark.parametrize(("number", "code", "stage", "unknown"), [
+    (signal.SIGINT, 130, "joints one by one", ["where the search of single joints ends", "what the whole robot does",
+                                               "intervals"]),
+    (signal.SIGTERM, 143, "the whole robot", ["what the whole robot does", "intervals"])])
+def test_a_stop_keeps_the_best_so_far(arm, child_environment, number, code, stage, unknown):
+    words = [word for word in WORDS if word != "--no-intervals"]
+    done = subprocess.run([sys.executable, "-c", STOPPED, str(int(number)), stage, *words, "--out", "out"],
+                          capture_output=True, text=True, cwd=arm, env=child_environment, check=False)
+    assert done.returncode == code, done.stderr
+    assert "interrupted; keeping the best so far" in done.stderr
+    assert f"not known are {', '.join(unknown)}" in " ".join(done.stdout.split())
+    assert {path.name for path in (arm / "out").iterdir()} == FILES
+    told = json.loads((arm / "out" / "summary.json").read_text())
+    assert told["interrupted"]
+    assert told["unknown"] == unknown
+    assert told["unseen"]["rms"] < told["before_unseen"]["rms"]
+    assert "stopped: the best so far" in (arm / "out" / "index.html").read_text()
+
+
+def test_a_time_keeps_the_best_so_far(cli, arm):
+    words = [word for word in WORDS if word != "--no-intervals"]
+    began = clock.monotonic()
+    ended = cli(*words, "--within", "2s", "--json")
+    assert ended.code == 0, ended.err
+    told = ended.data
+    assert told["interrupted"]
+    assert "intervals" in told["unknown"]
+    assert clock.monotonic() - began < 60.0
+    assert cli(*words, "--within", "1ms").error.startswith("--within: got 'a time in which nothing was found'")
+    assert cli(*words, "--within", "soon").error.startswith("--within")
+
+
 @pytest.mark.parametrize(("words", "said"), [
     (("robot", "fit", "so101", "arm.csv"), "joint of the robot"),
     (("robot", "fit", "nobody.xml", "arm.csv"), "nobody.xml is no file"),
     (("robot", "fit", "arm.xml", "arm.csv"), "servos of the robot"),
-    ((*WORDS, "--holdout", "2"), "holdout: got 2"),
+    ((*WORDS, "--holdout", "2"), "--holdout: got 2"),
+    ((*WORDS, "--masses", "-1"), "--masses: got -1"),
+    ((*WORDS, "--masses", "nan"), "--masses: got nan"),
+    (("robot", "fit", "arm.xml", "goals.csv", *WORDS[4:]), "goals.csv: columns: got 'timestamp, action.shoulder_rad, "
+     "action.elbow_rad', allowed: a time, and an action and a state"),
+    (("robot", "validate", "arm.xml", "goals.csv", *WORDS[4:6]), "goals.csv: columns"),
+    (("robot", "fit", "arm.xml", "header.csv", *WORDS[4:]), "at least one row"),
+    (("robot", "validate", "arm.xml", "nan.csv", *WORDS[4:6]), "elbow in episode 0: got nan, allowed: finite numbers"),
+    (("robot", "fit", "arm.xml", "nan.csv", *WORDS[4:]), "elbow in episode 0: got nan, allowed: finite numbers"),
+    (("robot", "fit", "unknown", "empty", *WORDS[4:]), "empty: got 'no dataset of LeRobot'"),
     (("robot", "fit", "arm.xml", "none.csv", "--servo", "*=feetech-sts3215-12v"), "none.csv"),
 ])
 def test_bad_input(cli, arm, words, said):
+    lines = (arm / "arm.csv").read_text().splitlines()
+    (arm / "header.csv").write_text(lines[0] + "\n")
+    (arm / "goals.csv").write_text("\n".join(",".join(line.split(",")[1:4]) for line in lines[:40]))
+    (arm / "nan.csv").write_text("\n".join([*lines[:20], lines[20].rpartition(",")[0] + ",nan", *lines[21:80]]))
+    (arm / "empty").mkdir()
     ended = cli(*words)
     assert ended.code == 2
     assert said in ended.err

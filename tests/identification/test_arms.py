@@ -10,8 +10,13 @@ import servotwin as st
 from robots.robots_cases import links
 from servotwin.errors import InputError
 from servotwin.identification.arms import dynamics, identify_arm
-from servotwin.identification.arms.arm_fit import BELIEFS
-from servotwin.identification.arms.rows import Noise, beyond_scatter, whitened
+from servotwin.identification.arms.arm_fit import BELIEFS, ArmCause
+from servotwin.identification.arms.causes import confirmed
+from servotwin.identification.arms.episodes import episodes_from
+from servotwin.identification.arms.numbers import Numbers
+from servotwin.identification.arms.problem import Problem
+from servotwin.identification.arms.rows import Noise, beyond_scatter, used_rows, whitened
+from servotwin.identification.arms.whole import WholeArm
 from servotwin.identification.fitting.words import Unidentifiable
 from servotwin.robots import Motion, Mount, run_motion
 
@@ -39,13 +44,13 @@ def goals(seed, seconds):
     return time, found
 
 
-def recorded(seed=0, seconds=10.0, *, gain=1.0, hand=None):
+def recorded(seed=0, seconds=10.0, *, gain=1.0, hand=None, payload=1.0):
     """Return an episode of an arm whose servos, zeros and masses are not those of the files."""
     servo = SERVO.replace({name: share * SERVO.get(name) for name, share in SHARES.items()})
     servo = servo.replace({"firmware.proportional_gain": gain * servo.get("firmware.proportional_gain")})
     time, angles = goals(seed, seconds)
     mounts = {joint: Mount(st.DigitalServo(servo), ZERO) for joint in JOINTS}
-    heavy = dynamics.with_masses(PLANT, dynamics.links_of(PLANT, JOINTS), np.array([1.0, 1.1]))
+    heavy = dynamics.with_masses(PLANT, dynamics.links_of(PLANT, JOINTS), np.array([1.0, 1.1 * payload]))
     run = run_motion(heavy, mounts, Motion(time=time, source="real", angles={
         joint: values + ZERO for joint, values in angles.items()}), bus=BUS, hold="previous")
     measured = {joint: COUNT * np.round((np.interp(time - LATENCY, run.time, run.record[joint]["joint_angle"]) - ZERO)
@@ -88,11 +93,19 @@ def test_what_cannot_be_told_apart_is_named(fit):
 
 
 def test_the_same_fit_twice_is_the_same_and_one_episode_says_so():
-    one, other = (fitted([recorded(5, 6.0)], intervals=False) for _ in range(2))
+    motion = recorded(5, 6.0)
+    one, other = (fitted([motion]) for _ in range(2))
     assert one.estimates == other.estimates
+    np.testing.assert_array_equal([*one.intervals().values()], [*other.intervals().values()])
+    assert one.training.rms() == other.training.rms()
     assert one.holdout is None
     assert any("nothing was held out" in text for text in one.warnings)
-    assert {interval.method for interval in one.intervals().values()} <= {"not sought"}
+
+
+def test_without_intervals_none_are_sought():
+    found = fitted([recorded(5, 6.0)], intervals=False)
+    assert {interval.method for interval in found.intervals().values()} == {"not sought"}
+    assert found.unknown == ()
 
 
 def test_a_wrong_gain_is_named_first():
@@ -104,6 +117,20 @@ def test_a_wrong_gain_is_named_first():
         gain = found.servos[joint].get("firmware.proportional_gain")
         assert gain == pytest.approx(0.5 * SERVO.get("firmware.proportional_gain"), rel=0.15)
     assert found.training.rms() < 0.3 * found.before.rms()
+
+
+def test_a_payload_is_named_and_none_where_only_single_joints_look_like_one():
+    found = fitted([recorded(seed, 8.0, payload=2.0) for seed in range(2)])
+    assert found.causes[0].name == "masses"
+    assert "times as heavy" in found.causes[0].sentence
+    healthy = fitted([recorded(seed, 8.0) for seed in range(2)])
+    episodes = episodes_from([recorded(0, 8.0)], JOINTS, dict.fromkeys(JOINTS, SERVO))
+    what = Problem(PLANT, healthy.numbers, dynamics.links_of(PLANT, JOINTS), episodes,
+                   [used_rows(one) for one in episodes], lambda: None)
+    arm, noise = what.whole(), Noise(np.array([healthy.noise[joint] for joint in JOINTS]), healthy.noise["clock"])
+    slopes = [one.slopes for one in what.search(arm, noise).linear(healthy.best, central=True)]
+    assert confirmed([ArmCause("masses", "as the first stage has it", 99.0)], what, arm, noise, healthy.best,
+                     slopes) == ()
 
 
 def test_what_a_hand_did_is_left_out():
@@ -135,6 +162,21 @@ def test_inverse_dynamics_are_linear_in_the_masses():
         np.testing.assert_allclose(torque[k] + inertia[k] * motion[2, k], data.qfrc_inverse, rtol=1e-9, atol=1e-12)
 
 
+def test_a_fit_simulates_what_a_run_does():
+    """Rows of 30 Hz between ticks of 2 ms act at their time in both, not with the next tick."""
+    motion = recorded(0, 3.0)
+    episode = episodes_from([motion], JOINTS, dict.fromkeys(JOINTS, SERVO))[0]
+    numbers = Numbers({joint: Mount(st.DigitalServo(SERVO)) for joint in JOINTS}, (), BUS)
+    found = WholeArm(PLANT, numbers, []).angles(episode, numbers.start[None])[0]
+    run = run_motion(PLANT, numbers.mounts, motion, bus=BUS, hold="previous", assume_heat=False)
+    at = motion.time - numbers.latency(numbers.start)
+    for j, joint in enumerate(JOINTS):
+        np.testing.assert_allclose(found[:, j], np.interp(at, run.time, run.record[joint]["joint_angle"]), atol=1e-5)
+        told = run.record[joint]["joint_command"]
+        begun = run.time - run.model.opt.timestep
+        np.testing.assert_allclose(told[np.searchsorted(begun, motion.time - 1e-6)], motion.angles[joint], atol=1e-9)
+
+
 def test_rows_are_whitened_by_positions_and_clock():
     class Row:
         speed = np.array([[1.0, -2.0, 0.5]])
@@ -152,6 +194,25 @@ def test_derivatives_that_are_noise_count_for_nothing():
     clean = slopes @ beyond_scatter(slopes, scatter)
     assert np.abs(clean @ [1.0, -1.0]).max() < 0.05 * np.abs(slopes @ [1.0, -1.0]).max()
     assert clean @ [1.0, 1.0] == pytest.approx(slopes @ [1.0, 1.0], rel=0.1, abs=3.0)
+
+
+def test_derivatives_are_of_steps_that_an_arm_answers_by_about_its_noise():
+    """An arm that its servos hardly lift answers a tenth more resistance otherwise than ten times a hundredth more."""
+    low = st.parameters.Supply(open_circuit_voltage=2.0, internal_resistance=None)
+    numbers = Numbers({joint: Mount(st.DigitalServo(SERVO)) for joint in JOINTS}, (), low)
+    episode = episodes_from([recorded(3, 8.0)], JOINTS, dict.fromkeys(JOINTS, SERVO))[0]
+    problem = Problem(PLANT, numbers, [], [episode], [used_rows(episode)], lambda: None)
+    search = problem.search(problem.lanes(), Noise(np.full(2, 5e-4), 0.0))
+    k = numbers.names.index("motor.armature_resistance")
+
+    def slope():
+        return search.linear(numbers.start, central=True)[0].slopes[..., k]
+
+    coarse, own = slope(), slope()
+    search.steps = np.full(len(numbers), 1e-3)
+    true = slope()
+    assert np.linalg.norm(coarse - true) > 0.1 * np.linalg.norm(true)
+    assert np.linalg.norm(own - true) < 0.05 * np.linalg.norm(true)
 
 
 @pytest.mark.parametrize(("logs", "servo", "words"), [

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,6 +11,7 @@ import typer
 
 from servotwin.cli import log_reading
 from servotwin.cli import shared_options as shared
+from servotwin.cli.stopping import best_kept, end_if_stopped
 from servotwin.cli.terminal import emit_json, patience, show
 from servotwin.logs.reading import reading_facts
 
@@ -137,10 +137,7 @@ def fit(
     if advise and not found.fit.interrupted and found.fit.doubt is not None:
         found = _Found(found.fit, found.ladder, _advice(found.fit))
     _report(found, files, as_json=as_json)
-    from servotwin.cli import interrupts
-
-    if found.fit.interrupted and (within is None or interrupts.noted()):
-        raise typer.Exit(interrupts.code())
+    end_if_stopped(found.fit, timed=within is not None)
 
 
 @dataclass(frozen=True)
@@ -250,7 +247,7 @@ def _run(search: _Search, logs: list[Log], options: dict[str, Any], scheduler: s
     from servotwin.identification import identify
 
     servo, kind = search.model.servo, type(search.model)
-    with executor_at(scheduler) as executor, _progress() as progress:
+    with executor_at(scheduler) as executor, best_kept() as progress:
         options = {**options, "bounds": search.bounds, "priors": search.priors, "executor": executor,
                    "progress": progress}
         if climbs is not None:
@@ -276,28 +273,6 @@ def _check_time(within: Within) -> None:
 
     if within.over and not noted():
         raise InputError("--within", got="a time in which nothing was found", allowed="a longer one")
-
-
-@contextlib.contextmanager
-def _progress() -> Iterator[Callable[[float, str], None]]:
-    """Give what shows the progress, and ends the search after an interrupt, with the best so far.
-
-    Before the first step there is no best, and an interrupt ends the process.
-    """
-    from servotwin.cli.interrupts import finishing
-    from servotwin.identification.fitting.checks import shown
-
-    with shown(True) as show, contextlib.ExitStack() as stack:
-        checks: list[Callable[[], None]] = []
-
-        def tell(share: float, text: str) -> None:
-            show(share, text)
-            if share > 0.0 and not checks:
-                checks.append(stack.enter_context(finishing()))
-            for check in checks:
-                check()
-
-        yield tell
 
 
 def _first_advice(search: _Search) -> Advice:

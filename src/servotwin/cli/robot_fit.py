@@ -38,42 +38,49 @@ def fit(
                                             "third of the time.", rich_help_panel=_FIT)] = True,
     diagnose: Annotated[bool, typer.Option("--diagnose/--no-diagnose", help="Whether causes are sought where a belief "
                                            "is pushed far.", rich_help_panel=_FIT)] = True,
+    within: Annotated[str | None, typer.Option(metavar="DURATION", help="Stop after this time, such as 90s or 5min, "
+                                               "and keep the best so far, as Ctrl-C does.",
+                                               rich_help_panel=_FIT)] = None,
     out: OutOption = None, force: ForceOption = False, as_json: shared.JsonOption = False,
 ) -> None:
     """Fit the servos of a robot."""
     from servotwin.cli import robot_files as files
+    from servotwin.cli.fit_words import duration
     from servotwin.cli.robot_words import as_options
+    from servotwin.cli.stopping import best_kept, end_if_stopped
     from servotwin.identification.arms import identify_arm
     from servotwin.identification.arms.plant import UNKNOWN, plant_of
     from servotwin.robots.episode import joints_of_dataset
 
+    limit = duration("--within", within)
     plant, unknown = plant_of(UNKNOWN, joints_of_dataset(logs)) if model_file == UNKNOWN else (None, ())
     asked = options.asked_robot(model_file, logs, servo=servo or [], mount=mount or [], model=model,
                                 change=change or [], register=register or [], supply=supply, calibration=calibration,
                                 episodes=episode or [], unit=unit or [], plant=plant)
 
-    def done(names: Sequence[str]) -> dict[str, Any]:
+    def done(names: Sequence[str]) -> tuple[ArmFit, dict[str, Any]]:
         targets = files.targets_of(out, names, force=force, inputs=[logs]) if out is not None else []
-        with as_options():
+        with as_options(), best_kept(shown=not as_json) as progress:
             found = identify_arm(asked.motions, UNKNOWN if unknown else asked.plant, asked.mounts, bus=asked.bus,
-                                 each=each, masses=masses,
-                                 holdout=holdout, intervals=intervals, diagnose=diagnose, progress=not as_json)
+                                 each=each, masses=masses, holdout=holdout, intervals=intervals, diagnose=diagnose,
+                                 within=limit, progress=progress)
         told = {"robot": model_file, "episodes": [one.source for one in asked.motions], **found.facts()}
         told["warnings"] = [*asked.said, *told["warnings"]]
         _write(found, told, targets, force=force)
         told["files"] = [str(target.path) for target in targets]
         if not as_json:
             _show(found, told)
-        return told
+        return found, told
 
     servos = [f"{joint}.toml" for joint in asked.mounts]
     if out is None:
-        told = done([])
+        found, told = done([])
     else:
         with files.folder(out):
-            told = done([*servos, SUMMARY, ERRORS, WINDOWS, PAGE])
+            found, told = done([*servos, SUMMARY, ERRORS, WINDOWS, PAGE])
     if as_json:
         emit_json(told)
+    end_if_stopped(found, timed=within is not None)
 
 
 def _show(found: ArmFit, told: dict[str, Any]) -> None:

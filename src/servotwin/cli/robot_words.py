@@ -20,7 +20,8 @@ _PYTHON = (("joint_friction='clear' sets it so, 'keep'", "--friction clear sets 
            ("with calibration=,", "with --calibration,"), (" or ranges=, the limits of the joint in rad", ""),
            ('unit="deg" or unit="range"', "--unit deg or --unit range"), ("unit=", "--unit "),
            ("mount it with another zero or direction", "--mount gives it another zero or direction"))
-_OPTIONS = {"joint_friction": "--friction", "hold": "--hold", "settle": "--settle", "timestep": "--timestep"}
+_OPTIONS = {"joint_friction": "--friction", "hold": "--hold", "settle": "--settle", "timestep": "--timestep",
+            "within": "--within", "masses": "--masses", "holdout": "--holdout", "latency": "--latency"}
 
 _ARM_SERVO = "feetech-sts3215-12v"
 

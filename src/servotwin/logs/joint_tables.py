@@ -75,6 +75,16 @@ def open_joint_table(path: Path) -> Dataset | None:
                    "the names of the columns" if all(told) else "")
 
 
+def no_dataset(path: Path) -> InputError:
+    """Return what is wrong with a path that is neither a dataset of LeRobot nor a table of several joints."""
+    columns = ", ".join(name for name in _header(path) if name)
+    if columns:
+        return InputError(f"{path}: columns", got=columns, allowed="a time, and an action and a state of each of "
+                          "several joints, such as action.elbow_deg and state.elbow_deg")
+    return InputError(f"{path}", got="no dataset of LeRobot", allowed="a folder with meta/info.json, a file of it, or "
+                      "a table of several joints (.csv)")
+
+
 def _header(path: Path) -> list[str]:
     """Return the names in the first line of a table; none where it is no table."""
     if path.suffix.lower() not in (".csv", ".tsv"):

@@ -144,13 +144,13 @@ def open_dataset(path: Path) -> Dataset:
     InputError
         If it is none, or has no joints.
     """
-    from servotwin.logs.joint_tables import open_joint_table
+    from servotwin.logs.joint_tables import no_dataset, open_joint_table
 
     folder = dataset_of(path)
     if folder is None and (table := open_joint_table(path)) is not None:
         return table
     if folder is None:
-        raise InputError(f"{path}", got="no dataset of LeRobot", allowed=f"a folder with {_INFO}, or a file of it")
+        raise no_dataset(path)
     info = read_json(folder / _INFO)
     files = [path] if path.suffix.lower() == ".parquet" else sorted((folder / "data").rglob("*.parquet"))
     return Dataset(folder, info, _joints(folder, info), files)

@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 SETTLE = 0.5  # s, before the motion and after it
 _HOLDS = ("linear", "previous")
 _MOST_TICKS = 2_000_000
-_SAME = 1e-9  # s
+_SAME, _SAME_TICKS = 1e-9, 1e-3  # s; of a tick, beside which datasets round their times
 _TELL = 50  # ticks between two words on the progress
 
 
@@ -144,7 +144,7 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
     bus, joint_friction
         As of `ServoDrive`.
     timestep : float, optional
-        Of MuJoCo; the model's own unless given [s]
+        Of MuJoCo; unless given the model's own, or as much shorter as lets samples that are held begin with a tick [s]
     settle : float
         [s]
     hold : str
@@ -176,8 +176,8 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
     mujoco = load_mujoco()
     _check(motion, settle, hold, timestep)
     own = robot_model(model)
-    if timestep is not None:
-        own.opt.timestep = timestep
+    own.opt.timestep = timestep or _fitting(own.opt.timestep, motion, hold)
+    settle = own.opt.timestep * math.ceil(settle / own.opt.timestep - _SAME_TICKS)  # the motion begins with a tick
     mounts = warm_mounts(servos, assume_heat=assume_heat, shared=bus is not None)
     mounts, assumed = as_motion_says(mounts, motion)
     for joint, mount in mounts.items():
@@ -192,7 +192,7 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
         data = mujoco.MjData(drive.model)
         poses = np.zeros((len(time), own.nq))
         begin(drive, data, motion, mounts, -settle)
-        for k, goals in enumerate(_goals(motion, time - own.opt.timestep, hold)):
+        for k, goals in enumerate(_goals(motion, time - own.opt.timestep, hold, 0.5 * own.opt.timestep)):
             if goals:
                 drive.command(data, goals)
             drive.step(data)
@@ -271,6 +271,25 @@ def _check_joints(motion: Motion, mounts: Mapping[str, Mount], joints: Mapping[s
                              allowed=f"joints with servos, {', '.join(mounts)}")
 
 
+def ticks_in(interval: float, timestep: float) -> int:
+    """Return in how many ticks, none longer than a timestep, MuJoCo goes over an interval.
+
+    Examples
+    --------
+    >>> ticks_in(1.0 / 30.0, 2e-3), ticks_in(0.02, 2e-3)
+    (17, 10)
+    """
+    return max(1, math.ceil(interval / timestep - _SAME_TICKS))
+
+
+def _fitting(timestep: float, motion: Motion, hold: str) -> float:
+    """Return a timestep up to another one with which goals that are held act when they are given, not a tick later."""
+    if hold != "previous" or len(motion.time) < 2:
+        return timestep
+    interval = float(np.median(np.diff(motion.time)))
+    return interval / ticks_in(interval, timestep)
+
+
 def _times(timestep: float, duration: float, settle: float) -> Array:
     """Return the ends of all ticks [s]."""
     ticks = math.ceil((duration + 2.0 * settle) / timestep - _SAME)
@@ -315,10 +334,10 @@ def _check_travel(joint: str, mount: Mount, start: float) -> None:
             "mount it with another zero or direction")
 
 
-def _goals(motion: Motion, time: Array, hold: str) -> Iterator[dict[str, float]]:
-    """Give what the servos are told at each time [s]; nothing where that has not changed."""
+def _goals(motion: Motion, time: Array, hold: str, near: float) -> Iterator[dict[str, float]]:
+    """Give what the servos are told at each time [s], samples that are so near too; nothing where it stays."""
     if hold == "previous":
-        samples = np.clip(np.searchsorted(motion.time, time + _SAME, side="right") - 1, 0, None)
+        samples = np.clip(np.searchsorted(motion.time, time + near, side="right") - 1, 0, None)
         table = np.array([values[samples] for values in motion.angles.values()])
     else:
         table = np.array([motion.at(joint, time) for joint in motion.joints])

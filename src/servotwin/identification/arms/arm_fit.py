@@ -73,6 +73,10 @@ class ArmFit:
         How much of what is known of each number is belief, from 0 to 1. Empty without intervals.
     stages : mapping of str to float
         CPU seconds that each stage took.
+    interrupted : bool
+        Whether it was stopped before its end.
+    unknown : tuple of str
+        What is not known because of that.
     """
 
     model: Any = field(repr=False)
@@ -100,6 +104,8 @@ class ArmFit:
     prior_share: Mapping[str, float] = field(default_factory=dict)
     stages: Mapping[str, float] = field(default_factory=dict)
     level: float = 0.95
+    interrupted: bool = False
+    unknown: tuple[str, ...] = ()
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -168,7 +174,7 @@ class ArmFit:
             "before_unseen": told(self.before_holdout), "noise": dict(self.noise),
             "left_out": [window._asdict() for window in self.left_out],
             "causes": [cause._asdict() for cause in self.causes], "warnings": list(self.warnings),
-            "cpu_seconds": dict(self.stages)}
+            "interrupted": self.interrupted, "unknown": list(self.unknown), "cpu_seconds": dict(self.stages)}
 
     def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write an HTML page.

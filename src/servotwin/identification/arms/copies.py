@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,10 +24,13 @@ class Copies(ABC):
     numbers : Numbers
     links : sequence of int
         Bodies whose masses are searched.
+    look : callable
+        Called while it simulates; may raise.
     """
 
-    def __init__(self, plant: Any, numbers: Numbers, links: Sequence[int]) -> None:
-        self.plant, self.numbers, self.links = plant, numbers, list(links)
+    def __init__(self, plant: Any, numbers: Numbers, links: Sequence[int],
+                 look: Callable[[], object] = lambda: None) -> None:
+        self.plant, self.numbers, self.links, self.look = plant, numbers, list(links), look
 
     @abstractmethod
     def angles(self, episode: Episode, points: Array, *, fine: bool = False) -> Array:

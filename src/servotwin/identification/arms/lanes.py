@@ -7,7 +7,7 @@ is where its lane is at t less the latency.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,8 +27,9 @@ _NUDGE, _NEAR = 0.01, 0.05  # rad
 class JointLanes(Copies):
     """Lanes of the joints of a robot; parameters as of `Copies`."""
 
-    def __init__(self, plant: Any, numbers: Numbers, links: Sequence[int]) -> None:
-        super().__init__(plant, numbers, links)
+    def __init__(self, plant: Any, numbers: Numbers, links: Sequence[int],
+                 look: Callable[[], object] = lambda: None) -> None:
+        super().__init__(plant, numbers, links, look)
         self.models = [mount.model for mount in numbers.mounts.values()]
         self._gain = np.array([mount.gain for mount in numbers.mounts.values()])
         self._zero = np.array([mount.zero for mount in numbers.mounts.values()])
@@ -49,6 +50,7 @@ class JointLanes(Copies):
         angle[0] = first
         for k, step in enumerate(np.diff(grid).tolist()):
             if k % _PARTS == 0:
+                self.look()
                 sims.set(load_inertia=inertia[k])
             sims.advance(step, command_angle=goals[k // _PARTS], external_torque=torque[k])
             angle[k + 1], speed[k + 1] = sims["output_angle"], sims["output_speed"]

@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 
 from servotwin.identification.arms.copies import Copies
 from servotwin.identification.arms.episodes import Episode
-from servotwin.identification.arms.numbers import LATENCY
+from servotwin.identification.arms.numbers import LATENCY, Numbers
 from servotwin.identification.fitting.point import LogPart
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-STEP, _STEPS = 0.1, {"rad": 0.03}  # of a number on its scale; of some, in SI
+_MOST, _MOST_ZERO, _LEAST_STEP = 0.1, 0.03, 1e-3  # of a number on its scale, of a zero [rad]; of either
+_SEEN = 1.0  # times the noise: what a step for a derivative is to change
 _BEGIN = 0.6  # s: until then an episode still shows how it began
 _MAD = 1.4826
 _LEAST = 2.0e-4  # rad
@@ -111,12 +112,38 @@ class Linear(NamedTuple):
     scatter: Array
 
 
-def linear_at(simulated: Copies, episode: Episode, x: Array, held: Mask, *, central: bool = False) -> Linear:
-    """Return residuals at a point and their derivatives by differences, one way or central."""
+def usual_steps(numbers: Numbers) -> Array:
+    """Return the longest steps for derivatives, on the scales of numbers: servos stick and slip over short ones."""
+    return np.array([_MOST_ZERO / one.scale if one.unit == "rad" and not one.logarithmic else _MOST
+                     for one in numbers.all])
+
+
+def steps_by(usual: Array, slopes: Array) -> Array:
+    """Return steps for derivatives that change an episode by about its noise, or the usual ones if these change less.
+
+    An arm near what its servos can carry answers a tenth less resistance by a fall. That is no derivative, and no sum
+    of such says that resistance, masses and friction together are only the scale of all torques.
+
+    Parameters
+    ----------
+    usual : ndarray, shape (numbers,)
+    slopes : ndarray, shape (m, numbers)
+        In units of noise.
+
+    Examples
+    --------
+    >>> steps_by(np.array([0.1, 0.1]), np.array([[50.0, 1.0], [-50.0, 0.0]])).tolist()
+    [0.02, 0.1]
+    """
+    size = np.sqrt(np.mean(slopes**2, axis=0))
+    return np.asarray(np.clip(_SEEN / np.maximum(size, 1e-300), _LEAST_STEP / _MOST * usual, usual))
+
+
+def linear_at(simulated: Copies, episode: Episode, x: Array, held: Mask, steps: Array, *,
+              central: bool = False) -> Linear:
+    """Return residuals at a point and their derivatives by differences of such steps, one way or central."""
     numbers = simulated.numbers
     moved = [k for k in range(len(x)) if not held[k] and numbers.names[k] != LATENCY]
-    steps = np.array([_STEPS[one.unit] / one.scale if one.unit in _STEPS and not one.logarithmic else STEP
-                      for one in numbers.all])
     ways = [np.where(x + side * steps > numbers.upper, -0.5 * side, np.where(
         x + side * steps < numbers.lower, -0.5 * side, side)) * steps for side in ((1.0, -1.0) if central else (1.0,))]
     points = np.repeat(x[None], 1 + len(ways) * len(moved), axis=0)

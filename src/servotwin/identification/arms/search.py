@@ -10,10 +10,20 @@ from numpy.typing import NDArray
 
 from servotwin.identification.arms.copies import Copies
 from servotwin.identification.arms.episodes import Episode
-from servotwin.identification.arms.rows import Linear, Mask, Noise, linear_at, parts_of, residuals
+from servotwin.identification.arms.rows import (
+    Linear,
+    Mask,
+    Noise,
+    linear_at,
+    parts_of,
+    residuals,
+    steps_by,
+    usual_steps,
+)
 from servotwin.identification.fitting.arrow import Loss, Prior, block
 
 Array = NDArray[np.float64]
+Tell = Callable[[int, Array], object]  # the number of a step, and the best point so far
 _DAMPINGS = (1e-4, 0.1, 10.0)  # tried side by side
 _LEAST_GAIN = 3e-3  # of the cost: servos that count make it rough
 _LEAST_GAIN_ALONG = 3e-4  # likewise, where a step costs little
@@ -35,12 +45,15 @@ class ArmSearch:
     prior : Prior
     held : ndarray of bool
         Numbers that stay.
+    steps : ndarray, optional
+        For derivatives, on the scales of the numbers; the longest ones unless given. Each derivative mends them.
     """
 
     def __init__(self, simulated: Copies, episodes: Sequence[Episode], used: Sequence[Mask], noise: Noise,
-                 loss: Loss, prior: Prior, held: Mask) -> None:
+                 loss: Loss, prior: Prior, held: Mask, steps: Array | None = None) -> None:
         self.simulated, self.episodes, self.used = simulated, list(episodes), list(used)
         self.noise, self.loss, self.prior, self.held = noise, loss, prior, held
+        self.steps = usual_steps(simulated.numbers) if steps is None else steps
 
     def cost(self, x: Array, found: Sequence[Array]) -> float:
         """Return the cost of a point whose residuals are known; inf where a lane failed."""
@@ -56,7 +69,12 @@ class ArmSearch:
 
     def linear(self, x: Array, *, central: bool = False) -> list[Linear]:
         """Return residuals and derivatives of all episodes at a point."""
-        return [linear_at(self.simulated, episode, x, self.held, central=central) for episode in self.episodes]
+        found = [linear_at(self.simulated, episode, x, self.held, self.steps, central=central)
+                 for episode in self.episodes]
+        self.steps = steps_by(usual_steps(self.simulated.numbers), np.concatenate(
+            [part.shared for episode, one, used in zip(self.episodes, found, self.used, strict=True)
+             for part in parts_of(episode, one.residual, one.slopes, self.noise, used)]))
+        return found
 
     def normal(self, x: Array, found: Sequence[Array], slopes: Sequence[Array]) -> tuple[Array, Array]:
         """Return gradient and matrix of the normal equations."""
@@ -73,10 +91,11 @@ class ArmSearch:
         trials = np.stack([stepped(x, g, H, scale * damping, lower, upper, self.held) for damping in _DAMPINGS])
         return trials, self.costs(trials)
 
-    def along(self, x: Array, slopes: Sequence[Array], *, most: int) -> Array:
+    def along(self, x: Array, slopes: Sequence[Array], *, most: int, tell: Tell = lambda step, x: None) -> Array:
         """Return the best point that steps by the same derivatives come to."""
         scale = 1.0
         for turn in range(most):
+            tell(turn, x)
             found = [residuals(self.simulated, episode, x[None])[0] for episode in self.episodes]
             best = self.cost(x, found)
             trials, costs = self.tried(x, *self.normal(x, found, slopes), scale)
@@ -88,11 +107,11 @@ class ArmSearch:
             x, scale = trials[k], scale * (1.0 if k < 2 else 10.0)
         return x
 
-    def run(self, x: Array, *, most: int, tell: Callable[[int], object] = lambda step: None) -> Array:
+    def run(self, x: Array, *, most: int, tell: Tell = lambda step, x: None) -> Array:
         """Return the best point that a search from another one comes to."""
         best, scale = math.inf, 1.0
         for step in range(most):
-            tell(step)
+            tell(step, x)
             linear = self.linear(x)
             found = [one.residual for one in linear]
             best = self.cost(x, found)

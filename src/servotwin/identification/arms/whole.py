@@ -11,6 +11,7 @@ from servotwin.identification.arms.episodes import Episode
 from servotwin.robots import ServoDrive
 from servotwin.robots.coupling import couple
 from servotwin.robots.places import load_mujoco
+from servotwin.robots.run import ticks_in
 
 Array = NDArray[np.float64]
 _SETTLE = 0.5  # s, at the first goals
@@ -24,11 +25,12 @@ class WholeArm(Copies):
         return np.stack([self._one(episode, x, fine=fine) for x in points])
 
     def _one(self, episode: Episode, x: Array, *, fine: bool) -> Array:
+        self.look()
         mujoco, numbers = load_mujoco(), self.numbers
         model = with_masses(self.plant, self.links, numbers.masses(x))
         drive = ServoDrive(model, numbers.mounts_at(x, fine=fine), bus=numbers.supply(x), joint_friction="keep",
                            assume_heat=False)
-        data, step, zeros = mujoco.MjData(drive.model), float(model.opt.timestep), numbers.zeros(x)
+        data, step, zeros = mujoco.MjData(drive.model), float(drive.model.opt.timestep), numbers.zeros(x)
         places = [int(model.jnt_qposadr[model.joint(name).id]) for name in drive.joints]
         goals = episode.goals + zeros
         data.qpos[places] = goals[0]
@@ -38,8 +40,10 @@ class WholeArm(Copies):
         drive.record(data)
         drive.command(data, dict(zip(drive.joints, goals[0].tolist(), strict=True)))
         drive.step(data, round(_SETTLE / step))
-        ticks = np.diff(np.round(np.append(episode.time, episode.time[-1] + _SETTLE) / step)).astype(int)
-        for row, count in zip(goals.tolist(), ticks.tolist(), strict=True):
+        spans = np.diff(np.append(episode.time, episode.time[-1] + _SETTLE))
+        for row, span in zip(goals.tolist(), spans.tolist(), strict=True):
+            count = ticks_in(span, step)
+            drive.model.opt.timestep = span / count  # a row acts at its time, not with the next tick
             drive.command(data, dict(zip(drive.joints, row, strict=True)))
             drive.step(data, count)
         record = drive.result(data)

@@ -169,7 +169,7 @@ def identify(
         from servotwin.identification.arms import identify_arm
 
         found: Any = identify_arm(logs, robot, servo, level=level, intervals=intervals, diagnose=diagnose,
-                                  progress=progress, **of_robot)
+                                  within=within, progress=progress, **of_robot)
         return found  # type: ignore[no-any-return]
     if of_robot:
         raise InputError("identify", got=", ".join(of_robot), allowed="with robot= only")

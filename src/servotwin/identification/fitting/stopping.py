@@ -55,23 +55,17 @@ class Within:
         return clock.monotonic() > self.end
 
 
-class Course:
-    """The way of a fit: stages say which share of theirs is done, and it is told which share of all work.
+class Stops:
+    """What stops a fit, and whom it tells how far it is: stages say which share of the fit is done.
 
     Parameters
     ----------
     within : Within
-    intervals : bool
-        Whether they are sought.
-    beside : int
-        How many simpler models are fitted too.
     """
 
-    def __init__(self, within: Within, *, intervals: bool = True, beside: int = 0) -> None:
+    def __init__(self, within: Within) -> None:
         self.within = within
         self.show: Show = lambda share, text: None  # told that share; may raise KeyboardInterrupt, which stops the fit
-        self._usual = (*_USUAL[:2], _USUAL[2] * intervals, _USUAL[3] + _BESIDE * beside)
-        self.budget: float | None = None  # of the trials, once they begin, in the work of the search
         self.stopped = False
         self._noted = False
         self._told, self._begun = (0.0, ""), False
@@ -84,10 +78,13 @@ class Course:
         ------
         KeyboardInterrupt
         """
-        known = self._share(share)
-        self._told, self._begun = (known if self.budget is not None else max(known, self._told[0]), text), True
+        self._told, self._begun = (self._of_all(share), text), True
         self._looked = -math.inf
         self.look()
+
+    def _of_all(self, share: float) -> float:
+        """Return the share of all work that is done."""
+        return max(share, self._told[0])
 
     def look(self) -> None:
         """Stop if it is time to; else say again how far it is, if that was long ago.
@@ -109,16 +106,6 @@ class Course:
             self.stopped = True
             raise
 
-    def _share(self, share: float) -> float:
-        """Return the share of all work that is done: what lies ahead is as much as usual beside what was measured."""
-        stage = max(k for k in range(5) if share >= _STAGES[k])
-        inner = (share - _STAGES[stage]) / (_STAGES[stage + 1] - _STAGES[stage])
-        if stage == 4:
-            before, ahead = sum(self._usual), self.budget or 0.0
-            return (before + inner * ahead) / (before + ahead)
-        done = sum(self._usual[:stage]) + inner * self._usual[stage]
-        return done / sum(self._usual)
-
     @contextmanager
     def watching(self) -> Iterator[None]:
         """Let the first Ctrl-C stop the fit where it can be stopped, if nobody else listens to it."""
@@ -137,3 +124,35 @@ class Course:
             yield
         finally:
             signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+class Course(Stops):
+    """The way of a fit: stages say which share of theirs is done, and it is told which share of all work.
+
+    Parameters
+    ----------
+    within : Within
+    intervals : bool
+        Whether they are sought.
+    beside : int
+        How many simpler models are fitted too.
+    """
+
+    def __init__(self, within: Within, *, intervals: bool = True, beside: int = 0) -> None:
+        super().__init__(within)
+        self._usual = (*_USUAL[:2], _USUAL[2] * intervals, _USUAL[3] + _BESIDE * beside)
+        self.budget: float | None = None  # of the trials, once they begin, in the work of the search
+
+    def _of_all(self, share: float) -> float:
+        known = self._share(share)
+        return known if self.budget is not None else super()._of_all(known)
+
+    def _share(self, share: float) -> float:
+        """Return the share of all work that is done: what lies ahead is as much as usual beside what was measured."""
+        stage = max(k for k in range(5) if share >= _STAGES[k])
+        inner = (share - _STAGES[stage]) / (_STAGES[stage + 1] - _STAGES[stage])
+        if stage == 4:
+            before, ahead = sum(self._usual), self.budget or 0.0
+            return (before + inner * ahead) / (before + ahead)
+        done = sum(self._usual[:stage]) + inner * self._usual[stage]
+        return done / sum(self._usual)

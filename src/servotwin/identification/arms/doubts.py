@@ -1,0 +1,60 @@
+"""How surely the numbers of a robot are known: from the derivatives of the whole robot, and from beliefs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.identification.arms.numbers import RESISTANCE, VOLTAGE
+from servotwin.identification.arms.problem import Problem
+from servotwin.identification.arms.rows import Noise, parts_of
+from servotwin.identification.fitting.arrow import Loss, Prior
+from servotwin.identification.fitting.task import HUBER
+from servotwin.identification.fitting.uncertainty import Rows, Uncertainty, rows_of, uncertainty
+from servotwin.identification.fitting.words import Unidentifiable, explain, simplest, vague_directions
+
+Array = NDArray[np.float64]
+
+
+class Doubts(NamedTuple):
+    """Uncertainty of the numbers, how much of what is known of each is belief, and what the episodes cannot say."""
+
+    all: Uncertainty
+    shares: dict[str, float]
+    unidentifiable: tuple[Unidentifiable, ...]
+
+
+def doubts_of(what: Problem, x: Array, noise: Noise, found: Sequence[Array], slopes: Sequence[Array]) -> Doubts:
+    """Return what residuals and derivatives at a point say of the numbers."""
+    numbers, loss, nothing = what.numbers, Loss(HUBER), Prior(np.zeros(0), np.zeros(0))
+    rows: list[Rows] = [rows_of(part, loss, nothing, np.zeros(0)) for episode, residual, slope, used in zip(
+        what.episodes, found, slopes, what.used, strict=True)
+        for part in parts_of(episode, residual, slope, noise, used)]
+    stuck = what.at_bound(x)
+    prior = what.prior
+    beliefs = uncertainty(rows, prior, stuck)
+    known = np.array([numbers.weight[k] if name in (VOLTAGE, RESISTANCE) else 0.0
+                      for k, name in enumerate(numbers.names)])
+    moves = ~stuck
+    information = (beliefs.information + np.diag(known**2))[np.ix_(moves, moves)]
+    flags, directions = np.zeros(len(x), np.bool_), np.zeros((len(x), 0))
+    flags[moves], some = vague_directions(information, beliefs.inflation, _sizes(what)[moves])
+    directions = np.zeros((len(x), some.shape[1]))
+    directions[moves] = some
+    if some.shape[1]:
+        directions = simplest(directions)
+    belief = np.array([one.belief for one in numbers.all])
+    prior_share = dict(zip(numbers.names, np.clip((beliefs.std / belief)**2, 0.0, 1.0).tolist(), strict=True))
+    shares = [1.0 if one.logarithmic else math.nan for one in numbers.all]
+    named = {str(one): one for one in explain(numbers.names, shares, flags, directions)}  # several of the same members
+    return Doubts(beliefs, prior_share, tuple(named.values()))
+
+
+def _sizes(what: Problem) -> Array:
+    """Return what counts as the whole of a number, on its scale: what is believed of it, or 1."""
+    weight = what.numbers.weight
+    return np.where(weight > 0.0, 1.0 / np.maximum(weight, 1e-300), 1.0)
