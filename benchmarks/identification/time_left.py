@@ -63,8 +63,7 @@ def main(count: int = 10) -> None:
             print(f"  {fit:3d} {whole:6.1f} s   too short", flush=True)
             continue
         # time goes on, so what is left may stay only if work turns out larger
-        lowest = np.minimum.accumulate(value)
-        rise = float(np.max(value - lowest) / whole)
+        rise = float(np.max(value - np.minimum.accumulate(value)) / whole)
         near = [value[min(np.searchsorted(time, share * whole), len(time) - 1)] / max((1.0 - share) * whole, 1e-9)
                 for share in AT]
         print(f"  {fit:3d} {whole:6.1f} s   {'   '.join(f'{one:7.2f}' for one in near)}   {100.0 * rise:4.0f} % of all",
