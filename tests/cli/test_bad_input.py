@@ -66,6 +66,7 @@ def test_servos(cli, tmp_path, words, said):
     (["--step", "a:b"], "--step: got 'a:b'"),
     (["--step", ""], "--step: got ''"),
     (["--step", "0:1", "--at", "nan"], "step(at): got nan"),
+    (["--step", "0:1", "--at", "-1"], "--at: got -1, allowed: 0 s or later"),
     (["--step", "0:1", "--over", "1"], "--over goes with --ramp, not with --step"),
     (["--step", "0:1", "--hold", "linear"], "--hold goes with --command, not with --step"),
     (["--constant", "0", "--at", "1"], "--at goes with --step, --ramp, not with --constant"),

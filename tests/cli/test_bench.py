@@ -113,7 +113,7 @@ WRONG = [
 def test_what_is_wrong_is_told_in_one_line(cli, tmp_path, words, said):
     (tmp_path / "bench.csv").write_text("mine")
     assert said in cli("bench", *words).error
-    assert not (tmp_path / "runs").exists() or not list((tmp_path / "runs").iterdir())
+    assert not (tmp_path / "runs").exists()
     assert (tmp_path / "bench.csv").read_text() == "mine"
 
 

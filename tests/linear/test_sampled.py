@@ -135,3 +135,16 @@ def test_a_profile_is_named():
     model = st.DigitalServo(st.load_servo("feetech-sts3215-12v"))
     with pytest.warns(UserWarning, match=r"leaves out firmware\.acceleration_limit, firmware\.speed_limit"):
         st.linear.sampled(model)
+
+
+@pytest.mark.parametrize(("model", "holds"), [
+    (st.PulseServo(st.load_servo("hitec-hs-755hb")), 1), (st.DigitalServo(sts(D=0)), 1), (st.DigitalServo(sts()), 20)])
+def test_the_closed_loop_is_a_system_of_python_control(model, holds):
+    """Its poles are those of the loop, its period is that after which the loop is the same again."""
+    seen = st.linear.sampled(model)
+    system = seen.system()
+    assert system.dt == pytest.approx(holds * seen.period)
+    np.testing.assert_allclose(np.sort(np.abs(system.poles())), np.sort(np.abs(np.linalg.eigvals(
+        seen.law.monodromy()))), atol=1e-9)
+    step = control.step_response(system, T=np.arange(200) * system.dt)
+    assert step.outputs[-1] == pytest.approx(1.0, abs=1e-3)

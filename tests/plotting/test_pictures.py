@@ -53,6 +53,8 @@ def test_unknown_signals_are_refused(result):
         plotting.time_response(result, ["output_angel"])
     with pytest.raises(InputError):
         plotting.time_response(result, [])
+    with pytest.raises(InputError, match="what simulate returns"):
+        plotting.time_response("x")
 
 
 @pytest.mark.parametrize("ending", ["png", "svg", "pdf"])

@@ -14,7 +14,7 @@ from servotwin.cli.bench_calibrate import calibrate
 from servotwin.cli.bench_paper import bench_paper
 from servotwin.cli.bench_record import record, rehearse
 from servotwin.cli.bench_video import MARKER_EPILOG, MARKER_HELP, VIDEO_EPILOG, VIDEO_HELP, marker, video
-from servotwin.cli.terminal import emit, emit_help, emit_json, pairs, show, table
+from servotwin.cli.terminal import emit, emit_help, emit_json, pairs, show, table, typed
 
 if TYPE_CHECKING:
     from servotwin.bench.recording import AnalogRig
@@ -104,7 +104,8 @@ def flash(
 
     where = words.port_from(port)
     put(where, board)
-    emit(f"the firmware of the bench is on the board at {where}; next: servotwin bench check --port {where}")
+    emit(f"the firmware of the bench is on the board at {where}; next: "
+         + typed("servotwin", "bench", "check", "--port", where))
 
 
 _RANGE = "--range 1000us:2000us --voltage 6V --current-limit 0.8A"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -64,14 +64,22 @@ class Files:
             if path.exists() and not self.force:
                 raise OutputExistsError(path)
 
-    def make(self) -> None:
-        """Make the folder."""
+    @contextlib.contextmanager
+    def made(self) -> Iterator[None]:
+        """Make the folder, and take it away again if nothing came into it."""
         from servotwin.errors import OutputError
 
+        new = [folder for folder in (self.out, *self.out.parents) if not folder.exists()]
         try:
             self.out.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise OutputError(f"--out {self.out} cannot be made ({error.strerror})") from None
+        try:
+            yield
+        finally:
+            with contextlib.suppress(OSError):  # one that is not empty stays
+                for folder in new:
+                    folder.rmdir()
 
 
 class Job(Protocol):

@@ -11,7 +11,7 @@ import typer
 
 from servotwin.cli import bench_options as words
 from servotwin.cli import shared_options as shared
-from servotwin.cli.terminal import emit, emit_json, show, table
+from servotwin.cli.terminal import emit, emit_json, show, table, typed
 
 if TYPE_CHECKING:
     from servotwin.bench.recording import Experiment, Limits, Recorded, Wiring
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 _FIDELITIES = ("pulse", "pulse-inductive", "digital")
 _SLICE = 0.1  # s
-_NEXT = "servotwin fit {folder} --servo {servo}"
 
 
 def record(
@@ -75,8 +74,9 @@ def record(
         job = OneServo(AnalogRig(SerialBackend(words.port_from(port)), words.wiring_from(wiring), rate=rate), files)
     else:
         job = SeveralServos(bus_of(bus, words.port_from(port), identity or [], baud, period), files)
-    files.make()
-    _report(recorded(job, made), out, servo, job, as_json=as_json)
+    with files.made():
+        done = recorded(job, made)
+    _report(done, out, servo, job, as_json=as_json)
 
 
 def rehearse(
@@ -139,9 +139,10 @@ def rehearse(
                                 noise=quantity("--noise", noise, "voltage"), seed=seed)
     if remark:
         warnings.warn(remark, stacklevel=2)
-    files.make()
     job = OneServo(rig, files)
-    _report(recorded(job, made), out, servo, job, as_json=as_json)
+    with files.made():
+        done = recorded(job, made)
+    _report(done, out, servo, job, as_json=as_json)
 
 
 def _offered(model: Model, load: Load, wiring: Wiring, *, noise: float, seed: int) -> None:
@@ -151,7 +152,8 @@ def _offered(model: Model, load: Load, wiring: Wiring, *, noise: float, seed: in
 
     board, _ = rehearsal_board(model, load, wiring, noise=noise, seed=seed, real_time=True)
     with Terminal(board) as terminal:
-        emit(f"the board is at {terminal.port}, until Ctrl-C; try servotwin bench check --port {terminal.port}")
+        emit(f"the board is at {terminal.port}, until Ctrl-C; try "
+             + typed("servotwin", "bench", "check", "--port", terminal.port))
         while True:
             terminal.serve(_SLICE)
 
@@ -197,4 +199,4 @@ def _report(found: Sequence[Recorded], out: Path, servo: str, job: Job, *, as_js
     rows = [(str(one.path), str(one.rows), f"{one.duration:.2f} s") for one in found]
     lost = facts.get("lost_frames", 0)
     remark = [f"{lost} frames of the wire were lost: there are gaps in the rows"] if lost else []
-    show(table(("log", "rows", "time"), rows), *remark, "", "next: " + _NEXT.format(folder=out, servo=servo))
+    show(table(("log", "rows", "time"), rows), *remark, "", "next: " + typed("servotwin", "fit", out, "--servo", servo))

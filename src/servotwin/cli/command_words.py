@@ -85,6 +85,8 @@ class CommandWords:
             if name in given and shapes[0] not in owners:
                 fitting = ", ".join(f"--{owner}" for owner in owners)
                 raise CommandError(f"--{name} goes with {fitting}, not with --{shapes[0]}")
+        if self.at is not None and self.at < 0.0:
+            raise CommandError(f"--at: got {self.at:g}, allowed: 0 s or later")
         if shapes[0] == "ramp" and self.over is None:
             raise CommandError("--ramp needs --over SECONDS, how long it takes")
         return shapes[0]

@@ -7,6 +7,8 @@ import io
 import json
 import math
 import os
+import shlex
+import subprocess
 import sys
 from typing import TYPE_CHECKING, Any
 
@@ -136,6 +138,18 @@ def _finite(data: Any) -> Any:
     if isinstance(data, float):
         return data + 0.0 if math.isfinite(data) else None
     return data
+
+
+def typed(*words: object) -> str:
+    """Return a command line as it is typed in a shell of this system.
+
+    Examples
+    --------
+    >>> typed("servotwin", "fit", "my runs", "--servo", "x.toml").replace('"', "'")
+    "servotwin fit 'my runs' --servo x.toml"
+    """
+    texts = [str(word) for word in words]
+    return subprocess.list2cmdline(texts) if os.name == "nt" else shlex.join(texts)
 
 
 def pairs(rows: Sequence[tuple[str, str]]) -> RenderableType:

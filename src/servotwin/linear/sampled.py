@@ -202,7 +202,7 @@ class SampledServo:
         Raises
         ------
         InputError
-            If the servo is digital: with what it remembers its loop is not one of the angle alone.
+            If the servo is digital: with what it remembers its loop is not one of the angle alone; see `system`.
 
         Examples
         --------
@@ -215,12 +215,38 @@ class SampledServo:
         import control
 
         if not isinstance(self.law, Bursts):
-            raise InputError("loop of a digital servo", got=self.model, allowed="open_loop, poles_at and margins: its "
-                             "derivative is renewed every so many ticks")
+            raise InputError("loop of a digital servo", got=self.model, allowed="system for the "
+                             "closed loop; open_loop, poles_at and margins")
         plant = self.law.plant
         found: Any = control.StateSpace(
             self.law.transition, self.law.jump()[:, np.newaxis], plant.angle[np.newaxis, :], [[0.0]], self.period,
             states=list(plant.states), inputs=["error_angle"], outputs=["output_angle"], name="frames")
+        return found
+
+    def system(self) -> control.StateSpace:
+        """Return the closed loop from a commanded angle to the output angle as a python-control system.
+
+        A pulse servo's is that of its edges. A digital servo's derivative is renewed every so many ticks, and its loop
+        is the same again after these: that is the system's period, and for so long a command is held.
+
+        Examples
+        --------
+        >>> import servotwin as st
+        >>> servo = st.DigitalServo(st.load_servo("dynamixel-xl330-m288"))
+        >>> system = st.linear.sampled(servo).system()
+        >>> system.dt, system.ninputs, round(float(system.dcgain()), 6)
+        (0.001, 1, 1.0)
+        """
+        import control
+
+        ends: dict[str, Any] = {"inputs": ["command_angle"], "outputs": ["output_angle"]}
+        if not isinstance(self.law, Ticks):
+            loop: Any = control.StateSpace(control.feedback(self.loop()), name="frames", **ends)
+            return loop
+        A, B = self.law.over_a_turn()
+        q = np.append(self.law.plant.angle, np.zeros(len(B) - len(self.law.plant.angle)))
+        found: Any = control.StateSpace(A, B[:, np.newaxis], q[np.newaxis, :], [[0.0]], self.law.ticks * self.period,
+                                        name="ticks", **ends)
         return found
 
 

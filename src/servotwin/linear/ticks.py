@@ -93,6 +93,14 @@ class Ticks:
             z = z @ transition.T + np.outer(turn**k, told)
         return (duty / len(ticks)).reshape(np.shape(omega))
 
+    def over_a_turn(self) -> tuple[Array, Array]:
+        """Return the closed loop until it is the same again, under an angle r held meanwhile: z' = A z + B r."""
+        A, B = np.eye(len(self._all[0].drive)), np.zeros(len(self._all[0].drive))
+        for tick in self._all:
+            closed = tick.transition + np.outer(tick.drive, tick.law)
+            A, B = closed @ A, closed @ B + tick.told + tick.drive * tick.direct
+        return A, B
+
     def monodromy(self, gain: float = 1.0) -> Array:
         """Return the transition of the closed loop until it is the same again, its gain `gain` times its own."""
         found = np.eye(len(self._all[0].drive))

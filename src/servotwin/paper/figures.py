@@ -211,7 +211,7 @@ def _over_angle(study: PaperStudy) -> Picture:
 
 def _comparison(study: PaperStudy, name: str, title: str, fit_name: str, quantity: str, x_label: str,
                 caption: str) -> Picture:
-    """Draw measured points, their line and both simulated tables, and below all less the line."""
+    """Draw measured points, their line and both simulated tables, and below how far all of these are off the line."""
     fit = study.fits[fit_name]
     is_angle = quantity == "output_angle"
     x, y = fit.x, fit.y
@@ -237,7 +237,7 @@ def _comparison(study: PaperStudy, name: str, title: str, fit_name: str, quantit
     below.append(Curve("", x, scale * (y - fit.line(x)), points=True, style=0))
     figure = plotting.curves(
         drawn, x_label=x_label, y_label="output angle $q$ (°)" if is_angle else "feedback voltage $v_o$ (V)",
-        below=below, below_label=f"less the line ({unit})", height=4.4)
+        below=below, below_label=f"off the line ({unit})", height=4.4)
     if is_angle:
         caption += " Bars: the standing band, where the shaft stops coming from below and from above, set side by side."
     return Picture(name=name, title=title, caption=caption, figure=figure, columns=columns)

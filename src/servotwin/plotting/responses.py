@@ -91,7 +91,7 @@ def time_response(result: Result, signals: Sequence[str] | None = None) -> Figur
     UnknownNameError
         If the model has no such signal.
     InputError
-        If `signals` is empty.
+        If it is no result, or `signals` is empty.
 
     Examples
     --------
@@ -101,6 +101,10 @@ def time_response(result: Result, signals: Sequence[str] | None = None) -> Figur
     >>> len(time_response(result, ["output_angle", "armature_voltage"]).axes)
     2
     """
+    from servotwin.simulation import Result
+
+    if not isinstance(result, Result):
+        raise InputError("result of time_response", got=result, allowed="what simulate returns")
     names = _names(result, signals)
     figure, axes = axes_grid(len(names), height=0.7 + 1.25 * len(names), margins=(0.88, 0.1, 0.45, 0.3, 0.15))
     with context():

@@ -170,7 +170,8 @@ class State:
             if place.name == name:
                 value: float = place.factor * getattr(self.memory.point.y, place.at)
                 return value
-        raise KeyError(f"{name!r} is no state; there are: {', '.join(self.names)}")
+        raise KeyError(f"{name!r} is no state; there are: {', '.join(self.names)}; signals that follow from these: "
+                       "Simulator.observe(state, name, command)")
 
 
 class Segment(NamedTuple):
