@@ -93,7 +93,8 @@ class Forecast:
         self.noise = dict.fromkeys(self.sensors, 1.0)
         self.step = WIDE if isinstance(model, DigitalServo) else STEP  # of the differences that are derivatives
         delayed = any(name in nuisance for name in ("delay", "log_delay", "frame_phase"))
-        self.cases = tuple(make_case(log, model, space, self.sensors, delayed=delayed) for log in logs)
+        signals: dict[tuple[Any, ...], Signal] = {}
+        self.cases = tuple(make_case(log, model, space, self.sensors, delayed=delayed, signals=signals) for log in logs)
         self.strict = True
         fades = _STRIBECK in space.names or model.value_or(_STRIBECK, 0.0) > 0.0
         bent = fades or any(log.load.pendulums or log.load.springs for log in logs)
