@@ -238,23 +238,36 @@ class Forecast:
 
     def at_all(self, points: Sequence[Point], *, derivatives: bool | Sequence[bool] = False, central: bool = False,
                step: float | None = None, cases: Sequence[int] | None = None, rates: bool = False,
-               noises: Sequence[Mapping[str, float]] | None = None) -> list[list[LogPart]]:
+               noises: Sequence[Mapping[str, float]] | None = None, leading: bool = False) -> list[list[LogPart]]:
         """Return what the logs say at several points, in one batch; for each point, log by log.
 
         `derivatives` may differ from point to point, and so may the noise; `rates` gives what a delay changes without
-        derivatives, for all signals.
+        derivatives, for all signals. Derivatives that are `leading` a search, no more, are those of lanes that go
+        nearly where there are any: residuals are of the engine itself.
         """
         which, step = range(len(self.cases)) if cases is None else cases, self.step if step is None else step
         self.running.look()
         sloped = [derivatives] * len(points) if isinstance(derivatives, bool) else derivatives
-        lanes = [LogLanes(self, k, at, point, sides=(1 + central) * sloped[at], step=step, rates=rates,
-                          noise=self.noise if noises is None else noises[at])
-                 for k in which for at, point in enumerate(points)]
-        self.work += sum(lane.cost for lane in lanes)
-        self._simulate(lanes, step if any(sloped) else STEP)
+        both = leading and self.bent and not self.nearly  # the nominal lane one way, those beside it another
+
+        def lanes_of(sides: Sequence[int], *, nearly: bool, only: Sequence[bool] | None = None) -> list[LogLanes]:
+            return [LogLanes(self, k, at, point, sides=sides[at], step=step, rates=rates, nearly=nearly,
+                             noise=self.noise if noises is None else noises[at])
+                    for k in which for at, point in enumerate(points) if only is None or only[at]]
+
+        sides = [(1 + central) * one for one in sloped]
+        lanes = lanes_of([0] * len(points) if both else sides, nearly=self.nearly)
+        beside = lanes_of(sides, nearly=True, only=sloped) if both else []
+        self.work += sum(lane.cost for lane in (*lanes, *beside))
+        self._simulate([*lanes, *beside], step if any(sloped) else STEP)
         found: list[list[LogPart]] = [[] for _ in points]
         for lane in lanes:
             found[lane.at].append(lane.part)
+        place = dict.fromkeys(range(len(points)), 0)
+        for lane in beside:
+            there, k = found[lane.at], place[lane.at]
+            there[k] = there[k]._replace(shared=lane.part.shared, own=lane.part.own)
+            place[lane.at] = k + 1
         return found
 
     def _simulate(self, lanes: Sequence[LogLanes], step: float) -> None:
@@ -263,12 +276,12 @@ class Forecast:
         accuracy = min(self.running.accuracy, max(self.running.accuracy * step / STEP, _FINEST))
         kinds: dict[tuple[Any, ...], list[int]] = {}
         for k, lane in enumerate(lanes):
-            kinds.setdefault(lane.case.key, []).append(k)
+            kinds.setdefault((lane.nearly, lane.case.key), []).append(k)
         bundles, pace = [lane.bundle() for lane in lanes], self._pace if math.isfinite(self._pace) else _PACE
         calls = [[some[i] for i in call] for some in kinds.values()
                  for call in batches([bundles[k] for k in some], pace, self.running.crew)]
         work = [Batch(self.model, lanes[call[0]].outputs, accuracy, self.strict, tuple(bundles[k] for k in call),
-                      self.nearly)
+                      lanes[call[0]].nearly)
                 for call in calls]
         with closing(self._done(work)) as running:
             for call, batch, done in zip(calls, work, running, strict=True):

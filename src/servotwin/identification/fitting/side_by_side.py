@@ -18,7 +18,7 @@ Ask = Callable[[list[Array]], list[Seen]]
 _MOST = 60  # steps
 _NOTHING = 1e-30  # of the squares of the first residuals: all is explained
 _MOST_DAMPING = 1e9
-_PATIENCE = 10  # trials
+_PATIENCE = 8  # trials
 _SMALL = 2**17  # products of numbers
 
 
