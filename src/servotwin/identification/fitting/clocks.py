@@ -56,21 +56,31 @@ def with_clocks(task: Task, starts: Sequence[Point], tell: Told, began: float) -
 
 def _with_phases(task: Task, start: Point, tell: Told, began: float) -> tuple[Point, float]:
     """Return where a search ends that finds the pulses of each log, and the logarithm of the noise there."""
-    task.forecast.own_phases = False
-    point = task.ran_roughly(start, tell, began)
-    task.measure(point)
-    task.forecast.own_phases = True
-    for k in range(_ROUNDS):
-        before = [task.forecast.frames_of(point, k) for k in task.fitted]
-        tell(began, "pulses")
-        there = settled(task.scan(point), task.fitted)
-        point = task.ran(there, tell, began).point if k else task.ran_roughly(there, tell, began)
-        task.measure(point)
-        if [task.forecast.frames_of(point, k) for k in task.fitted] == before:
+    few = task.some_of_many()
+    few.forecast.own_phases = False
+    point = few.ran(start, tell, began).point
+    few.measure(point)
+    few.forecast.own_phases = True
+    for _ in range(_ROUNDS):
+        point, stays = _assigned(few, point, tell, began)
+        if stays:
             break
     if task.forecast.ticked:
-        point = _with_ticks(task, point, tell, began)
+        point = _with_ticks(few, point, tell, began)
+    if few is not task:
+        task.measure(point)
+        point, _ = _assigned(task, point, tell, began)
+        point = ticking(task, point, tell, began)
     return point, math.fsum(math.log(value) for value in task.forecast.noise.values())
+
+
+def _assigned(task: Task, point: Point, tell: Told, began: float) -> tuple[Point, bool]:
+    """Return where a search ends with the best pulses for every log, and whether these are those of before."""
+    before = [task.forecast.frames_of(point, k) for k in task.fitted]
+    tell(began, "pulses")
+    point = task.ran(settled(task.scan(point), task.fitted), tell, began).point
+    task.measure(point)
+    return point, [task.forecast.frames_of(point, k) for k in task.fitted] == before
 
 
 def _with_ticks(task: Task, point: Point, tell: Told, began: float) -> Point:
@@ -163,21 +173,30 @@ def _with_period(task: Task, point: Point, tell: Told, began: float) -> Point:
     tell(began, "period of the pulses")
     wider = task.like(Forecast(
         [case.log for case in old.cases], old.model, old.space, (*old.nuisance, "frame_period"), old.sensors))
-    near = wider.ran(_with_its_period(point, task.period), tell, began).point
-    found = point
-    if task.pays(point, wider, near, _NEAR_PAYS):
-        found = near = _assigned_anew(wider, near, tell, began, rounds=1)
-    if far_off and _is_more_than_noise(wider, near):
-        far = _at_likely_period(task, wider, point, tell, began)
-        if wider.cost(far) < wider.cost(near) and task.pays(point, wider, far):
-            found = far
-    if found is point or _is_more_than_noise(wider, found):
+    few = task.some_of_many()
+    if few is not task and _period(few, few.like(wider.forecast, wider.prior), point, tell, began, far_off=far_off) is None:
+        return point
+    found = _period(task, wider, point, tell, began, far_off=far_off)
+    if found is None:
         return point  # what lacks something takes any further number: whether this one explains it, trials tell
     there = wider.forecast.nuisance_of(found.shared, "frame_period")
     task.become(wider, f"pulses come every {1e3 * there:.6g} ms by the logs, not every {1e3 * task.period:.6g} ms: "
                        "their period was fitted too")
     task.measure(found)
     return found
+
+
+def _period(task: Task, wider: Task, point: Point, tell: Told, began: float, *, far_off: bool) -> Point | None:
+    """Return where a search ends that has the period too; None where that does not pay, or explains too little."""
+    near = wider.ran(_with_its_period(point, task.period), tell, began).point
+    found = None
+    if task.pays(point, wider, near, _NEAR_PAYS):
+        found = near = _assigned_anew(wider, near, tell, began, rounds=1)
+    if far_off and _is_more_than_noise(wider, near):
+        far = _at_likely_period(task, wider, point, tell, began)
+        if wider.cost(far) < wider.cost(near) and task.pays(point, wider, far):
+            found = far
+    return None if found is None or _is_more_than_noise(wider, found) else found
 
 
 def _at_likely_period(task: Task, wider: Task, point: Point, tell: Told, began: float) -> Point:
