@@ -22,7 +22,6 @@ Array = NDArray[np.float64]
 _LEAST_STEP = 1e-7  # of a searched number
 _PATIENCE = 6  # small gains one after the other
 _LEAST_GAIN = 1e-3  # of the cost, half a sum of squares in units of noise: a twentieth of a standard error
-_AGREES, _KEPT = 0.7, 2  # of what a step promised: then derivatives serve for another one, and for how many
 _KINK = 0.3  # the same where the cost has kinks: less than one of these is deep
 
 
@@ -239,18 +238,12 @@ class Search:
         least_gain = max(self.least_gain if least_gain is None else least_gain, least_share * best.cost)
         damping, small = 1e-3, 0
         scale = np.zeros(self.forecast.size)
-        kept = 0  # steps since derivatives were taken
         for k in range(1, most + 1):
             if not all(np.isfinite(part.shared).all() and np.isfinite(part.own).all() for part in parts):
                 return best  # beside it is what no servo is: there is no slope to follow
             normal = self.normal(best.point, parts)
-            promise = self._promise(best.point, normal)
-            if kept and promise < least_gain:
-                parts, kept = (yield Ask(best.point, True)), 0
-                normal = self.normal(best.point, parts)
-                promise = self._promise(best.point, normal)
             # A gain is also small where the damping is high: what counts is what a whole step promises
-            if promise < least_gain:
+            if self._promise(best.point, normal) < least_gain:
                 return Outcome(best.point, best.cost, True, k)
             scale = np.maximum(0.5 * scale, np.diag(normal.H))
             while True:
@@ -261,26 +254,17 @@ class Search:
                 cost = self.cost_of(trial, parts_there)
                 if cost <= best.cost:
                     break
-                if kept:  # derivatives from farther back may be the reason
-                    parts, kept = (yield Ask(best.point, True)), 0
-                    normal = self.normal(best.point, parts)
-                    continue
                 damping = max(damping, 1e-6) * 6.0
                 if damping > 1e9:
                     return Outcome(best.point, best.cost, True, k)
             damping = max(damping / 8.0, 1e-9)
             small = small + 1 if best.cost - cost < least_gain else 0
-            agrees = best.cost - cost > _AGREES * promise
             best = Outcome(trial, cost, False, k)
             if tell is not None:
                 tell(k, best)
             if small > _PATIENCE or k == most:
                 return best
-            if agrees and kept < _KEPT:
-                parts, kept = [part._replace(residual=there.residual)
-                               for part, there in zip(parts, parts_there, strict=True)], kept + 1
-            else:
-                parts, kept = (yield Ask(trial, True)), 0
+            parts = yield Ask(trial, True)
         return best
 
     def _stays(self, x: Array, g: Array) -> NDArray[np.bool_]:

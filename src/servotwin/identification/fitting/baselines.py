@@ -37,7 +37,7 @@ _DELAYS = (0.0, 0.02, 0.04, 0.06, 0.09, 0.13, 0.2, 0.3)  # s, of the starts
 _LAGS = (0.01, 0.04, 0.15)  # s
 _SLEWS = (0.7, 1.0, 1.4)  # of what the logs show
 _STARTS = 4
-_ROUGHLY, _CLOSELY = 1e-3, 1e-6  # of the cost: less is an end, of several starts and of the best
+_ROUGHLY, _CLOSELY = 1e-2, 3e-6  # of the cost: less is an end, of several starts and of the best
 
 
 def fit_slew_lag(logs: Sequence[Log], *, loss: Loss = "linear", loss_scale: float | None = None) -> SlewLag:

@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from time import perf_counter
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,19 +114,9 @@ class Batch:
     bundles: tuple[Bundle, ...]
     nearly: bool = False
 
-    @property
-    def cost(self) -> float:
-        """What it takes, in seconds of one lane of which nothing is looked at."""
-        looks = sum({bundle.key: len(bundle.times) for bundle in self.bundles}.values())
-        return sum(bundle.lanes for bundle in self.bundles) * (
-            max(bundle.duration for bundle in self.bundles) + _LOOK * looks)
 
-
-class Done(NamedTuple):
-    """What comes of a batch: signals of each bundle, (n, T) each, None where it failed; and the time it took [s]."""
-
-    signals: list[dict[str, Array] | None]
-    seconds: float
+Done = list[dict[str, Array] | None]
+"""What comes of a batch: signals of each bundle, (n, T) each, None where it failed."""
 
 
 def simulated(batch: Batch) -> Done:
@@ -139,15 +127,13 @@ def simulated(batch: Batch) -> Done:
     InputError
         If a lane is nothing that can be simulated, and the batch is strict.
     """
-    began = perf_counter()
     try:
-        found: list[dict[str, Array] | None] = [*_simulated(batch)]
+        return [*_simulated(batch)]
     except InputError:
         if batch.strict:
             raise
         alone = [replace(batch, bundles=(bundle,)) for bundle in batch.bundles]
-        found = [None] if len(alone) == 1 else [one for some in alone for one in simulated(some).signals]
-    return Done(found, perf_counter() - began)
+        return [None] if len(alone) == 1 else [one for some in alone for one in simulated(some)]
 
 
 def _simulated(batch: Batch) -> list[dict[str, Array]]:

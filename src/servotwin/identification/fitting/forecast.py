@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, contextmanager
 from typing import Any
 
 import numpy as np
@@ -48,7 +48,10 @@ _BEFORE = 5  # pulses: by then a servo hunts as it will
 _HOLDS = 0.5  # of the friction that a servo file says: what it surely holds without drives
 _HELD = 1e-6  # of its scale: how far a number moves that stays
 _KEPT = 500  # commands
-_PACE = 2e-5  # s that a second of one lane takes, until it is known
+_PACE, _TICKING, _BENT = 2e-5, 1e-4, 6e-4
+"""s that a second of one lane takes, about: in closed form, of a program, and of one whose motion is integrated. They are
+not measured, for which lanes go into one call must not depend on the computer: a lane that is run for longer than it is
+looked at may differ in its last bits."""
 _FINEST = 1e-11  # rad, unless a finer accuracy is asked for
 _POTENTIOMETER = ("potentiometer.feedback_gain", "potentiometer.feedback_offset")
 
@@ -101,7 +104,6 @@ class Forecast:
         self.bent = bent and isinstance(model, DigitalServo)  # so that motion is integrated, as there is no closed form
         self.nearly = False  # whether torques of springs and pendulums count by their middle of each tick instead
         self._commands: dict[tuple[Any, ...], Signal] = {}  # points of a search often differ in other numbers only
-        self._pace = math.inf  # seconds that a second of one lane takes, as far as is known
         self.work = 0.0  # seconds of one lane that were simulated
         self.phased = "frame_phase" in nuisance and _PERIOD not in space.names and all(c.period for c in self.cases)
         self.extra = tuple(name for name in SHARED if name in nuisance and (name != "frame_period" or self.phased))
@@ -123,6 +125,15 @@ class Forecast:
         self.running, self.nearly = other.running, other.nearly and self.bent
         if self.phased and other.phased:
             self.own_phases = other.own_phases
+
+    @contextmanager
+    def roughly(self) -> Generator[None]:
+        """Let lanes go nearly for a while, where there are any that may."""
+        before, self.nearly = self.nearly, self.bent
+        try:
+            yield
+        finally:
+            self.nearly = before
 
     def names_of_own(self, case: Case) -> tuple[str, ...]:
         """Return which numbers a log has for itself."""
@@ -277,18 +288,24 @@ class Forecast:
         kinds: dict[tuple[Any, ...], list[int]] = {}
         for k, lane in enumerate(lanes):
             kinds.setdefault((lane.nearly, lane.case.key), []).append(k)
-        bundles, pace = [lane.bundle() for lane in lanes], self._pace if math.isfinite(self._pace) else _PACE
+        bundles = [lane.bundle() for lane in lanes]
         calls = [[some[i] for i in call] for some in kinds.values()
-                 for call in batches([bundles[k] for k in some], pace, self.running.crew)]
+                 for call in batches([bundles[k] for k in some], self._pace(nearly=lanes[some[0]].nearly),
+                                     self.running.crew)]
         work = [Batch(self.model, lanes[call[0]].outputs, accuracy, self.strict, tuple(bundles[k] for k in call),
                       lanes[call[0]].nearly)
                 for call in calls]
         with closing(self._done(work)) as running:
-            for call, batch, done in zip(calls, work, running, strict=True):
+            for call, done in zip(calls, running, strict=True):
                 self.running.look()
-                self._pace = min(self._pace, done.seconds / batch.cost)
-                for k, signals in zip(call, done.signals, strict=True):
+                for k, signals in zip(call, done, strict=True):
                     lanes[k].take(signals)
+
+    def _pace(self, *, nearly: bool) -> float:
+        """Return how long a second of one lane takes, about [s]."""
+        if not isinstance(self.model, DigitalServo):
+            return _PACE
+        return _BENT if self.bent and not nearly else _TICKING
 
     def _done(self, work: Sequence[Batch]) -> Generator[Done]:
         """Return what comes of each batch; a single one is simulated here and now, unless others are to do it."""
