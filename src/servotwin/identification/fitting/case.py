@@ -104,7 +104,8 @@ def make_case(log: Log, model: Model, space: Space, sensors: Sequence[str], *, d
     times = time[any_used]
     overridden = tuple(sorted(name for name in log.parameters))
     key = (log.command_kind, overridden, tuple(sorted(places)), bool(log.sent.all()))
-    return Case(log=log, signal=_signal(log, model, {} if signals is None else signals), times=times, places=places, values=values, start=(angle, speed),
+    signal = _signal(log, model, {} if signals is None else signals)
+    return Case(log=log, signal=signal, times=times, places=places, values=values, start=(angle, speed),
                 scatter=scatter, moving=moving, key=key, period=_period(log, model))
 
 

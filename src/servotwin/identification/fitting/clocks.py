@@ -57,30 +57,21 @@ def with_clocks(task: Task, starts: Sequence[Point], tell: Told, began: float) -
 def _with_phases(task: Task, start: Point, tell: Told, began: float) -> tuple[Point, float]:
     """Return where a search ends that finds the pulses of each log, and the logarithm of the noise there."""
     few = task.some_of_many()
-    few.forecast.own_phases = False
+    task.forecast.own_phases = False
     point = few.ran(start, tell, began).point
-    few.measure(point)
-    few.forecast.own_phases = True
-    for _ in range(_ROUNDS):
-        point, stays = _assigned(few, point, tell, began)
-        if stays:
+    task.measure(point)
+    task.forecast.own_phases = True
+    for k in range(_ROUNDS):
+        before = [task.forecast.frames_of(point, k) for k in task.fitted]
+        tell(began, "pulses")
+        there = settled(task.scan(point), task.fitted)
+        point = (task if k else few).ran(there, tell, began).point
+        task.measure(point)
+        if [task.forecast.frames_of(point, k) for k in task.fitted] == before:
             break
     if task.forecast.ticked:
-        point = _with_ticks(few, point, tell, began)
-    if few is not task:
-        task.measure(point)
-        point, _ = _assigned(task, point, tell, began)
-        point = ticking(task, point, tell, began)
+        point = _with_ticks(task, point, tell, began)
     return point, math.fsum(math.log(value) for value in task.forecast.noise.values())
-
-
-def _assigned(task: Task, point: Point, tell: Told, began: float) -> tuple[Point, bool]:
-    """Return where a search ends with the best pulses for every log, and whether these are those of before."""
-    before = [task.forecast.frames_of(point, k) for k in task.fitted]
-    tell(began, "pulses")
-    point = task.ran(settled(task.scan(point), task.fitted), tell, began).point
-    task.measure(point)
-    return point, [task.forecast.frames_of(point, k) for k in task.fitted] == before
 
 
 def _with_ticks(task: Task, point: Point, tell: Told, began: float) -> Point:
@@ -174,9 +165,12 @@ def _with_period(task: Task, point: Point, tell: Told, began: float) -> Point:
     wider = task.like(Forecast(
         [case.log for case in old.cases], old.model, old.space, (*old.nuisance, "frame_period"), old.sensors))
     few = task.some_of_many()
-    if few is not task and _period(few, few.like(wider.forecast, wider.prior), point, tell, began, far_off=far_off) is None:
-        return point
-    found = _period(task, wider, point, tell, began, far_off=far_off)
+    both = [(few, few.like(wider.forecast, wider.prior)), (task, wider)][few is task:]
+    found = None
+    for search, other in both:  # on all of many logs only where some want it
+        found = _period(search, other, point, tell, began, far_off=far_off)
+        if found is None:
+            break
     if found is None:
         return point  # what lacks something takes any further number: whether this one explains it, trials tell
     there = wider.forecast.nuisance_of(found.shared, "frame_period")

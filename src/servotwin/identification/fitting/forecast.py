@@ -49,9 +49,10 @@ _HOLDS = 0.5  # of the friction that a servo file says: what it surely holds wit
 _HELD = 1e-6  # of its scale: how far a number moves that stays
 _KEPT = 500  # commands
 _PACE, _TICKING, _BENT = 2e-5, 1e-4, 6e-4
-"""s that a second of one lane takes, about: in closed form, of a program, and of one whose motion is integrated. They are
-not measured, for which lanes go into one call must not depend on the computer: a lane that is run for longer than it is
-looked at may differ in its last bits."""
+"""s that a second of one lane takes, about: in closed form, of a program, and of one whose motion is integrated.
+
+They are not measured, for which lanes go into one call must not depend on how busy a computer is: a lane that runs for
+longer than it is looked at may differ in its last bits."""
 _FINEST = 1e-11  # rad, unless a finer accuracy is asked for
 _POTENTIOMETER = ("potentiometer.feedback_gain", "potentiometer.feedback_offset")
 
@@ -261,24 +262,20 @@ class Forecast:
         sloped = [derivatives] * len(points) if isinstance(derivatives, bool) else derivatives
         both = leading and self.bent and not self.nearly  # the nominal lane one way, those beside it another
 
-        def lanes_of(sides: Sequence[int], *, nearly: bool, only: Sequence[bool] | None = None) -> list[LogLanes]:
-            return [LogLanes(self, k, at, point, sides=sides[at], step=step, rates=rates, nearly=nearly,
-                             noise=self.noise if noises is None else noises[at])
-                    for k in which for at, point in enumerate(points) if only is None or only[at]]
+        def lanes_of(*, nearly: bool, beside: bool) -> list[LogLanes]:
+            none = both and not beside
+            return [LogLanes(self, k, at, point, sides=0 if none else (1 + central) * sloped[at], step=step, rates=rates,
+                             noise=self.noise if noises is None else noises[at], nearly=nearly)
+                    for k in which for at, point in enumerate(points) if sloped[at] or not beside]
 
-        sides = [(1 + central) * one for one in sloped]
-        lanes = lanes_of([0] * len(points) if both else sides, nearly=self.nearly)
-        beside = lanes_of(sides, nearly=True, only=sloped) if both else []
-        self.work += sum(lane.cost for lane in (*lanes, *beside))
-        self._simulate([*lanes, *beside], step if any(sloped) else STEP)
+        lanes, slopes = lanes_of(nearly=self.nearly, beside=False), lanes_of(nearly=True, beside=True) if both else []
+        self.work += sum(lane.cost for lane in (*lanes, *slopes))
+        self._simulate([*lanes, *slopes], step if any(sloped) else STEP)
         found: list[list[LogPart]] = [[] for _ in points]
+        waiting = iter(slopes)  # in the same order
         for lane in lanes:
-            found[lane.at].append(lane.part)
-        place = dict.fromkeys(range(len(points)), 0)
-        for lane in beside:
-            there, k = found[lane.at], place[lane.at]
-            there[k] = there[k]._replace(shared=lane.part.shared, own=lane.part.own)
-            place[lane.at] = k + 1
+            there = next(waiting).part if both and sloped[lane.at] else lane.part
+            found[lane.at].append(lane.part._replace(shared=there.shared, own=there.own))
         return found
 
     def _simulate(self, lanes: Sequence[LogLanes], step: float) -> None:

@@ -48,7 +48,7 @@ _DELAYS = (_DELAY, 0.0, 0.04, 0.06, 0.09)
 _STARTS = 0.6  # of the way: rough searches from several starts
 _MOST = {"rough": 12, "all": 25, "few": 10}  # steps
 _FEW_ROUNDS = 2  # of search and noise among kinks, where a search wanders on for ever
-_MANY_LOGS = 16  # of more, so many lead near
+_MANY_LOGS = 16  # from which on half as many lead near
 _ABOUT = 0.3  # of a searched number: how far off a servo file may be, while clocks are sought
 _NOTHING = 0.35  # of what a search began with
 _PAYS = 10.0  # of the cost, for each independent residual: what another clock has to gain
@@ -174,10 +174,10 @@ class Task:
         return ticking(self, other.point, tell, began) if other.cost < here.cost else here.point
 
     def some_of_many(self) -> Task:
-        """Return the search on some logs of every kind of motion, which lead near first; itself unless there are many."""
+        """Return the search on some logs of every kind of motion, which lead near; itself unless there are many."""
         if len(self.fitted) <= _MANY_LOGS:
             return self
-        return self.like(self.forecast, cases=self.few(_MANY_LOGS))
+        return self.like(self.forecast, cases=self.few(_MANY_LOGS // 2))
 
     def ran(self, start: Point, tell: Told, began: float) -> Outcome:
         """Search from a point on all logs that are fitted, as closely as is needed to choose between points."""

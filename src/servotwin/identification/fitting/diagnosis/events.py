@@ -34,7 +34,7 @@ _NORMAL = 1.4826  # standard deviation over median magnitude of a normal law
 
 @dataclass(frozen=True)
 class _Kind:
-    """One kind of event: where it may be in a log, the log with some of them, and whether it only delays what follows."""
+    """One kind of event: where it may be in a log, the log with some, and whether it only delays what follows."""
 
     places: Callable[[Log], Sequence[int]]
     put: Callable[[Log, Sequence[int]], Log]
