@@ -264,8 +264,8 @@ class Forecast:
 
         def lanes_of(*, nearly: bool, beside: bool) -> list[LogLanes]:
             none = both and not beside
-            return [LogLanes(self, k, at, point, sides=0 if none else (1 + central) * sloped[at], step=step, rates=rates,
-                             noise=self.noise if noises is None else noises[at], nearly=nearly)
+            return [LogLanes(self, k, at, point, sides=0 if none else (1 + central) * sloped[at], step=step,
+                             rates=rates, noise=self.noise if noises is None else noises[at], nearly=nearly)
                     for k in which for at, point in enumerate(points) if sloped[at] or not beside]
 
         lanes, slopes = lanes_of(nearly=self.nearly, beside=False), lanes_of(nearly=True, beside=True) if both else []
