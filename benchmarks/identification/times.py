@@ -1,9 +1,11 @@
 """Part 6: seconds of CPU that typical fits take, default ones and first results, and how far estimates are off.
 
-    python benchmarks/identification/times.py [ROW ...] [first]
+    python benchmarks/identification/times.py [ROW ...] [first | standin]
 
 A default fit has intervals, a verdict and the simpler models beside it; a first result has none of these. CPU time is
-that of all threads, kernels being there. Rows `xl330` and `miuzei` need the measured logs beside the repository.
+that of all threads, kernels being there. `standin` prints what first results of lanes that go nearly say, alone, beside
+those of the engine, in shares of the engine's intervals. Rows `xl330` and `miuzei` need the measured logs beside the
+repository.
 """
 
 import math
@@ -27,6 +29,7 @@ import servotwin as st
 from reference import rig
 from reference import rig_draws as draws
 from reference.rig_logs import REDUCTION, log_of
+from servotwin.identification.fitting.task import Task
 
 DATA = next((one for up in Path(__file__).resolve().parents if (one := up / "shared" / "data").is_dir()), None)
 XL330 = ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque",
@@ -234,6 +237,25 @@ def measure(name: str, *, first_only: bool = False) -> None:
           f"{fit.verdict.sentence if fit.verdict else ''}", flush=True)
 
 
+def standin(name: str) -> None:
+    """Print the estimates of a search that never goes by the engine itself beside those of the engine."""
+    if name not in ROWS:
+        return
+    row = ROWS[name]()
+    fit, spent = _timed(lambda: _fit(row, diagnose=False, compare_with=()))
+    exactly = Task.exactly
+    Task.exactly = lambda self, point: None  # so that the last search stays with lanes that go nearly
+    try:
+        near, sooner = _timed(lambda: _fit(row, **FIRST))
+    finally:
+        Task.exactly = exactly
+    print(f"  {name:12} engine with intervals {spent:.1f} s, stand-in {sooner:.1f} s; estimate of the engine, of the "
+          "stand-in, and how far that is, in widths of the interval")
+    for number, (lower, upper, _) in fit.intervals().items():
+        one, other = fit.estimates[number], near.estimates[number]
+        print(f"    {number:42} {one:12.5g} {other:12.5g} {(other - one) / (upper - lower):+8.3f}", flush=True)
+
+
 def _rms(fit: st.Fit) -> float:
     """Return what is left of the fitted logs [mrad]."""
     return 1e3 * math.sqrt(np.mean(np.concatenate([t.residual for t in fit.traces if not t.held_out]) ** 2))
@@ -241,10 +263,13 @@ def _rms(fit: st.Fit) -> float:
 
 def main(*words: str) -> None:
     print("seconds of CPU of a first result and of a default fit; estimates, off the truth where it is known")
-    names = [word for word in words if word != "first"] or [*ROWS, *LADDERS]
+    names = [word for word in words if word not in ("first", "standin")] or [*ROWS, *LADDERS]
     for name in names:
         try:
-            measure(name, first_only="first" in words)
+            if "standin" in words:
+                standin(name)
+            else:
+                measure(name, first_only="first" in words)
         except FileNotFoundError as missing:
             print(f"  {name:12} left out: {missing}", flush=True)
 

@@ -32,7 +32,7 @@ def crew(workers=2):
     ([bundle(step=0.02 + 1e-4 * k) for k in range(5)], FAST, 1),  # other times, which cost less than another call
     ([bundle(duration=1.0 + 0.1 * k) for k in range(5)], FAST, 1),
     ([bundle(duration=1.0 + 0.1 * k) for k in range(5)], SLOW, 5),  # nobody waits for the longest
-    ([bundle(lanes=1, step=0.02 + 1e-4 * k) for k in range(4)], SLOW, 4),
+    ([bundle(lanes=1, step=0.02 + 1e-4 * k) for k in range(4)], SLOW, 2),
     ([bundle() for _ in range(100)], SLOW, 4),  # two for each worker
     ([bundle(lanes=1)], SLOW, 1),
     ([], FAST, 0),

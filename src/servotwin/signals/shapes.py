@@ -223,7 +223,7 @@ def pulse_train(edges: ArrayLike, widths: ArrayLike, *, unit: str = "us") -> Sig
 
 def _held(t: NDArray[np.float64], y: NDArray[np.float64], unit: str, frame_period: float | None) -> Signal:
     keep = np.append(True, np.diff(y) != 0.0)  # equal neighbours are one piece
-    rows = tuple(Piece(a, b) for a, b in zip(t[keep].tolist(), y[keep].tolist(), strict=True))
+    rows = tuple(map(Piece, t[keep].tolist(), y[keep].tolist()))
     before = max(int(np.searchsorted(t, 0.0)) - 1, 0)  # the sample in force just before t = 0, else the first
     return Signal(pieces=Pieces(rows), unit=unit, initial=float(y[before]), frame_period=frame_period)
 

@@ -167,7 +167,7 @@ def together(forecast: Forecast, cases: Sequence[int], searches: Sequence[Genera
     while asks:
         now = list(asks)
         found = forecast.at_all([asks[k].point for k in now], derivatives=[asks[k].derivatives for k in now],
-                                cases=cases, noises=None if noises is None else [noises[k] for k in now])
+                                cases=cases, noises=None if noises is None else [noises[k] for k in now], leading=True)
         for k, parts in zip(now, found, strict=True):
             go_on(k, parts)
     return [ended[k] for k in range(len(searches))]
@@ -262,7 +262,7 @@ class Search:
             best = Outcome(trial, cost, False, k)
             if tell is not None:
                 tell(k, best)
-            if small > _PATIENCE:
+            if small > _PATIENCE or k == most:
                 return best
             parts = yield Ask(trial, True)
         return best

@@ -37,6 +37,7 @@ _DELAYS = (0.0, 0.02, 0.04, 0.06, 0.09, 0.13, 0.2, 0.3)  # s, of the starts
 _LAGS = (0.01, 0.04, 0.15)  # s
 _SLEWS = (0.7, 1.0, 1.4)  # of what the logs show
 _STARTS = 4
+_ROUGHLY, _CLOSELY = 1e-2, 3e-6  # of the cost: less is an end, of several starts and of the best
 
 
 def fit_slew_lag(logs: Sequence[Log], *, loss: Loss = "linear", loss_scale: float | None = None) -> SlewLag:
@@ -84,10 +85,10 @@ def fit_slew_lag(logs: Sequence[Log], *, loss: Loss = "linear", loss_scale: floa
         raise InputError("loss_scale", got=loss_scale, allowed="a positive number (SI)")
     kind, signal = _kind(logs), _signal(logs)
     fitted = _Fitted(logs, signal, gain=kind != "angle" or signal != "output_angle")
-    x = fitted.solve(fitted.starts(), "linear", 1.0)
-    if loss != "linear":
-        spread = 1.4826 * float(np.median(np.abs(fitted.residual(x)))) * 1.5
-        x = fitted.solve([x], loss, loss_scale or max(spread, 1e-9))
+    x = fitted.solve(fitted.starts(), "linear", 1.0, _ROUGHLY)
+    spread = 1.0 if loss == "linear" else loss_scale or max(
+        1.4826 * 1.5 * float(np.median(np.abs(fitted.residual(x)))), 1e-9)
+    x = fitted.solve([x], loss, spread, _CLOSELY)
     values = {name: float(value.item()) for name, value in fitted.numbers(x[None, :])._asdict().items()}
     return SlewLag(**values, command_kind=kind, signal=signal)
 
@@ -161,10 +162,10 @@ class _Fitted:
             found.append((angle[0] - self.measured, np.column_stack([-speed[0] * self.scale["delay"], columns.T])))
         return found
 
-    def solve(self, starts: Sequence[Array], loss: Loss, scale: float) -> Array:
+    def solve(self, starts: Sequence[Array], loss: Loss, scale: float, gain: float) -> Array:
         """Return where the best of the searches from some starts ends."""
         inside = [np.clip(start, self.lower + 1e-9, self.upper - 1e-9) for start in starts]
-        ends = solved(inside, self.lower, self.upper, self.seen, loss, scale)
+        ends = solved(inside, self.lower, self.upper, self.seen, loss, scale, gain)
         return min(ends, key=lambda end: end[0])[1]
 
     def starts(self) -> list[Array]:

@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from time import perf_counter
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +25,7 @@ Array = NDArray[np.float64]
 
 FIT_ACCURACY = 1e-7  # rad
 _LOOK = 1e-3  # s of simulation: about what it costs to look at a lane once
-_CALL = 1e-3  # s: what a call costs besides its lanes
+_CALL = 6e-3  # s: what a call costs besides its lanes
 _WORTH = 4.0  # calls: less is not handed to another worker
 _WORTH_AWAY = 20.0  # the same, where what goes to a worker and comes back is copied
 
@@ -116,19 +114,9 @@ class Batch:
     bundles: tuple[Bundle, ...]
     nearly: bool = False
 
-    @property
-    def cost(self) -> float:
-        """What it takes, in seconds of one lane of which nothing is looked at."""
-        looks = sum({bundle.key: len(bundle.times) for bundle in self.bundles}.values())
-        return sum(bundle.lanes for bundle in self.bundles) * (
-            max(bundle.duration for bundle in self.bundles) + _LOOK * looks)
 
-
-class Done(NamedTuple):
-    """What comes of a batch: signals of each bundle, (n, T) each, None where it failed; and the time it took [s]."""
-
-    signals: list[dict[str, Array] | None]
-    seconds: float
+Done = list[dict[str, Array] | None]
+"""What comes of a batch: signals of each bundle, (n, T) each, None where it failed."""
 
 
 def simulated(batch: Batch) -> Done:
@@ -139,15 +127,13 @@ def simulated(batch: Batch) -> Done:
     InputError
         If a lane is nothing that can be simulated, and the batch is strict.
     """
-    began = perf_counter()
     try:
-        found: list[dict[str, Array] | None] = [*_simulated(batch)]
+        return [*_simulated(batch)]
     except InputError:
         if batch.strict:
             raise
         alone = [replace(batch, bundles=(bundle,)) for bundle in batch.bundles]
-        found = [None] if len(alone) == 1 else [one for some in alone for one in simulated(some).signals]
-    return Done(found, perf_counter() - began)
+        return [None] if len(alone) == 1 else [one for some in alone for one in simulated(some)]
 
 
 def _simulated(batch: Batch) -> list[dict[str, Array]]:
@@ -188,9 +174,11 @@ def batches(bundles: Sequence[Bundle], pace: float, crew: Crew) -> list[list[int
     calls: list[_Call] = []
     for k in sorted(range(len(bundles)), key=lambda k: (-bundles[k].duration, bundles[k].key)):
         alone = not calls or calls[-1].seconds + 0.5 * seconds[k] > share
-        if alone or calls[-1].in_vain(bundles[k]) * pace > _CALL:
+        vain = 0.0 if alone else calls[-1].in_vain(bundles[k]) * pace
+        if alone or vain > (_CALL + calls[-1].vain) / len(calls[-1].which):  # more than each of these costs beside
             calls.append(_Call(bundles[k].duration))
-        calls[-1].add(k, bundles[k], seconds[k])
+            vain = 0.0
+        calls[-1].add(k, bundles[k], seconds[k], vain)
     return [call.which for call in sorted(calls, key=lambda call: -call.seconds)]
 
 
@@ -199,7 +187,7 @@ class _Call:
 
     def __init__(self, duration: float) -> None:
         self.which: list[int] = []
-        self.seconds = 0.0
+        self.seconds = self.vain = 0.0
         self._duration, self._lanes, self._looks = duration, 0, dict[bytes, int]()
         self._all_looks = 0
 
@@ -209,10 +197,11 @@ class _Call:
         idle = self._duration - bundle.duration + _LOOK * (self._all_looks - own)
         return bundle.lanes * idle + (0.0 if own else self._lanes * _LOOK * len(bundle.times))
 
-    def add(self, k: int, bundle: Bundle, seconds: float) -> None:
-        """Take one more."""
+    def add(self, k: int, bundle: Bundle, seconds: float, vain: float) -> None:
+        """Take one more, which does so much in vain [s]."""
         self.which.append(k)
         self.seconds += seconds
+        self.vain += vain
         self._lanes += bundle.lanes
         if bundle.key not in self._looks:
             self._looks[bundle.key] = len(bundle.times)

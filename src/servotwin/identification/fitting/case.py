@@ -73,8 +73,9 @@ class Case:
         return sum(len(place) for place in self.places.values())
 
 
-def make_case(log: Log, model: Model, space: Space, sensors: Sequence[str], *, delayed: bool = False) -> Case:
-    """Return a log ready to be compared.
+def make_case(log: Log, model: Model, space: Space, sensors: Sequence[str], *, delayed: bool = False,
+              signals: dict[tuple[Any, ...], Signal] | None = None) -> Case:
+    """Return a log ready to be compared; `signals` keeps the commands of others like it.
 
     Raises
     ------
@@ -103,7 +104,8 @@ def make_case(log: Log, model: Model, space: Space, sensors: Sequence[str], *, d
     times = time[any_used]
     overridden = tuple(sorted(name for name in log.parameters))
     key = (log.command_kind, overridden, tuple(sorted(places)), bool(log.sent.all()))
-    return Case(log=log, signal=_signal(log, model), times=times, places=places, values=values, start=(angle, speed),
+    signal = _signal(log, model, {} if signals is None else signals)
+    return Case(log=log, signal=signal, times=times, places=places, values=values, start=(angle, speed),
                 scatter=scatter, moving=moving, key=key, period=_period(log, model))
 
 
@@ -165,7 +167,11 @@ def _period(log: Log, model: Model) -> float:
     return float(log.parameters.get(_FRAME_PERIOD, getattr(model, "frame_period", 0.0)))
 
 
-def _signal(log: Log, model: Model) -> Signal:
+def _signal(log: Log, model: Model, known: dict[tuple[Any, ...], Signal]) -> Signal:
     """Return the command as a model takes it; only one with pulses knows missing ones."""
-    made = log.signal(_period(log, model) or None)
-    return replace(made, edges=None) if made.edges is not None and not has_pulses(model) else made
+    period = _period(log, model)
+    which = (log.time.tobytes(), log.command.tobytes(), log.command_kind, log.command_hold, log.sent.tobytes(), period)
+    if which not in known:
+        made = log.signal(period or None)
+        known[which] = replace(made, edges=None) if made.edges is not None and not has_pulses(model) else made
+    return known[which]

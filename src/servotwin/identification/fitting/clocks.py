@@ -56,15 +56,16 @@ def with_clocks(task: Task, starts: Sequence[Point], tell: Told, began: float) -
 
 def _with_phases(task: Task, start: Point, tell: Told, began: float) -> tuple[Point, float]:
     """Return where a search ends that finds the pulses of each log, and the logarithm of the noise there."""
+    few = task.some_of_many()
     task.forecast.own_phases = False
-    point = task.ran_roughly(start, tell, began)
+    point = few.ran(start, tell, began).point
     task.measure(point)
     task.forecast.own_phases = True
     for k in range(_ROUNDS):
         before = [task.forecast.frames_of(point, k) for k in task.fitted]
         tell(began, "pulses")
         there = settled(task.scan(point), task.fitted)
-        point = task.ran(there, tell, began).point if k else task.ran_roughly(there, tell, began)
+        point = (task if k else few).ran(there, tell, began).point
         task.measure(point)
         if [task.forecast.frames_of(point, k) for k in task.fitted] == before:
             break
@@ -163,21 +164,33 @@ def _with_period(task: Task, point: Point, tell: Told, began: float) -> Point:
     tell(began, "period of the pulses")
     wider = task.like(Forecast(
         [case.log for case in old.cases], old.model, old.space, (*old.nuisance, "frame_period"), old.sensors))
-    near = wider.ran(_with_its_period(point, task.period), tell, began).point
-    found = point
-    if task.pays(point, wider, near, _NEAR_PAYS):
-        found = near = _assigned_anew(wider, near, tell, began, rounds=1)
-    if far_off and _is_more_than_noise(wider, near):
-        far = _at_likely_period(task, wider, point, tell, began)
-        if wider.cost(far) < wider.cost(near) and task.pays(point, wider, far):
-            found = far
-    if found is point or _is_more_than_noise(wider, found):
+    few = task.some_of_many()
+    both = [(few, few.like(wider.forecast, wider.prior)), (task, wider)][few is task:]
+    found = None
+    for search, other in both:  # on all of many logs only where some want it
+        found = _period(search, other, point, tell, began, far_off=far_off)
+        if found is None:
+            break
+    if found is None:
         return point  # what lacks something takes any further number: whether this one explains it, trials tell
     there = wider.forecast.nuisance_of(found.shared, "frame_period")
     task.become(wider, f"pulses come every {1e3 * there:.6g} ms by the logs, not every {1e3 * task.period:.6g} ms: "
                        "their period was fitted too")
     task.measure(found)
     return found
+
+
+def _period(task: Task, wider: Task, point: Point, tell: Told, began: float, *, far_off: bool) -> Point | None:
+    """Return where a search ends that has the period too; None where that does not pay, or explains too little."""
+    near = wider.ran(_with_its_period(point, task.period), tell, began).point
+    found = None
+    if task.pays(point, wider, near, _NEAR_PAYS):
+        found = near = _assigned_anew(wider, near, tell, began, rounds=1)
+    if far_off and _is_more_than_noise(wider, near):
+        far = _at_likely_period(task, wider, point, tell, began)
+        if wider.cost(far) < wider.cost(near) and task.pays(point, wider, far):
+            found = far
+    return None if found is None or _is_more_than_noise(wider, found) else found
 
 
 def _at_likely_period(task: Task, wider: Task, point: Point, tell: Told, began: float) -> Point:

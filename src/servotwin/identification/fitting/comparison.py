@@ -16,6 +16,7 @@ from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import LUMPED, Space
 from servotwin.identification.fitting.held_out import with_pulses_of
 from servotwin.identification.fitting.holdout import ErrorTable, LogError, log_error
+from servotwin.identification.fitting.point import Point
 from servotwin.identification.fitting.scatter import by_sensor
 from servotwin.identification.fitting.task import Task
 from servotwin.logs.log import Log
@@ -42,7 +43,7 @@ class ErrorTables:
 
 
 def compare(task: Task, held_out: Sequence[int], traces: Sequence[Trace], servo: Servo,
-            beside: tuple[str, ...], tell: Callable[[], object] = lambda: None) -> ErrorTables:
+            beside: tuple[str, ...], point: Point, tell: Callable[[], object] = lambda: None) -> ErrorTables:
     """Return the errors of the fitted servo, log by log, and of the models beside it.
 
     Parameters
@@ -57,6 +58,8 @@ def compare(task: Task, held_out: Sequence[int], traces: Sequence[Trace], servo:
         The fitted one, where the simpler models begin.
     beside : tuple of str
         Of `BESIDE`.
+    point : Point
+        Where the fit ended.
     tell : callable, optional
         Called after each step of theirs.
     """
@@ -68,7 +71,7 @@ def compare(task: Task, held_out: Sequence[int], traces: Sequence[Trace], servo:
         if slew:
             errors[SLEW] = slew
     if "M1" in beside:
-        simple = _of_m1(task, held_out, traces, type(model)(servo), tell)
+        simple = _of_m1(task, held_out, traces, type(model)(servo), point, tell)
         if simple:
             errors[M1] = simple
     models = tuple(errors)
@@ -93,7 +96,7 @@ def _of_slew(logs: Sequence[Log], fitted: Sequence[int], traces: Sequence[Trace]
     return found
 
 
-def _of_m1(whole: Task, held_out: Sequence[int], traces: Sequence[Trace], model: Model,
+def _of_m1(whole: Task, held_out: Sequence[int], traces: Sequence[Trace], model: Model, point: Point,
            tell: Callable[[], object]) -> dict[int, LogError]:
     """Return the errors of the servo with Coulomb and viscous friction; none where it is that already."""
     space, logs = whole.forecast.space, [trace.log for trace in traces]
@@ -109,15 +112,18 @@ def _of_m1(whole: Task, held_out: Sequence[int], traces: Sequence[Trace], model:
     own_bounds = {p.name: (p.lower, p.upper) for p in space.parameters if p.bounded and p.name in free}
     beliefs = {p.name: p.prior for k, p in enumerate(space.parameters)
                if p.prior is not None and p.name in free and whole.prior.weight[k] > 0.0}  # those that did not yield
-    load = {p.name: p.start for p in space.parameters if p.name.startswith("load.")}
+    load = {p.name: float(p.value(point.shared[k])) for k, p in enumerate(space.parameters)
+            if p.name.startswith("load.")}
     simple = Space(plain, [*free, *more], bounds=own_bounds, priors=beliefs or None, load=load)
     forecast = Forecast(logs, plain, simple, whole.forecast.nuisance, whole.forecast.sensors,
                         whole.forecast.running)
+    forecast.goes_on_from(whole.forecast)
     task = Task(forecast, whole.loss, whole.fitted, whole.seed, 1, whole.noise)
-    found, _ = task.search(lambda share, text: (tell(), None)[1])
+    # When pulses come, and what else is of the rig, is so whatever the law of friction
+    begin = point._replace(shared=np.concatenate([simple.start, point.shared[len(space):]]))
+    found = task.nearby(begin, lambda share, text: (tell(), None)[1])
     errors = {}
-    forecast = task.forecast
-    point = with_pulses_of(forecast, task.loss, found.point, held_out, task.fitted)
+    point = with_pulses_of(forecast, task.loss, found, held_out, task.fitted)
     for k, part in enumerate(forecast.at(point, derivatives=False)):
         residual = by_sensor(forecast, k, part)[traces[k].signal]
         errors[k] = log_error(logs[k], residual[traces[k].judged])

@@ -181,7 +181,8 @@ def _reach(task: Task, found: Outcome, made: Allowed, inflation: float) -> tuple
     points = made.points((steps[..., None] * made.directions.T[None, :, None, :]).reshape(-1, len(made.best)))
     points = np.clip(np.vstack([made.best, points]), task.lower, task.upper)
     search = Search(task.forecast, task.loss, task.prior, task.lower, task.upper, task.fitted, task.held)
-    costs = search.costs([found.point._replace(shared=x) for x in points])
+    with task.forecast.roughly():
+        costs = search.costs([found.point._replace(shared=x) for x in points])
     of_logs = np.array([cost - task.prior.cost(x) for cost, x in zip(costs, points, strict=True)])
     rises = ((of_logs[1:] - of_logs[0]) / inflation**2).reshape(steps.shape)
     reach = np.array([[_until(steps[side, k], rises[side, k]) for k in range(steps.shape[1])] for side in (0, 1)])

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, contextmanager
 from typing import Any
 
 import numpy as np
@@ -48,7 +48,11 @@ _BEFORE = 5  # pulses: by then a servo hunts as it will
 _HOLDS = 0.5  # of the friction that a servo file says: what it surely holds without drives
 _HELD = 1e-6  # of its scale: how far a number moves that stays
 _KEPT = 500  # commands
-_PACE = 2e-5  # s that a second of one lane takes, until it is known
+_PACE, _TICKING, _BENT = 2e-5, 1e-4, 6e-4
+"""s that a second of one lane takes, about: in closed form, of a program, and of one whose motion is integrated.
+
+They are not measured, for which lanes go into one call must not depend on how busy a computer is: a lane that runs for
+longer than it is looked at may differ in its last bits."""
 _FINEST = 1e-11  # rad, unless a finer accuracy is asked for
 _POTENTIOMETER = ("potentiometer.feedback_gain", "potentiometer.feedback_offset")
 
@@ -93,14 +97,14 @@ class Forecast:
         self.noise = dict.fromkeys(self.sensors, 1.0)
         self.step = WIDE if isinstance(model, DigitalServo) else STEP  # of the differences that are derivatives
         delayed = any(name in nuisance for name in ("delay", "log_delay", "frame_phase"))
-        self.cases = tuple(make_case(log, model, space, self.sensors, delayed=delayed) for log in logs)
+        signals: dict[tuple[Any, ...], Signal] = {}
+        self.cases = tuple(make_case(log, model, space, self.sensors, delayed=delayed, signals=signals) for log in logs)
         self.strict = True
         fades = _STRIBECK in space.names or model.value_or(_STRIBECK, 0.0) > 0.0
         bent = fades or any(log.load.pendulums or log.load.springs for log in logs)
         self.bent = bent and isinstance(model, DigitalServo)  # so that motion is integrated, as there is no closed form
         self.nearly = False  # whether torques of springs and pendulums count by their middle of each tick instead
         self._commands: dict[tuple[Any, ...], Signal] = {}  # points of a search often differ in other numbers only
-        self._pace = math.inf  # seconds that a second of one lane takes, as far as is known
         self.work = 0.0  # seconds of one lane that were simulated
         self.phased = "frame_phase" in nuisance and _PERIOD not in space.names and all(c.period for c in self.cases)
         self.extra = tuple(name for name in SHARED if name in nuisance and (name != "frame_period" or self.phased))
@@ -122,6 +126,15 @@ class Forecast:
         self.running, self.nearly = other.running, other.nearly and self.bent
         if self.phased and other.phased:
             self.own_phases = other.own_phases
+
+    @contextmanager
+    def roughly(self) -> Generator[None]:
+        """Let lanes go nearly for a while, where there are any that may."""
+        before, self.nearly = self.nearly, self.bent
+        try:
+            yield
+        finally:
+            self.nearly = before
 
     def names_of_own(self, case: Case) -> tuple[str, ...]:
         """Return which numbers a log has for itself."""
@@ -237,23 +250,32 @@ class Forecast:
 
     def at_all(self, points: Sequence[Point], *, derivatives: bool | Sequence[bool] = False, central: bool = False,
                step: float | None = None, cases: Sequence[int] | None = None, rates: bool = False,
-               noises: Sequence[Mapping[str, float]] | None = None) -> list[list[LogPart]]:
+               noises: Sequence[Mapping[str, float]] | None = None, leading: bool = False) -> list[list[LogPart]]:
         """Return what the logs say at several points, in one batch; for each point, log by log.
 
         `derivatives` may differ from point to point, and so may the noise; `rates` gives what a delay changes without
-        derivatives, for all signals.
+        derivatives, for all signals. Derivatives that are `leading` a search, no more, are those of lanes that go
+        nearly where there are any: residuals are of the engine itself.
         """
         which, step = range(len(self.cases)) if cases is None else cases, self.step if step is None else step
         self.running.look()
         sloped = [derivatives] * len(points) if isinstance(derivatives, bool) else derivatives
-        lanes = [LogLanes(self, k, at, point, sides=(1 + central) * sloped[at], step=step, rates=rates,
-                          noise=self.noise if noises is None else noises[at])
-                 for k in which for at, point in enumerate(points)]
-        self.work += sum(lane.cost for lane in lanes)
-        self._simulate(lanes, step if any(sloped) else STEP)
+        both = leading and self.bent and not self.nearly  # the nominal lane one way, those beside it another
+
+        def lanes_of(*, nearly: bool, beside: bool) -> list[LogLanes]:
+            none = both and not beside
+            return [LogLanes(self, k, at, point, sides=0 if none else (1 + central) * sloped[at], step=step,
+                             rates=rates, noise=self.noise if noises is None else noises[at], nearly=nearly)
+                    for k in which for at, point in enumerate(points) if sloped[at] or not beside]
+
+        lanes, slopes = lanes_of(nearly=self.nearly, beside=False), lanes_of(nearly=True, beside=True) if both else []
+        self.work += sum(lane.cost for lane in (*lanes, *slopes))
+        self._simulate([*lanes, *slopes], step if any(sloped) else STEP)
         found: list[list[LogPart]] = [[] for _ in points]
+        waiting = iter(slopes)  # in the same order
         for lane in lanes:
-            found[lane.at].append(lane.part)
+            there = next(waiting).part if both and sloped[lane.at] else lane.part
+            found[lane.at].append(lane.part._replace(shared=there.shared, own=there.own))
         return found
 
     def _simulate(self, lanes: Sequence[LogLanes], step: float) -> None:
@@ -262,19 +284,25 @@ class Forecast:
         accuracy = min(self.running.accuracy, max(self.running.accuracy * step / STEP, _FINEST))
         kinds: dict[tuple[Any, ...], list[int]] = {}
         for k, lane in enumerate(lanes):
-            kinds.setdefault(lane.case.key, []).append(k)
-        bundles, pace = [lane.bundle() for lane in lanes], self._pace if math.isfinite(self._pace) else _PACE
+            kinds.setdefault((lane.nearly, lane.case.key), []).append(k)
+        bundles = [lane.bundle() for lane in lanes]
         calls = [[some[i] for i in call] for some in kinds.values()
-                 for call in batches([bundles[k] for k in some], pace, self.running.crew)]
+                 for call in batches([bundles[k] for k in some], self._pace(nearly=lanes[some[0]].nearly),
+                                     self.running.crew)]
         work = [Batch(self.model, lanes[call[0]].outputs, accuracy, self.strict, tuple(bundles[k] for k in call),
-                      self.nearly)
+                      lanes[call[0]].nearly)
                 for call in calls]
         with closing(self._done(work)) as running:
-            for call, batch, done in zip(calls, work, running, strict=True):
+            for call, done in zip(calls, running, strict=True):
                 self.running.look()
-                self._pace = min(self._pace, done.seconds / batch.cost)
-                for k, signals in zip(call, done.signals, strict=True):
+                for k, signals in zip(call, done, strict=True):
                     lanes[k].take(signals)
+
+    def _pace(self, *, nearly: bool) -> float:
+        """Return how long a second of one lane takes, about [s]."""
+        if not isinstance(self.model, DigitalServo):
+            return _PACE
+        return _BENT if self.bent and not nearly else _TICKING
 
     def _done(self, work: Sequence[Batch]) -> Generator[Done]:
         """Return what comes of each batch; a single one is simulated here and now, unless others are to do it."""

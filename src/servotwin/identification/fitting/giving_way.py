@@ -49,6 +49,10 @@ class Parabolas(NamedTuple):
         """Return the sums."""
         return Parabolas(*(a + b for a, b in zip(self, other, strict=True)))
 
+    def less(self, other: Parabolas) -> Parabolas:
+        """Return the differences."""
+        return Parabolas(*(a - b for a, b in zip(self, other, strict=True)))
+
     def at(self, k: int) -> Parabolas:
         """Return one of them alone."""
         return Parabolas(*(a[k:k + 1] for a in self))
@@ -130,10 +134,8 @@ def _cost(parabolas: Mapping[int, Parabolas], about: Parabolas, chosen: Mapping[
 
 
 def _sum(parabolas: Mapping[int, Parabolas], about: Parabolas, chosen: Mapping[int, int]) -> Parabolas:
-    total = about
-    for k, which in chosen.items():
-        total = total.plus(parabolas[k].at(which))
-    return total
+    several = [about, *(parabolas[k].at(which) for k, which in chosen.items())]
+    return Parabolas(*(np.sum(parts, axis=0) for parts in zip(*several, strict=True)))
 
 
 def _descent(parabolas: Mapping[int, Parabolas], about: Parabolas,
@@ -141,12 +143,12 @@ def _descent(parabolas: Mapping[int, Parabolas], about: Parabolas,
     """Return the choices to which changes of one log at a time lead, and what they cost."""
     chosen, cost = dict(start), _cost(parabolas, about, start)
     while True:
-        before = cost
+        before, total = cost, _sum(parabolas, about, chosen)  # anew each time: rounding does not add up
         for k, mine in parabolas.items():
-            others = _sum(parabolas, about, {j: which for j, which in chosen.items() if j != k})
+            others = total.less(mine.at(chosen[k]))
             costs = mine.plus(others).least()
             best = int(np.argmin(costs))
             if costs[best] < cost:
-                chosen[k], cost = best, float(costs[best])
+                chosen[k], cost, total = best, float(costs[best]), others.plus(mine.at(best))
         if not cost < before - 1e-9 * abs(before):
             return chosen, cost

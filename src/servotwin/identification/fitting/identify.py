@@ -218,7 +218,7 @@ def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: fl
     final = identified_servo(forecast.model.servo, forecast.space, found.point.shared, doubts, level,
                              [one.name for one in dropped])
     final = with_what_logs_say(final, [forecast.cases[k].log for k in task.fitted], forecast.space.names)
-    tables = _compared(task, held_out, traces, final, beside, course, missing)
+    tables = _compared(task, held_out, traces, final, beside, found.point, course, missing)
     fit = _fit(task, found, doubts, dropped, wide, final, traces, tables, ended)
     middles = {name: 0.5 * (low + high) for name, (low, high) in doubts.spans.items()}
     fit = replace(fit, level=level, phased=forecast.phased, ticked=forecast.ticked,
@@ -256,17 +256,18 @@ def _doubted(task: Task, found: Outcome, level: float, course: Course, missing: 
 
 
 def _compared(task: Task, held_out: Sequence[int], traces: tuple[Trace, ...], final: Servo, beside: tuple[str, ...],
-              course: Course, missing: list[str]) -> ErrorTables:
+              point: Point, course: Course, missing: list[str]) -> ErrorTables:
     """Return errors, beside those of simpler models if nothing has stopped the fit."""
     if not missing:
         try:
             course(0.95, "errors")
-            return compare(task, held_out, traces, final, beside, lambda: course(0.95, "errors of simpler models"))
+            return compare(task, held_out, traces, final, beside, point,
+                           lambda: course(0.95, "errors of simpler models"))
         except KeyboardInterrupt:
             pass
     missing += ["simpler models"] if beside else []
     missing.append("what may be the matter")
-    return compare(task, held_out, traces, final, ())
+    return compare(task, held_out, traces, final, (), point)
 
 
 def _with_doubts(task: Task, found: Outcome, level: float,
@@ -301,7 +302,7 @@ def _doubts(task: Task, found: Outcome, level: float, show: Callable[[float, str
     sizes = np.maximum(np.abs(x), 1.0)
     sizes[:len(searched)][[p.logarithmic for p in searched]] = 1.0
     doubt = uncertainty(rows, task.prior, stuck)
-    information = _information(task, found, beliefs)
+    information = _information(task, found, parts, beliefs)
     flags, directions = _vague(information, doubt.inflation, sizes, ~task.held)
     directions = simplest(directions)
     if flags.any():
@@ -344,10 +345,10 @@ def _vague(information: Array, inflation: float, sizes: Array, asked: NDArray[np
     return all_flags, all_directions
 
 
-def _information(task: Task, found: Outcome, beliefs: Sequence[Prior]) -> Array:
+def _information(task: Task, found: Outcome, central: Sequence[LogPart], beliefs: Sequence[Prior]) -> Array:
     """Return what the logs say of the shared numbers, from differences so fine that what has no effect has none."""
     jagged = task.forecast.step > STEP  # then fine differences are those of steps, not of what moves the shaft
-    parts = task.forecast.at(found.point, step=None if jagged else FINE, central=jagged, cases=task.fitted)
+    parts = central if jagged else task.forecast.at(found.point, step=FINE, cases=task.fitted)
     rows = [rows_of(part, task.loss, own, found.point.own[k])
             for k, part, own in zip(task.fitted, parts, beliefs, strict=True)]
     return np.asarray(np.sum([(r.slope * r.inside[:, None]).T @ r.slope for r in rows], axis=0))

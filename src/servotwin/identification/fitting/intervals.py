@@ -84,22 +84,19 @@ def ends(search: Search, best: Outcome, doubt: Uncertainty, which: Sequence[int]
     every, which = which, [k for k in which if k not in found]
     both = [(k, side) for k in which for side in (-1.0, 1.0)]
     points = [moved(search, best, doubt, k, side * reaches[k], rows) for k, side in both]
-    beyond = [begins(search, best, doubt, k, far * side * reaches[k], rows)[1] for far in _FAR for k, side in both]
-    costs = iter(search.costs([*points, *beyond]) if both else [])
-    rises, near, far = ({one: next(costs) - best.cost for one in both} for _ in range(3))
-    bent: list[int] = []
-    for k in which:
-        reach = reaches[k]
-        expected = {side: _expected(doubt, k, reach) for side in (-1.0, 1.0)}
-        inside = _inside(search, best, doubt, k, reach)
-        faithful = all(_FAITHFUL[0] <= rises[k, side] / expected[side] <= _FAITHFUL[1] for side in (-1.0, 1.0))
-        flat = any(far[k, side] < _RISES * near[k, side] < _HIGH * expected[side] for side in (-1.0, 1.0))
-        if inside and faithful and not flat:
-            found[k] = Ends(-reach, reach, "normal")
+    rises = _rises(search, best, both, points)
+    faithful = [k for k in which if _inside(search, best, doubt, k, reaches[k]) and all(
+        _FAITHFUL[0] <= rises[k, side] / _expected(doubt, k, reaches[k]) <= _FAITHFUL[1] for side in (-1.0, 1.0))]
+    beyond = [(k, far * side) for k in faithful for far in _FAR for side in (-1.0, 1.0)]
+    farther = _rises(search, best, beyond, [
+        begins(search, best, doubt, k, far * reaches[k], rows)[1] for k, far in beyond])
+    for k in faithful:
+        high = _HIGH * _expected(doubt, k, reaches[k])
+        if not any(farther[k, _FAR[1] * side] < _RISES * farther[k, _FAR[0] * side] < high for side in (-1.0, 1.0)):
+            found[k] = Ends(-reaches[k], reaches[k], "normal")
             tell(len(found))
-        else:
-            bent.append(k)
-    profiles = [_end(search, best, doubt, k, side, reaches[k], rows, lambda: tell(len(found)), deeper)
+    bent = [k for k in which if k not in found]
+    profiles = [_end(search, best, doubt, k, side, reaches[k], rows, lambda: tell(len(found)), deeper, rises[k, side])
                 for k in bent for side in (-1.0, 1.0)]
     reached = together(search.forecast, search.cases, profiles)
     for k, (low, of_low), (high, of_high) in zip(bent, reached[::2], reached[1::2], strict=True):
@@ -107,6 +104,13 @@ def ends(search: Search, best: Outcome, doubt: Uncertainty, which: Sequence[int]
         found[k] = Ends(-low, high, "profile", min(max(share, 0.0), 1.0))
         tell(len(found))
     return {k: found[k] for k in every}
+
+
+def _rises(search: Search, best: Outcome, which: Sequence[tuple[int, float]],
+           points: Sequence[Point]) -> dict[tuple[int, float], float]:
+    """Return by how much some points cost more than the best, by what they stand for."""
+    costs = search.costs(points) if points else []
+    return {one: cost - best.cost for one, cost in zip(which, costs, strict=True)}
 
 
 def _inside(search: Search, best: Outcome, doubt: Uncertainty, k: int, reach: float) -> bool:
@@ -169,11 +173,11 @@ def _expected(doubt: Uncertainty, k: int, reach: float) -> float:
 
 
 def _end(search: Search, best: Outcome, doubt: Uncertainty, k: int, side: float, reach: float,
-         rows: Sequence[Rows], tell: Callable[[], None],
-         deeper: Callable[[Outcome], None]) -> Generator[Ask, list[LogPart], tuple[float, float]]:
+         rows: Sequence[Rows], tell: Callable[[], None], deeper: Callable[[Outcome], None],
+         rise: float) -> Generator[Ask, list[LogPart], tuple[float, float]]:
     """Return how far a profile of the cost reaches on one side [standard errors], and the share of the priors in that.
 
-    A bound ends it.
+    A bound ends it. It begins where the rise of the cost at its reach says, all others moved along.
     """
     held = search.held.copy()
     held[k] = True
@@ -182,7 +186,8 @@ def _end(search: Search, best: Outcome, doubt: Uncertainty, k: int, side: float,
     farthest = float(abs(bound - best.point.shared[k]) / max(doubt.std[k], 1e-300))
     wanted = _expected(doubt, k, reach)
     low, of_low, high, of_high = 0.0, 0.0, math.inf, math.inf
-    at, share = float(min(reach, farthest)), 0.0
+    first = min(max(wanted / max(rise, 1e-300), 1.0), _FAR[0] ** 2) if math.isfinite(rise) else 1.0
+    at, share = float(min(reach * math.sqrt(first), farthest)), 0.0
     kinked = search.forecast.step > STEP
     for _ in range(_FEW_ROUNDS if kinked else _ROUNDS):
         starts, costs = begins(search, best, doubt, k, side * at, rows), [0.0]

@@ -103,7 +103,7 @@ def _outliers(verdict: Verdict, traces: Sequence[Trace], sensor: str) -> tuple[C
 def _rows(task: Task, point: Point) -> list[Rows]:
     """Return what each fitted log says of the shared numbers."""
     forecast = task.forecast
-    parts = forecast.at(point, cases=task.fitted)
+    (parts,) = forecast.at_all([point], derivatives=True, cases=task.fitted, leading=True)
     return [rows_of(part, task.loss, Prior(*forecast.own_belief(forecast.cases[k])), point.own[k])
             for k, part in zip(task.fitted, parts, strict=True)]
 

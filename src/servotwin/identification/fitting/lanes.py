@@ -39,7 +39,8 @@ class LogLanes:
     """The lanes of one log at one point: the nominal one, and one for each number that is varied."""
 
     def __init__(self, forecast: Forecast, k: int, at: int, point: Point, *, sides: int, step: float,
-                 rates: bool, noise: Mapping[str, float]) -> None:
+                 rates: bool, noise: Mapping[str, float], nearly: bool = False) -> None:
+        self.nearly = nearly
         self.forecast, self.case, self.at, self.sides, self.noise = forecast, forecast.cases[k], at, sides, noise
         p, names = len(forecast.space), forecast.names_of_own(self.case)
         self.names, own = names, dict(zip(names, point.own[k], strict=True))

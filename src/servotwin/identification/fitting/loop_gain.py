@@ -39,9 +39,11 @@ def with_loop_gain(log: Log, model: Model) -> Log:
     if not isinstance(model, DigitalServo) or not model.takes_goals:
         return log
     own = {name: value for name, value in log.parameters.items() if not name.startswith(_OF_PULSES)}
-    gain = own.get(GAIN, _of_registers(model.servo, log))
-    gain = _of_pulses(log, model.servo) if gain is None else gain
-    return replace(log, parameters=own if gain is None else {**own, GAIN: gain})
+    if GAIN not in own:
+        gain = _of_registers(model.servo, log)
+        gain = _of_pulses(log, model.servo) if gain is None else gain
+        own |= {} if gain is None else {GAIN: gain}
+    return log if len(own) == len(log.parameters) and GAIN in log.parameters else replace(log, parameters=own)
 
 
 def _of_registers(servo: Servo, log: Log) -> float | None:

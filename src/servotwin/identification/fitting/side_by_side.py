@@ -16,12 +16,14 @@ Seen = tuple[Array, Array]  # residuals (N,) and their derivatives (N, p)
 Ask = Callable[[list[Array]], list[Seen]]
 
 _MOST = 60  # steps
-_GAIN, _NOTHING = 1e-10, 1e-30  # of the cost: less is an end; of the squares of the first residuals: all is explained
+_NOTHING = 1e-30  # of the squares of the first residuals: all is explained
 _MOST_DAMPING = 1e9
+_PATIENCE = 8  # trials
+_SMALL = 2**17  # products of numbers
 
 
 def solved(starts: Sequence[Array], lower: Array, upper: Array, ask: Ask, loss: str, scale: float,
-           ) -> list[tuple[float, Array]]:
+           gain: float) -> list[tuple[float, Array]]:
     """Return the cost and the point where the search from each start ends.
 
     Parameters
@@ -33,8 +35,10 @@ def solved(starts: Sequence[Array], lower: Array, upper: Array, ask: Ask, loss: 
     loss : {"linear", "soft_l1", "huber"}
     scale : float
         Residual from which a loss counts less than squares.
+    gain : float
+        Of the cost: where a step promises less, or several trials in a row gain less, a search ends.
     """
-    ways = [_way(np.clip(start, lower, upper), lower, upper, loss, scale) for start in starts]
+    ways = [_way(np.clip(start, lower, upper), lower, upper, loss, scale, gain) for start in starts]
     ends: dict[int, tuple[float, Array]] = {}
     asked = {k: next(way) for k, way in enumerate(ways)}
     while asked:
@@ -61,20 +65,22 @@ def _counted(r: Array, loss: str, scale: float) -> tuple[float, Array]:
     return scale**2 * float((root - 1.0).sum()), 1.0 / root
 
 
-def _way(x: Array, lower: Array, upper: Array, loss: str, scale: float) -> Generator[Array, Seen, tuple[float, Array]]:
+def _way(x: Array, lower: Array, upper: Array, loss: str, scale: float,
+         gain: float) -> Generator[Array, Seen, tuple[float, Array]]:
     r, J = yield x
     cost, weight = _counted(r, loss, scale)
-    nothing, damping, size = _NOTHING * max(cost, 1e-300), 1e-3, np.zeros(len(x))
+    nothing, damping, size, vain = _NOTHING * max(cost, 1e-300), 1e-3, np.zeros(len(x)), 0
     for _ in range(_MOST):
-        g, H = J.T @ (weight * r), (J * weight[:, None]).T @ J
+        g, H = _normal(r, J, weight)
         size = np.maximum(size, np.diag(H))
         while True:
             step = _step(x, g, H + damping * np.diag(np.maximum(size, 1e-300)), lower, upper)
             promised = -float(g @ step) - 0.5 * float(step @ H @ step)
-            if promised <= _GAIN * cost or cost <= nothing:
+            if promised <= gain * cost or cost <= nothing or vain > _PATIENCE:
                 return cost, x
             seen = yield x + step
             found, weighed = _counted(seen[0], loss, scale)
+            vain = 0 if found < (1.0 - gain) * cost else vain + 1
             if found < cost:
                 break
             damping *= 6.0
@@ -82,6 +88,17 @@ def _way(x: Array, lower: Array, upper: Array, loss: str, scale: float) -> Gener
                 return cost, x
         x, (r, J), cost, weight, damping = x + step, seen, found, weighed, max(damping / 10.0, 1e-12)
     return cost, x
+
+
+def _normal(r: Array, J: Array, weight: Array) -> tuple[Array, Array]:
+    """Return gradient and matrix of the normal equations, from pieces so small that no library spreads them."""
+    A = np.column_stack([J, r])
+    rows = max(_SMALL // A.shape[1] ** 2, 1)
+    H = np.zeros((A.shape[1], A.shape[1]))
+    for first in range(0, len(A), rows):
+        piece = slice(first, first + rows)
+        H += (A[piece] * weight[piece, None]).T @ A[piece]
+    return H[:-1, -1], H[:-1, :-1]
 
 
 def _step(x: Array, g: Array, H: Array, lower: Array, upper: Array) -> Array:

@@ -205,9 +205,10 @@ class Courses:
         """Return the angles where the commands change, shape (K, C, L); the delay shifts them all alike."""
         found = np.empty((self.events.shape[1], len(numbers.lag), len(self.start)))
         found[0] = self.start
-        for k in range(len(found) - 1):
-            target = numbers.gain * self.commands[:, k] + numbers.offset
-            found[k + 1] = _advance(found[k], target, self.spans[:, k], numbers)[0]
+        targets = numbers.gain * self.commands.T[:, None, :] + numbers.offset
+        for k, span in enumerate(self.spans.T):
+            size, left, way, _ = _left(targets[k] - found[k], span, numbers)
+            np.add(found[k], np.copysign(size - left, way), out=found[k + 1])
         return found
 
 
@@ -217,11 +218,15 @@ def _padded(values: Array, most: int) -> Array:
 
 def _advance(angle: Array, target: Array, span: Array, numbers: LagNumbers) -> tuple[Array, Array]:
     """Return angle and speed after a span of time under a constant target: first at the slew rate, then by the lag."""
-    error = target - angle
+    size, left, way, rate = _left(target - angle, span, numbers)
+    return angle + np.copysign(size - left, way), np.copysign(np.minimum(rate, left / numbers.lag), way)
+
+
+def _left(error: Array, span: Array, numbers: LagNumbers) -> tuple[Array, Array, Array, Array]:
+    """Return how far it was, how far it still is after a span of time, the way there, and the rate on it."""
     half = 0.5 * numbers.deadband
     way = error - np.minimum(np.maximum(error, -half), half)
     rate = np.where(way > 0.0, numbers.slew_up, numbers.slew_down)
     size = np.abs(way)
     slewing = np.minimum(np.maximum(size / rate - numbers.lag, 0.0), span)
-    left = (size - rate * slewing) * np.exp((slewing - span) / numbers.lag)
-    return angle + np.copysign(size - left, way), np.copysign(np.minimum(rate, left / numbers.lag), way)
+    return size, (size - rate * slewing) * np.exp((slewing - span) / numbers.lag), way, rate

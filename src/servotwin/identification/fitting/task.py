@@ -48,7 +48,7 @@ _DELAYS = (_DELAY, 0.0, 0.04, 0.06, 0.09)
 _STARTS = 0.6  # of the way: rough searches from several starts
 _MOST = {"rough": 12, "all": 25, "few": 10}  # steps
 _FEW_ROUNDS = 2  # of search and noise among kinks, where a search wanders on for ever
-_MANY_LOGS = 16  # from which on not all are needed to come near
+_MANY_LOGS = 16  # from which on half as many lead near
 _ABOUT = 0.3  # of a searched number: how far off a servo file may be, while clocks are sought
 _NOTHING = 0.35  # of what a search began with
 _PAYS = 10.0  # of the cost, for each independent residual: what another clock has to gain
@@ -173,11 +173,11 @@ class Task:
         here, other = self.ran_all([point, begun.point], tell, began)
         return ticking(self, other.point, tell, began) if other.cost < here.cost else here.point
 
-    def ran_roughly(self, start: Point, tell: Told, began: float) -> Point:
-        """Search from a point as `ran` does; of many logs, on some of every kind of motion."""
+    def some_of_many(self) -> Task:
+        """Return the search on some logs of every kind of motion, which lead near; itself unless there are many."""
         if len(self.fitted) <= _MANY_LOGS:
-            return self.ran(start, tell, began).point
-        return self._search(self.few(_MANY_LOGS // 2)).run(start, most=_MOST["rough"]).point
+            return self
+        return self.like(self.forecast, cases=self.few(_MANY_LOGS // 2))
 
     def ran(self, start: Point, tell: Told, began: float) -> Outcome:
         """Search from a point on all logs that are fitted, as closely as is needed to choose between points."""
@@ -290,6 +290,18 @@ class Task:
                 break
         search = self._search(cases)
         return replace(best, cost=search.costs([best.point])[0])
+
+    def nearby(self, start: Point, tell: Told) -> Point:
+        """Return where a search on all logs ends that begins near, with clocks that are known; to be compared, no more.
+
+        It never goes by the engine itself where lanes go nearly.
+        """
+        self.measure(start)
+        self.forecast.strict, self.forecast.nearly = False, self.forecast.bent
+        found = self._refined(start, self.fitted, rounds=3, tell=tell, began=0.0).point
+        found = self._out_of_nothing(found, tell, 0.0)
+        self.forecast.nearly = False
+        return found
 
     def again(self, start: Point, tell: Told) -> Outcome:
         """Return where a search on all logs ends that begins at the end of another one."""

@@ -35,6 +35,7 @@ _COPY = 4.0  # s of one lane: about what a log takes that is made ready to be si
 _LEAST = 2e-3  # of the cost: what a step has to gain
 _FINER = 0.7  # of the noise: then a search goes on with less
 _NORMAL = 1.4826  # standard deviation over median magnitude of a normal law
+_FELT, _FORETOLD = 0.02, 0.02  # of the root of what is left, and of its cost: what an effect has to reach to be tried
 _REACH = 0.5  # of a searched number: how far the others are moved before a trial is searched
 
 
@@ -293,7 +294,7 @@ class TrialBench:
         start = self.start(forecast, setting, self.base.point)
         parts = forecast.at(start, derivatives=False)
         r = np.concatenate([part.residual for part in parts])
-        J, loss = self._slopes(), self.task.loss
+        (_, J), loss = self._slopes(), self.task.loss
         if not np.isfinite(r).all():
             return math.inf
         if len(J) != len(r):
@@ -305,10 +306,36 @@ class TrialBench:
             step = -np.linalg.solve(H, (J * w[:, None]).T @ r)
         return loss.cost(r + J @ step)
 
-    def _slopes(self) -> Array:
-        if not hasattr(self, "_J"):
-            self._J = joined(self.base.forecast.at(self.base.point))
-        return self._J
+    def may_gain(self, setting: Setting) -> bool:
+        """Tell whether a setting can gain enough to count, as far as its effect at its start tells: in proportion.
+
+        What is searched from the servo's values, or changes which numbers there are, is not foretold.
+        """
+        if setting.afresh or setting.without or setting.nuisance not in (None, self.setting.nuisance):
+            return True
+        forecast, base = self.forecast(setting), self.base.forecast
+        forecast.noise = dict(base.noise)
+        parts = forecast.at(self.start(forecast, setting, self.base.point), derivatives=False)
+        (r, J), there = self._slopes(), np.concatenate([part.residual for part in parts])
+        if len(there) != len(r) or not np.isfinite(there).all():
+            return True
+        d = there - r
+        if not setting.values:
+            return float(d @ d) > _FELT**2 * float(r @ r)
+        loss, A = self.task.loss, np.column_stack([J, d])
+        ridge = np.diag(np.append(np.full(J.shape[1], _REACH**-2.0), 1e-9 * float(d @ d) + 1e-300))
+        step = np.zeros(A.shape[1])
+        for _ in range(3):
+            w = loss.weight(r + A @ step)
+            step = -np.linalg.solve((A * w[:, None]).T @ A + ridge, (A * w[:, None]).T @ r)
+        return step[-1] > 0.0 and loss.cost(r + A @ step) < (1.0 - _FORETOLD) * loss.cost(r)
+
+    def _slopes(self) -> tuple[Array, Array]:
+        """Return residuals and derivatives of what teaches at the base."""
+        if not hasattr(self, "_known"):
+            parts = self.base.forecast.at(self.base.point)
+            self._known = np.concatenate([part.residual for part in parts]), joined(parts)
+        return self._known
 
 
 def _finer(forecast: Watched, point: Point) -> bool:

@@ -17,13 +17,15 @@ from servotwin.identification.fitting.diagnosis.bench import Gain, Told, TrialBe
 from servotwin.identification.fitting.frames import has_pulses
 from servotwin.identification.fitting.point import Point
 from servotwin.logs.log import Log
+from servotwin.models import DigitalServo
 
 Array = NDArray[np.float64]
 
 _MOST = 12  # events of a log and round
 _SOON = 10  # samples after an event, by which it is judged
 _ROUNDS, _TIMES = 3, 4  # of choosing and searching, and of choosing in each
-_LOOKED = 200  # places of a log that are tried at once: those after which most is left
+_LOOKED = 100  # places of a log that are tried at once: those after which most is left
+_FORETOLD = 0.25  # of what an event has to gain: what it is tried for, where its effect is foretold
 _PAYS = 8.0  # in units of noise: what one of some hundred places has to gain (their logarithm, twice)
 _LEFT = 0.25  # of what is left in a log, where that is more than noise: a model that lacks something takes any event
 _MOST_LEFT = 0.5  # of the error
@@ -32,10 +34,11 @@ _NORMAL = 1.4826  # standard deviation over median magnitude of a normal law
 
 @dataclass(frozen=True)
 class _Kind:
-    """One kind of event: where it may be in a log, and the log with some of them."""
+    """One kind of event: where it may be in a log, the log with some, and whether it only delays what follows."""
 
     places: Callable[[Log], Sequence[int]]
     put: Callable[[Log, Sequence[int]], Log]
+    delays: bool = False
 
 
 def lost_pulses(bench: TrialBench) -> Told | None:
@@ -47,6 +50,12 @@ def lost_pulses(bench: TrialBench) -> Told | None:
     def width(log: Log) -> int:
         return max(1, round(period / float(np.median(np.diff(log.time)))))
 
+    holds = isinstance(bench.setting.model, DigitalServo)  # a pulse that brings nothing new is not missed
+
+    def places(log: Log) -> Sequence[int]:
+        size, changes = width(log), log.changes
+        return [k for k in range(1, len(log) - 1, size) if not holds or ((changes >= k) & (changes < k + size)).any()]
+
     def put(log: Log, starts: Sequence[int]) -> Log:
         if not starts:
             return log
@@ -55,7 +64,7 @@ def lost_pulses(bench: TrialBench) -> Told | None:
             on[start:start + width(log)] = False
         return replace(log, torque_on=on)
 
-    count, gained = _tried(bench, _Kind(lambda log: range(1, len(log) - 1, width(log)), put))
+    count, gained = _tried(bench, _Kind(places, put))
     frames = sum(log.duration for log in bench.setting.logs) / period
     return None if gained is None else Told(
         "lost pulses", f"{count} of {round(frames)} pulses that never reached the servo", "look for a loose contact, "
@@ -74,7 +83,7 @@ def dropped_samples(bench: TrialBench) -> Told | None:
     def put(log: Log, starts: Sequence[int]) -> Log:
         return _with_rows(log, sorted(starts, key=abs))
 
-    count, gained = _tried(bench, _Kind(places, put))
+    count, gained = _tried(bench, _Kind(places, put, delays=True))
     rows = sum(map(len, bench.setting.logs))
     return None if gained is None else Told(
         "dropped samples", f"{count} rows that are missing among {rows}, though the stamps go on evenly", "have the "
@@ -139,8 +148,9 @@ def _chosen(bench: TrialBench, point: Point, k: int, kind: _Kind, already: list[
     if not np.isfinite(here).all():
         return already
     scale = max(bench.noise, _LEFT * _NORMAL * float(np.median(np.abs(here))))
-    most = {place: _worth(bench, scale, here, np.zeros(len(here)), int(np.searchsorted(used, abs(place))))
-            for place in kind.places(log) if abs(place) not in known}  # that there is to gain
+    places = [place for place in kind.places(log) if abs(place) not in known]
+    gains = _most(bench, scale, here, here + log.measured[log.angle_name][used] if kind.delays else None)
+    most = dict(zip(places, gains[np.searchsorted(used, np.abs(places))], strict=True)) if places else {}
     dearest = sorted(most, key=lambda place: -most[place])[:_LOOKED]
     every = [place for place in most if most[place] > _PAYS and place in dearest]
     tried = [*([*already, place] for place in every),
@@ -159,6 +169,36 @@ def _chosen(bench: TrialBench, point: Point, k: int, kind: _Kind, already: list[
         if worth[i] > _PAYS and far and len(chosen) < _MOST + len(already):
             chosen.append(every[i])
     return sorted(chosen)
+
+
+def _most(bench: TrialBench, scale: float, here: Array, simulated: Array | None) -> Array:
+    """Return by how much an event at each sample may lower the cost of those soon after it, and none behind the last.
+
+    One that only delays what follows leaves the shaft as far off as it moves from a sample to the next, here or there,
+    for long or for a while: the most of these.
+    """
+    n, soon = len(here), np.arange(_SOON)
+    at = np.arange(n)[:, None] + soon
+    inside = at < n
+    counts = inside & (at % 2 == 0)  # as `teaching`
+    r = np.where(inside, here[np.minimum(at, n - 1)], 0.0) / scale
+    before = _costs(bench, r)
+    if simulated is None:
+        most = np.sum(before * counts, axis=1)
+    else:
+        steps = np.append(np.diff(simulated), 0.0) / scale
+        here_by = np.append(0.0, steps[:-1])[:, None]  # as far as it moved until then
+        there_by = np.where(inside, steps[np.minimum(at, n - 1)], 0.0)
+        shapes = (np.ones(_SOON), 1.0 - soon / _SOON, np.exp(-soon / 2.0))
+        most = np.max([np.sum((before - _costs(bench, r + shape * by)) * counts, axis=1)
+                       for shape in shapes for by in (here_by, there_by)], axis=0) / _FORETOLD
+    return np.append(most, 0.0)
+
+
+def _costs(bench: TrialBench, r: Array) -> Array:
+    """Return the cost of each residual."""
+    x, limit = np.abs(r), bench.task.loss.limit
+    return np.where(x > limit, limit * (x - 0.5 * min(limit, 1e6)), 0.5 * x**2)
 
 
 def _worth(bench: TrialBench, scale: float, before: Array, after: Array, first: int) -> float:

@@ -146,7 +146,9 @@ def _of_findings(bench: TrialBench, traces: Sequence[Trace]) -> list[Candidate]:
 
 
 def _tried(bench: TrialBench, candidate: Candidate, settings: Sequence[Setting]) -> Told | None:
-    """Return what a candidate gains, searched from the most promising of its settings."""
+    """Return what a candidate gains, searched from the most promising of its settings; None if none promises enough."""
+    if not any(bench.may_gain(setting) for setting in settings):
+        return None
     trials = [bench.searched(setting, bench.base.point) for setting in _promising(bench, settings)]
     trials += [bench.afresh(setting) for setting in settings if setting.afresh]
     good = [trial for trial in trials if all(np.isfinite(r).all() for r in trial.residuals)]
