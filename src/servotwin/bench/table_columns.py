@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
@@ -41,6 +42,7 @@ _NAMES = {f"{name}{end}": (quantity, factor) for quantity, known in QUANTITIES.i
           for name in (quantity, known.symbol) for end, factor in _ENDS[known.unit].items()}
 _NUMBER = re.compile(r"_(\d+)(?=(?:_[A-Za-z]+)?$)")  # the 2 of feedback_voltage_2_V: another instrument
 _LEAST_ROWS = 4
+_LEAST_BOTH, _LEAST_WAY = 6, 3  # rows of a table that was read both ways, and of each
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,6 +102,23 @@ class BenchTable:
     columns: tuple[TableColumn, ...]
     others: tuple[TableColumn, ...] = ()
     ignored: tuple[str, ...] = ()
+
+    @cached_property
+    def ways(self) -> NDArray[np.float64] | None:
+        """Which way each row was read, −½ up and ½ down, by the command or pulse of the row before; None for one way.
+
+        The first row counts as one of the way that follows. Rows that turn back after less than three each were read
+        in no order, and are of one way.
+        """
+        told = [column for name in ("pulse_width", "command_voltage", "command_count") for column in self.of(name)]
+        if not told or self.rows < _LEAST_BOTH:
+            return None
+        steps = np.sign(np.diff(told[0].values))
+        steps = steps[np.maximum.accumulate(np.where(steps != 0.0, np.arange(steps.size), 0))]  # of equal ones the last
+        ways = -0.5 * np.concatenate([steps[:1], steps])
+        turns = int((np.diff(ways) != 0.0).sum())
+        both = min((ways < 0.0).sum(), (ways > 0.0).sum()) >= _LEAST_WAY
+        return ways if both and 3 * turns <= self.rows and not (ways == 0.0).any() else None
 
     @property
     def rows(self) -> int:

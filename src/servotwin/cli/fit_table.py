@@ -68,6 +68,8 @@ def calibration_facts(found: TableCalibration, out: Path | None = None) -> dict[
     >>> list(facts["parameters"])
     ['potentiometer.feedback_gain', 'potentiometer.feedback_offset']
     """
+    from servotwin.bench.both_ways import ways_facts
+
     return {
         "source": found.source, "servo": found.servo.name, "rows": found.table.rows,
         "columns": [column.name for column in found.table.columns], "ignored_columns": list(found.table.ignored),
@@ -77,7 +79,8 @@ def calibration_facts(found: TableCalibration, out: Path | None = None) -> dict[
             "intercept_error": fit.line.intercept_error, "covariance": fit.line.covariance, "unit": fit.unit,
             "residuals": list(fit.line.residuals), "largest_residual": fit.line.max_residual,
             "curvature_F": fit.curvature.f_value, "curvature_p": fit.curvature.p_value,
-            "sagitta": fit.curvature.sagitta, "curved": name in found.curved} for name, fit in found.lines.items()},
+            "sagitta": fit.curvature.sagitta, "curved": name in found.curved,
+            "hysteresis": ways_facts(fit)} for name, fit in found.lines.items()},
         "parameters": {name: {"value": one.value, "std": one.std, "unit": one.unit, "source": one.source}
                        for name, one in found.parameters.items()},
         "instruments": [{
