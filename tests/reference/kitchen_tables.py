@@ -114,7 +114,7 @@ def _hung(chance: random.Random, of: Truth, share: float
     unit, written, torques = _loads(chance, most, arm, chance.randint(5, 9))
     if unit != "torque_kgf_cm" and chance.random() < 0.5:
         return [unit, "arm_cm"], [written, [f"{100.0 * arm:g}"] * len(written)], torques, None
-    return [unit], [written], torques, arm
+    return [unit], [written], torques, None if unit == "torque_kgf_cm" else arm
 
 
 def _current(chance: random.Random, of: Truth) -> Table:

@@ -74,12 +74,22 @@ class TableColumn:
 
         At most 0.01 V, or 1 of another unit: values that were set may be round, however finely they are read.
         """
-        size = float(np.abs(self.values).max())
-        for k in range(2 if self.unit == "V" else 0, 10):
-            step = 10.0**-k
-            if np.all(np.abs(np.round(self.values, k) - self.values) <= 1e-12 * size):
-                return step
-        return 0.0
+        return last_place(self.values, 2 if self.unit == "V" else 0)
+
+
+def last_place(values: NDArray[np.float64], first: int = 0) -> float:
+    """Return the last decimal place that numbers use, from the place `first` behind the point on; 0 where they use all.
+
+    Examples
+    --------
+    >>> last_place(np.array([230.0, 405.0])), last_place(np.array([0.25, 0.1]))
+    (1.0, 0.01)
+    """
+    size = float(np.abs(values).max())
+    for k in range(first, 10):
+        if np.all(np.abs(np.round(values, k) - values) <= 1e-12 * size):
+            return 10.0**-k
+    return 0.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
