@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 _FURTHEST = 8.0  # times the gain of the servo, either way
 _STEP = 1.2  # of the gain, for its derivative
+_VAGUE = 0.5  # of a gain: a larger standard error tells nothing
 _MOST_LOADS = 6  # that are simulated: those of the table, or so many of them
 
 
@@ -68,6 +69,9 @@ def gain_of_sag(servo: Servo, sag: LoadLine) -> tuple[str, Estimate] | str:
         return f"{name} stays: loads of this size do not tell it"
     gain = math.exp(found)
     spread = gain * sag.line.slope_error / wanted / abs(rate)
+    if spread > _VAGUE * gain:
+        return (f"{name} stays: the table tells it to {100.0 * spread / gain:.0f} % only, {gain:.3g} ± {spread:.2g}; "
+                "more or larger loads would tell it")
     return name, Estimate(gain, spread, "sag over load, by simulating the servo at rest; deadband, friction and frame "
                                        "of the servo")
 
@@ -94,6 +98,6 @@ def _root(off: Callable[[float], float], middle: float, furthest: float) -> floa
         if math.isnan(after):
             return None
         if (after > 0.0) != (low > 0.0):
-            return float(brentq(off, min(at, at + step), max(at, at + step), xtol=2e-3))
+            return float(brentq(off, min(at, at + step), max(at, at + step), xtol=1e-2))
         at += step
     return None

@@ -97,8 +97,8 @@ def line_words(found: LoadLines) -> Iterator[str]:
                 and not one.y.timed:
             sag, unit = shown(test.sagitta, {CURRENT: "A", SAG: "rad"}.get(name, "rad/s"))
             yield (f"{name} is visibly curved: a parabola fits better with p = {test.p_value:.2g} and bends by "
-                   f"{sag:.2g} {unit}; {residual_pattern(x.tolist(), one.line.residuals)}. Numbers beyond the rows are then off "
-                   "by more than their intervals")
+                   f"{sag:.2g} {unit}; {residual_pattern(x.tolist(), one.line.residuals)}. Numbers beyond the rows are "
+                   "then off by more than their intervals")
 
 
 def supply_words(table: LoadTable, found: LoadLines, shares: Sequence[SheetShare], circuit: Circuit | None

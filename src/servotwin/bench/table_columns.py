@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from servotwin.bench.dial_names import dial_columns
 from servotwin.errors import InputError
 from servotwin.tables import read_table
 
@@ -106,12 +107,15 @@ class BenchTable:
         Numbers under an unknown name.
     ignored : tuple of str
         All unknown names.
+    told_ways : ndarray, optional
+        Which way each row was read, where the table's columns say so.
     """
 
     source: str
     columns: tuple[TableColumn, ...]
     others: tuple[TableColumn, ...] = ()
     ignored: tuple[str, ...] = ()
+    told_ways: NDArray[np.float64] | None = None
 
     @cached_property
     def ways(self) -> NDArray[np.float64] | None:
@@ -120,6 +124,8 @@ class BenchTable:
         The first row counts as one of the way that follows. Rows that turn back after less than three each were read
         in no order, and are of one way.
         """
+        if self.told_ways is not None:
+            return self.told_ways
         told = [column for name in ("pulse_width", "command_voltage", "command_count") for column in self.of(name)]
         if not told or self.rows < _LEAST_BOTH:
             return None
@@ -178,7 +184,11 @@ def bench_table(table: str | Path | Mapping[str, ArrayLike], *, source: str | No
     (['q', 't_a'], ('who',))
     """
     where = "table" if isinstance(table, Mapping) else str(table)
-    found = _given(table) if isinstance(table, Mapping) else _of_file(Path(table))
+    found, units = (_given(table), {}) if isinstance(table, Mapping) else _of_file(Path(table))
+    ways = None
+    if len({_NAMES[_NUMBER.sub("", name)][0] for name in found if _NUMBER.sub("", name) in _NAMES}) < 2 and (
+            dial := dial_columns(found, units)) is not None:
+        found, ways = dial
     known = [name for name in found if _NUMBER.sub("", name) in _NAMES]
     ignored = tuple(name for name in found if name not in known)
     columns: list[TableColumn] = []
@@ -194,7 +204,7 @@ def bench_table(table: str | Path | Mapping[str, ArrayLike], *, source: str | No
                          allowed=f"at least two of {wanted} (with commas between columns)")
     others = tuple(column for name in ignored if (column := _other(name, found[name])) is not None)
     return BenchTable(source=source or ("a table without a name" if isinstance(table, Mapping) else where),
-                      columns=tuple(columns), others=others, ignored=ignored)
+                      columns=tuple(columns), others=others, ignored=ignored, told_ways=ways)
 
 
 def _given(table: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float64] | InputError]:
@@ -215,7 +225,8 @@ def _given(table: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float64] | In
     return found
 
 
-def _of_file(path: Path) -> dict[str, NDArray[np.float64] | InputError]:
+def _of_file(path: Path) -> tuple[dict[str, NDArray[np.float64] | InputError], dict[str, str]]:
+    """Return the columns of a file, and the units that a line below the header says of them."""
     table = read_table(path, lambda name: _NUMBER.sub("", name) in _NAMES)
     table.check_lengths(shorter=True)
     twice = [name for name in table.header if name and table.header.count(name) > 1]
@@ -232,7 +243,7 @@ def _of_file(path: Path) -> dict[str, NDArray[np.float64] | InputError]:
         bad = np.flatnonzero(~np.isfinite(values))
         found[name] = values if not bad.size else InputError(
             f"{path}: line {table.rows[bad[0]].line}, {name}", got=float(values[bad[0]]), allowed="a finite number")
-    return found
+    return found, dict(zip(table.header, table.units, strict=False))
 
 
 def _column(where: str, name: str, given: NDArray[np.float64], before: list[TableColumn]) -> TableColumn:

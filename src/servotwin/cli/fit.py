@@ -51,7 +51,7 @@ def fit(
         "currents).", rich_help_panel=_LOGS)] = None,
     table: Annotated[Path | None, typer.Option(
         metavar="FILE.csv", help="Calibrate from a table instead of logs: readings of a bench, or weights with "
-        "currents, speeds or sags, or voltages with speeds; or from records of lifts, one a weight, 'lift{mass:g}.txt'.",
+        "currents, speeds or sags, or voltages with speeds; or from records of lifts: 'lift{mass:g}.txt'.",
         rich_help_panel=_LOGS)] = None,
     arm: Annotated[str | None, typer.Option(
         metavar="LENGTH", help="With --table: the arm, or the radius of the drum, on which the weights hung, such as "
