@@ -65,6 +65,24 @@ def test_the_arm_is_read_from_the_name_and_from_beside(cli, table, tmp_path):
     (tmp_path / "table.json").write_text(json.dumps({"arm": "1cm"}))
     for name in ("lift_drum1cm.csv", "table.csv"):
         assert cli("fit", "--table", name, "--json").data["arm"] == pytest.approx(0.01)
+    records(tmp_path)
+    for said in ({"arm": "10cm"}, {"format": "servotwin-log-1", "files": {
+            "lift{mass}.txt": {"load": {"drum": {"mass": "{mass}g", "radius": 0.1}}}}}):
+        (tmp_path / "logs.json").write_text(json.dumps(said))
+        assert cli("fit", "--table", "lift{mass}.txt", "--columns", COLUMNS, "--json").data["arm"] == pytest.approx(0.1)
+
+
+def test_a_log_with_a_load_is_no_table(tmp_path):
+    from servotwin.bench import is_load_table
+
+    file = tmp_path / "log.csv"
+    for header in ("time_s,pulse_width_us,output_angle_deg,load_torque_Nm", "t,load [N],current [A]",
+                   "time_s,supply_voltage_V,speed_deg_s,angle_deg", "V_i_V,V_o_V,q_deg,f_Hz"):
+        file.write_text(header + "\n" + "\n".join(",".join(f"{k}.0" for _ in header.split(",")) for k in range(5)))
+        assert not is_load_table(file), header
+    for header in ("load [N],I (A)", "supply_voltage_V,time_60deg_s", "weight,current_mA", "weight_kg,sag_deg"):
+        file.write_text(header + "\n" + "\n".join(",".join(f"{k}.0" for _ in header.split(",")) for k in range(5)))
+        assert is_load_table(file), header
 
 
 def test_records_of_lifts(cli, tmp_path):

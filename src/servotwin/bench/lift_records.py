@@ -113,8 +113,7 @@ def lifts(pattern: str | Path, *, columns: str | Mapping[str, str] | None = None
     data = {f"{name} [{unit}]": [one.load for one in records], "speed [rad/s]": [one.speed for one in records]}
     if all(np.isfinite(one.current) for one in records):
         data["current [A]"] = [one.current for one in records]
-    said = arm if arm is not None else arm_beside(path.parent / f"{path.stem}{path.suffix}") or arm_beside(
-        path.parent / "logs.json.")
+    said = arm if arm is not None else arm_beside(path)
     table = load_table(data, arm=said, source=str(path))
     if table.speed is not None:
         table = replace(table, speed=Reading(name="steady speed", values=table.speed.values, step=0.0))

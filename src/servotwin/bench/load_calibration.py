@@ -86,7 +86,7 @@ def calibrate_loads(table: str | Path | LoadTable | Mapping[str, ArrayLike], ser
     ...                         st.load_servo("towerpro-mg90s"), arm=0.01)
     >>> figure = found.figure("torque per current")
     >>> f"{figure.value:.4f} ({figure.lower:.3f} to {figure.upper:.3f}) {figure.unit}"
-    '0.1625 (0.151 to 0.176) N m/A'
+    '0.1625 (0.142 to 0.190) N m/A'
     """
     read = table if isinstance(table, LoadTable) else load_table(table, arm=arm, source=source)
     found = load_lines(read)

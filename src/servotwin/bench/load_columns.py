@@ -17,8 +17,10 @@ from servotwin.bench import load_names as names
 from servotwin.bench.load_names import Name, name_of
 from servotwin.bench.table_columns import last_place
 from servotwin.errors import InputError
-from servotwin.logs.sidecar import sidecar_path
+from servotwin.logs.column_names import COMMAND, COMMAND_ANGLE, PULSE, TIME, meaning_of
+from servotwin.logs.sidecar import FOLDER_FILE, sidecar_path
 from servotwin.tables import read_table
+from servotwin.units import is_finite
 from servotwin.units.quantities import quantity
 
 LEAST_ROWS = 3
@@ -112,15 +114,20 @@ class LoadTable:
 
 
 def is_load_table(path: str | Path) -> bool:
-    """Return whether a file's header is that of a table of loads, or of voltage and speed."""
+    """Return whether a file's header is that of a table of loads, or of voltage and speed; with stamps it is a log."""
     table = read_table(path, _known)
     roles = set()
     for k, column in enumerate(table.header):
         try:
             found = name_of(column, table.units[k] if k < len(table.units) else "")
         except InputError:
-            return True  # a load without a unit: whoever reads it says so
-        roles.add(None if found is None else found.role)
+            roles.add(names.LOAD)  # without a unit: whoever reads it says so
+            continue
+        meant = meaning_of(column) if found is None else None
+        if meant is not None and meant.role in (TIME, PULSE, COMMAND, COMMAND_ANGLE):
+            return False
+        if found is not None:
+            roles.add(found.role)
     return names.LOAD in roles or (names.VOLTAGE in roles and bool({names.SPEED, names.TIME} & roles))
 
 
@@ -267,15 +274,29 @@ def arm_beside(path: Path) -> float | None:
     """
     if (match := _ARM_IN_NAME.search(path.stem)) is not None:
         return quantity(f"{path}: arm", f"{match[1].replace(',', '.')} {match[2]}", "length", positive=True)
-    beside = sidecar_path(path)
+    return _said_in(sidecar_path(path), path) or _said_in(path.parent / FOLDER_FILE, path)
+
+
+def _said_in(beside: Path, path: Path) -> float | None:
+    """Return the arm of a sidecar: `"arm": "2cm"`, or the radius [m] of a load's drum, of all files or of these."""
     if beside == path or not beside.is_file():
         return None
     try:
         said = json.loads(beside.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         raise InputError(str(beside), got="no JSON", allowed='an object such as {"arm": "2cm"}') from None
-    text = said.get("arm") if isinstance(said, dict) else None
-    return None if text is None else quantity(f"{beside}: arm", str(text), "length", positive=True)
+    if not isinstance(said, dict):
+        return None
+    if "arm" in said:
+        return quantity(f"{beside}: arm", str(said["arm"]), "length", positive=True)
+    files = said.get("files")
+    name = re.sub(r":[^{}]*\}", "}", path.name)  # {mass:g} is {mass} there
+    for content in (said, files.get(name) if isinstance(files, dict) else None):
+        load = content.get("load") if isinstance(content, dict) else None
+        drum = load.get("drum") if isinstance(load, dict) else None
+        if isinstance(drum, dict) and is_finite(drum.get("radius")):
+            return float(drum["radius"])
+    return None
 
 
 def _measured(where: str, found: dict[str, tuple[Name, str, NDArray[np.float64]]]) -> dict[str, Any]:

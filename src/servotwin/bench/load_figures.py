@@ -77,7 +77,7 @@ def figures_of(table: LoadTable, found: LoadLines) -> tuple[LoadFigure, ...]:
     >>> from servotwin.bench.load_lines import load_lines
     >>> table = load_table({"mass_g": [100, 200, 320, 400, 450], "current_mA": [230, 300, 370, 405, 450]}, arm=0.01)
     >>> [(figure.name, round(figure.value, 4)) for figure in figures_of(table, load_lines(table))][1:3]
-    [('current per torque', 6.1527), ('torque per current', 0.1625)]
+    [('current per torque', 6.155), ('torque per current', 0.1625)]
     """
     made: list[LoadFigure] = []
     lines = found.lines

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 _TABLES = (".csv", ".txt", ".tsv", ".dat")
+_MOST_BYTES = 65536  # of a table that was written by hand
 _LOGS, _SEARCH = log_reading.PANEL, "What to search for, and how"
 
 
@@ -193,7 +194,11 @@ def _check_no_table(logs: list[Path] | None, arm: str | None) -> None:
     if arm is not None:
         raise InputError("--arm", got="no --table", allowed="--table FILE.csv, a table of loads")
     for path in logs or ():
-        if path.suffix.lower() in _TABLES and path.is_file() and is_load_table(path):
+        table = False
+        with contextlib.suppress(InputError, OSError):  # whoever reads it says so
+            table = (path.suffix.lower() in _TABLES and path.is_file() and path.stat().st_size < _MOST_BYTES
+                     and is_load_table(path))
+        if table:
             raise InputError(f"{path}", got="a table of loads and no log", allowed=f"--table {path}")
 
 
