@@ -8,7 +8,7 @@ import sys
 from importlib import import_module
 
 PARTS = {"jacobian": "jacobian", "recover": "recover", "coverage": "interval_coverage", "defects": "defects",
-         "speed": "speed", "times": "times", "arms": "arms"}
+         "speed": "speed", "times": "times", "arms": "arms", "kitchen": "kitchen"}
 
 
 def main() -> None:

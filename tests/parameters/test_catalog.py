@@ -47,7 +47,7 @@ def other(request):
 
 
 def facts(servo):
-    return {name: entry for name, entry in servo.sheet.items() if name != "flags"}
+    return {name: entry for name, entry in servo.sheet.items() if name not in ("flags", "also_at")}
 
 
 def fact(servo, name):

@@ -11,6 +11,9 @@ from servotwin.bench.converter import FEEDBACK_CONVERTER, INPUT_CONVERTER, Conve
 from servotwin.bench.fits import CurvatureTest, LineFit, TableFit, curvature_test, fit_line, table_fits
 from servotwin.bench.generator import PulseGenerator
 from servotwin.bench.instruments import InstrumentPair, instrument_pairs
+from servotwin.bench.lift_records import Lifts, is_pattern, lifts
+from servotwin.bench.load_calibration import LoadCalibration, calibrate_loads
+from servotwin.bench.load_columns import LoadTable, is_load_table, load_table
 from servotwin.bench.reading import Reading, TableRow
 from servotwin.bench.residuals import (
     Comparison,
@@ -37,7 +40,10 @@ __all__ = [
     "CurvatureTest",
     "InstrumentPair",
     "Interval",
+    "Lifts",
     "LineFit",
+    "LoadCalibration",
+    "LoadTable",
     "ModelShares",
     "PulseGenerator",
     "Reading",
@@ -50,12 +56,17 @@ __all__ = [
     "TableRow",
     "bench_servo",
     "bench_table",
+    "calibrate_loads",
     "calibrate_table",
     "command_voltage_interval",
     "compare",
     "curvature_test",
     "fit_line",
     "instrument_pairs",
+    "is_load_table",
+    "is_pattern",
+    "lifts",
+    "load_table",
     "measured_shares",
     "model_shares",
     "row_findings",

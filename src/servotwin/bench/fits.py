@@ -28,7 +28,13 @@ class LineFit:
     covariance : float
         Of slope and intercept, in the product of their units.
     residuals : tuple of float, length n
-        y − (slope x + intercept).
+        y − (slope x + intercept), less half of the hysteresis on the side where the point lies.
+    freedom : int
+        Degrees of freedom: points less what was fitted to them.
+    hysteresis : float
+        How much larger y is on the way down than on the way up at one x, in its unit; 0 where `ways` were not given.
+    hysteresis_error : float
+        Its standard error.
 
     Examples
     --------
@@ -43,6 +49,9 @@ class LineFit:
     intercept_error: float
     covariance: float
     residuals: tuple[float, ...]
+    freedom: int = 0
+    hysteresis: float = 0.0
+    hysteresis_error: float = 0.0
 
     @property
     def max_residual(self) -> float:
@@ -53,7 +62,22 @@ class LineFit:
         """Return the same line where abscissas are `x` and ordinates `y` times as large numbers."""
         return LineFit(slope=self.slope * y / x, intercept=self.intercept * y, slope_error=self.slope_error * y / x,
                        intercept_error=self.intercept_error * y, covariance=self.covariance * y**2 / x,
-                       residuals=tuple(r * y for r in self.residuals))
+                       residuals=tuple(r * y for r in self.residuals), freedom=self.freedom,
+                       hysteresis=self.hysteresis * y, hysteresis_error=self.hysteresis_error * y)
+
+    def wide(self, error: float, level: float = 0.95) -> float:
+        """Return half of the interval of a number with this standard error, by Student's t."""
+        return wide(error, self.freedom, level)
+
+    @property
+    def hysteresis_p(self) -> float:
+        """Chance of such a hysteresis, or a larger one, where there is none but noise; 1 where none was looked for."""
+        from scipy.special import stdtr
+
+        if self.hysteresis == 0.0 or self.freedom < 1:
+            return 1.0
+        t = abs(self.hysteresis) / self.hysteresis_error if self.hysteresis_error > 0.0 else math.inf
+        return 2.0 * float(stdtr(self.freedom, -t))
 
     @overload
     def __call__(self, x: float) -> float: ...
@@ -101,20 +125,23 @@ class TableFit:
     Parameters
     ----------
     x_column, y_column : TableColumn
+    ways : ndarray, shape (n,), optional
+        −½ for rows that were read on the way up, ½ for those on the way down; None where all are of one way.
     """
 
     x_column: TableColumn = field(repr=False)
     y_column: TableColumn = field(repr=False)
+    ways: NDArray[np.float64] | None = field(default=None, repr=False)
 
     @cached_property
     def line(self) -> LineFit:
-        """The line."""
-        return fit_line(self.x, self.y)
+        """The line; where the table was read both ways, between both."""
+        return fit_line(self.x, self.y, ways=self.ways)
 
     @cached_property
     def curvature(self) -> CurvatureTest:
         """Whether a parabola fits better."""
-        return curvature_test(self.x, self.y)
+        return curvature_test(self.x, self.y, ways=self.ways)
 
     @property
     def name(self) -> str:
@@ -151,39 +178,70 @@ class TableFit:
         return column is self.x_column or column is self.y_column
 
 
-def fit_line(x: ArrayLike, y: ArrayLike) -> LineFit:
+def fit_line(x: ArrayLike, y: ArrayLike, *, weights: ArrayLike | None = None, ways: ArrayLike | None = None,
+             least_variance: float = 0.0) -> LineFit:
     """Return the least-squares line through points.
 
     Parameters
     ----------
     x, y : array_like, shape (n,)
-        At least 3 points, not all at one x.
+        At least 3 points, not all at one x; 4 with `ways`.
+    weights : array_like, shape (n,), optional
+        Inverse variances of y but for a factor; all 1 unless given.
+    ways : array_like, shape (n,), optional
+        −½ and ½, on which way each was read: the difference of both ways is fitted with the line.
+    least_variance : float
+        That a y of weight 1 has at least, such as that of its last digit.
 
     Raises
     ------
     InputError
         If there are too few points, they are not finite, or all have the same x.
     """
-    a, b = _points(x, y, 3)
-    a_mean = float(a.mean())
-    spread = float(((a - a_mean) ** 2).sum())
-    slope = float(((a - a_mean) * (b - b.mean())).sum()) / spread
-    intercept = float(b.mean()) - slope * a_mean
-    residuals = b - slope * a - intercept
-    variance = float((residuals**2).sum()) / (a.size - 2)
+    a, b = _points(x, y, 3 if ways is None else 4)
+    w = np.ones(a.size) if weights is None else np.asarray(weights, dtype=np.float64)
+    a_mean = float((w * a).sum() / w.sum())
+    basis = design(a - a_mean, ways)
+    inverse = np.linalg.inv((basis.T * w) @ basis)
+    slope, middle, *rest = (inverse @ (basis.T @ (w * b))).tolist()
+    residuals = b - basis @ np.array([slope, middle, *rest])
+    freedom = a.size - basis.shape[1]
+    cov = inverse * max(float((w * residuals**2).sum()) / freedom, least_variance)
     return LineFit(
-        slope=slope, intercept=intercept, slope_error=math.sqrt(variance / spread),
-        intercept_error=math.sqrt(variance * (1.0 / a.size + a_mean**2 / spread)),
-        covariance=-a_mean * variance / spread, residuals=tuple(residuals.tolist()))
+        slope=slope, intercept=middle - slope * a_mean, slope_error=math.sqrt(cov[0, 0]),
+        intercept_error=math.sqrt(max(cov[1, 1] - 2.0 * a_mean * cov[0, 1] + a_mean**2 * cov[0, 0], 0.0)),
+        covariance=float(cov[0, 1] - a_mean * cov[0, 0]), residuals=tuple(residuals.tolist()), freedom=freedom,
+        hysteresis=rest[0] if rest else 0.0, hysteresis_error=math.sqrt(cov[2, 2]) if rest else 0.0)
 
 
-def curvature_test(x: ArrayLike, y: ArrayLike) -> CurvatureTest:
+def design(x: NDArray[np.float64], ways: ArrayLike | None = None) -> NDArray[np.float64]:
+    """Return what a line is a sum of at each point: x, 1 and, where both ways are given, the way."""
+    columns = [x, np.ones(x.size), *([] if ways is None else [np.asarray(ways, dtype=np.float64)])]
+    return np.stack(columns, axis=1)
+
+
+def wide(error: float, freedom: int, level: float = 0.95) -> float:
+    """Return half of the interval of a number with a standard error from so many degrees of freedom.
+
+    Examples
+    --------
+    >>> round(wide(1.0, 3), 3), round(wide(1.0, 1000), 2)
+    (3.182, 1.96)
+    """
+    from scipy.special import stdtrit
+
+    return error * float(stdtrit(freedom, 0.5 * (1.0 + level)))
+
+
+def curvature_test(x: ArrayLike, y: ArrayLike, *, ways: ArrayLike | None = None) -> CurvatureTest:
     """Return the F-test of a quadratic term beside a line.
 
     Parameters
     ----------
     x, y : array_like, shape (n,)
         At least 4 points, at 3 or more different x.
+    ways : array_like, shape (n,), optional
+        As of `fit_line`.
 
     Raises
     ------
@@ -192,15 +250,15 @@ def curvature_test(x: ArrayLike, y: ArrayLike) -> CurvatureTest:
     """
     from scipy.special import stdtr
 
-    a, b = _points(x, y, 4)
+    a, b = _points(x, y, 4 if ways is None else 5)
     if np.unique(a).size < 3:
         raise InputError("points of a parabola", got=f"{np.unique(a).size} different x", allowed="at least 3")
     scale = float(np.ptp(a)) / 2.0
     u = (a - a.mean()) / scale  # well conditioned, whatever the units
-    basis = np.vander(u, 3)
+    basis = np.column_stack([u**2, design(u, ways)])
     inverse = np.linalg.inv(basis.T @ basis)
     solution = inverse @ basis.T @ b
-    free = a.size - 3
+    free = a.size - basis.shape[1]
     variance = float(((b - basis @ solution) ** 2).sum()) / free
     error = math.sqrt(variance * float(inverse[0, 0]))
     t = float(solution[0]) / error if error > 0.0 else math.inf
@@ -239,7 +297,7 @@ def table_fits(table: BenchTable | Mapping[str, ArrayLike]) -> dict[str, TableFi
     pairs = [(_reading(read, abscissa), _reading(read, ordinate)) for ordinate, abscissa in _LINES]
     for side in ("command", "feedback"):
         pairs.append((read.first(f"{side}_voltage"), read.first(f"{side}_count")))
-    fits = [TableFit(x, y) for x, y in pairs if x is not None and y is not None]
+    fits = [TableFit(x, y, read.ways) for x, y in pairs if x is not None and y is not None]
     if not fits:
         raise InputError("lines of the table", got=", ".join(column.name for column in read.columns),
                          allowed="two columns of different quantities")

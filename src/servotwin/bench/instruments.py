@@ -176,8 +176,9 @@ def _candidates(table: BenchTable) -> list[tuple[TableColumn, TableColumn]]:
         found += [(readings[0], column) for column in readings[1:]]
     electrical = [column for column in table.columns if column.unit in ("V", "counts")]
     for other in table.others:
-        near = [fit for known in electrical if known.values.size == other.values.size
-                and _fine(fit := TableFit(*sorted((known, other), key=lambda c: c.unit == "counts")))]
+        pairs = [sorted((known, other), key=lambda c: c.unit == "counts") for known in electrical
+                 if known.values.size == other.values.size]
+        near = [fit for x, y in pairs if _fine(fit := TableFit(x, y))]
         if near:
             best = min(near, key=lambda fit: fit.line.max_residual / float(np.ptp(fit.y)))
             found.append((best.x_column, best.y_column))

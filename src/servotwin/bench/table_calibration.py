@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from servotwin.bench.both_ways import both_ways
 from servotwin.bench.fits import TableFit, table_fits
 from servotwin.bench.instruments import InstrumentPair, instrument_pairs
 from servotwin.bench.table_columns import BenchTable, bench_table
@@ -70,7 +71,8 @@ class TableCalibration:
 
     def findings(self) -> tuple[str, ...]:
         """Return all that is worth a sentence: curvature, instruments, rows, remarks."""
-        return (*(_curvature(fit, len(self.lines)) for name, fit in self.lines.items() if name in self.curved),
+        return (*both_ways(self.lines, self.servo),
+                *(_curvature(fit, len(self.lines)) for name, fit in self.lines.items() if name in self.curved),
                 *(pair.words for pair in self.instruments), *(row.words for row in self.rows), *self.remarks)
 
 

@@ -6,12 +6,14 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from servotwin.bench.dial_names import dial_columns
 from servotwin.errors import InputError
 from servotwin.tables import read_table
 
@@ -41,6 +43,7 @@ _NAMES = {f"{name}{end}": (quantity, factor) for quantity, known in QUANTITIES.i
           for name in (quantity, known.symbol) for end, factor in _ENDS[known.unit].items()}
 _NUMBER = re.compile(r"_(\d+)(?=(?:_[A-Za-z]+)?$)")  # the 2 of feedback_voltage_2_V: another instrument
 _LEAST_ROWS = 4
+_LEAST_BOTH, _LEAST_WAY = 6, 3  # rows of a table that was read both ways, and of each
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,12 +75,22 @@ class TableColumn:
 
         At most 0.01 V, or 1 of another unit: values that were set may be round, however finely they are read.
         """
-        size = float(np.abs(self.values).max())
-        for k in range(2 if self.unit == "V" else 0, 10):
-            step = 10.0**-k
-            if np.all(np.abs(np.round(self.values, k) - self.values) <= 1e-12 * size):
-                return step
-        return 0.0
+        return last_place(self.values, 2 if self.unit == "V" else 0)
+
+
+def last_place(values: NDArray[np.float64], first: int = 0) -> float:
+    """Return the last decimal place that numbers use, from the place `first` behind the point on; 0 where they use all.
+
+    Examples
+    --------
+    >>> last_place(np.array([230.0, 405.0])), last_place(np.array([0.25, 0.1]))
+    (1.0, 0.01)
+    """
+    size = float(np.abs(values).max())
+    for k in range(first, 10):
+        if np.all(np.abs(np.round(values, k) - values) <= 1e-12 * size):
+            return 10.0**-k
+    return 0.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -94,12 +107,34 @@ class BenchTable:
         Numbers under an unknown name.
     ignored : tuple of str
         All unknown names.
+    told_ways : ndarray, optional
+        Which way each row was read, where the table's columns say so.
     """
 
     source: str
     columns: tuple[TableColumn, ...]
     others: tuple[TableColumn, ...] = ()
     ignored: tuple[str, ...] = ()
+    told_ways: NDArray[np.float64] | None = None
+
+    @cached_property
+    def ways(self) -> NDArray[np.float64] | None:
+        """Which way each row was read, −½ up and ½ down, by the command or pulse of the row before; None for one way.
+
+        The first row counts as one of the way that follows. Rows that turn back after less than three each were read
+        in no order, and are of one way.
+        """
+        if self.told_ways is not None:
+            return self.told_ways
+        told = [column for name in ("pulse_width", "command_voltage", "command_count") for column in self.of(name)]
+        if not told or self.rows < _LEAST_BOTH:
+            return None
+        steps = np.sign(np.diff(told[0].values))
+        steps = steps[np.maximum.accumulate(np.where(steps != 0.0, np.arange(steps.size), 0))]  # of equal ones the last
+        ways = -0.5 * np.concatenate([steps[:1], steps])
+        turns = int((np.diff(ways) != 0.0).sum())
+        both = min((ways < 0.0).sum(), (ways > 0.0).sum()) >= _LEAST_WAY
+        return ways if both and 3 * turns <= self.rows and not (ways == 0.0).any() else None
 
     @property
     def rows(self) -> int:
@@ -149,7 +184,11 @@ def bench_table(table: str | Path | Mapping[str, ArrayLike], *, source: str | No
     (['q', 't_a'], ('who',))
     """
     where = "table" if isinstance(table, Mapping) else str(table)
-    found = _given(table) if isinstance(table, Mapping) else _of_file(Path(table))
+    found, units = (_given(table), {}) if isinstance(table, Mapping) else _of_file(Path(table))
+    ways = None
+    if len({_NAMES[_NUMBER.sub("", name)][0] for name in found if _NUMBER.sub("", name) in _NAMES}) < 2 and (
+            dial := dial_columns(found, units)) is not None:
+        found, ways = dial
     known = [name for name in found if _NUMBER.sub("", name) in _NAMES]
     ignored = tuple(name for name in found if name not in known)
     columns: list[TableColumn] = []
@@ -165,7 +204,7 @@ def bench_table(table: str | Path | Mapping[str, ArrayLike], *, source: str | No
                          allowed=f"at least two of {wanted} (with commas between columns)")
     others = tuple(column for name in ignored if (column := _other(name, found[name])) is not None)
     return BenchTable(source=source or ("a table without a name" if isinstance(table, Mapping) else where),
-                      columns=tuple(columns), others=others, ignored=ignored)
+                      columns=tuple(columns), others=others, ignored=ignored, told_ways=ways)
 
 
 def _given(table: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float64] | InputError]:
@@ -186,7 +225,8 @@ def _given(table: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float64] | In
     return found
 
 
-def _of_file(path: Path) -> dict[str, NDArray[np.float64] | InputError]:
+def _of_file(path: Path) -> tuple[dict[str, NDArray[np.float64] | InputError], dict[str, str]]:
+    """Return the columns of a file, and the units that a line below the header says of them."""
     table = read_table(path, lambda name: _NUMBER.sub("", name) in _NAMES)
     table.check_lengths(shorter=True)
     twice = [name for name in table.header if name and table.header.count(name) > 1]
@@ -203,7 +243,7 @@ def _of_file(path: Path) -> dict[str, NDArray[np.float64] | InputError]:
         bad = np.flatnonzero(~np.isfinite(values))
         found[name] = values if not bad.size else InputError(
             f"{path}: line {table.rows[bad[0]].line}, {name}", got=float(values[bad[0]]), allowed="a finite number")
-    return found
+    return found, dict(zip(table.header, table.units, strict=False))
 
 
 def _column(where: str, name: str, given: NDArray[np.float64], before: list[TableColumn]) -> TableColumn:

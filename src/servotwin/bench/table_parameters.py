@@ -92,7 +92,7 @@ def _voltage(angle: LineFit, p: float, error_p: float, b_o: float, error_b: floa
     return LineFit(
         slope=p * a, intercept=p * c + b_o, slope_error=math.hypot(p * angle.slope_error, a * error_p),
         intercept_error=math.sqrt((p * angle.intercept_error) ** 2 + (c * error_p) ** 2 + error_b**2),
-        covariance=p**2 * angle.covariance + a * c * error_p**2, residuals=())
+        covariance=p**2 * angle.covariance + a * c * error_p**2, residuals=(), freedom=angle.freedom)
 
 
 def _of_voltages(lines: Mapping[str, LineFit], over_t_a: str, over_v_i: str) -> dict[str, Estimate]:

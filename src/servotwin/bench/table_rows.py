@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.bench.fits import TableFit, fit_line
+from servotwin.bench.fits import TableFit, design, fit_line
 from servotwin.bench.table_columns import BenchTable, TableColumn
 
 ROW_LEVEL = 0.05
@@ -139,12 +139,13 @@ def _tested(fit: TableFit) -> _Tested:
     from scipy.special import stdtr
 
     x, r = fit.x, np.asarray(fit.line.residuals)
-    leverage = 1.0 / x.size + (x - x.mean()) ** 2 / ((x - x.mean()) ** 2).sum()
-    free = np.maximum(1.0 - leverage, 1e-12)
-    variance = np.maximum(((r**2).sum() - r**2 / free) / (x.size - 3), fit.rounding)
+    columns = np.linalg.qr(design((x - x.mean()) / np.ptp(x), fit.ways))[0]
+    free = np.maximum(1.0 - (columns**2).sum(axis=1), 1e-12)
+    freedom = fit.line.freedom - 1
+    variance = np.maximum(((r**2).sum() - r**2 / free) / freedom, fit.rounding)
     scale = 1e-12 * float(np.abs(fit.y).max())
     t = r / np.sqrt(np.maximum(variance * free, scale**2))
-    return _Tested(fit, t, 2.0 * stdtr(x.size - 3, -np.abs(t)))
+    return _Tested(fit, t, 2.0 * stdtr(freedom, -np.abs(t)))
 
 
 def _found(table: BenchTable, tested: Sequence[_Tested], one: _Tested, row: int) -> RowFinding:
@@ -158,7 +159,7 @@ def _changed(fit: TableFit, column: TableColumn, row: int, value: float) -> floa
     """Return the largest residual with another value in a row."""
     x, y = fit.x.copy(), fit.y.copy()
     (x if fit.x_column is column else y)[row] = value
-    return fit_line(x, y).max_residual
+    return fit_line(x, y, ways=fit.ways).max_residual
 
 
 def _certain(found: RowFinding, tested: Sequence[_Tested], fit: TableFit) -> RowFinding:
@@ -187,7 +188,8 @@ def _certain(found: RowFinding, tested: Sequence[_Tested], fit: TableFit) -> Row
 
 def _asked(tested: Sequence[_Tested], column: TableColumn, row: int) -> tuple[float, TableFit]:
     """Return the value that the other rows ask for in a column, by the line that they lie on best, and that line."""
-    rests = [(fit_line(np.delete(one.fit.x, row), np.delete(one.fit.y, row)), one.fit)
+    rests = [(fit_line(*(np.delete(values, row) for values in (one.fit.x, one.fit.y)),
+                       ways=None if one.fit.ways is None else np.delete(one.fit.ways, row)), one.fit)
              for one in tested if one.fit.has(column)]
     rest, best = min(rests, key=lambda pair: pair[0].max_residual / float(np.ptp(pair[1].y)))
     x, y = float(best.x[row]), float(best.y[row])

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from servotwin.identification.fitting.stopping import Within
     from servotwin.models import Model
 
+_TABLES = (".csv", ".txt", ".tsv", ".dat")
+_MOST_BYTES = 65536  # of a table that was written by hand
 _LOGS, _SEARCH = log_reading.PANEL, "What to search for, and how"
 
 
@@ -49,7 +51,12 @@ def fit(
         metavar="NAME", help="Measured signals to fit; repeatable or with commas (default: the angle and all "
         "currents).", rich_help_panel=_LOGS)] = None,
     table: Annotated[Path | None, typer.Option(
-        metavar="FILE.csv", help="Calibrate from a bench table instead of logs.", rich_help_panel=_LOGS)] = None,
+        metavar="FILE.csv", help="Calibrate from a table instead of logs: readings of a bench, or weights with "
+        "currents, speeds or sags, or voltages with speeds; or from records of lifts: 'lift{mass:g}.txt'.",
+        rich_help_panel=_LOGS)] = None,
+    arm: Annotated[str | None, typer.Option(
+        metavar="LENGTH", help="With --table: the arm, or the radius of the drum, on which the weights hung, such as "
+        "1cm.", rich_help_panel=_LOGS)] = None,
     model: Annotated[str | None, typer.Option(
         metavar="MODEL", help="pulse, pulse-inductive, bounded or digital (default: the one that stands for the "
         "servo: pulse, or digital if its file says so; bounded if it has no chip).", rich_help_panel=_SEARCH)] = None,
@@ -116,8 +123,10 @@ def fit(
     if table is not None:
         from servotwin.cli.fit_table import calibrate_from
 
-        calibrate_from(table, servo, out, force=force, as_json=as_json)
+        calibrate_from(table, servo, out, change=change or (), arm=arm, columns=columns or (), force=force,
+                       as_json=as_json)
         return
+    _check_no_table(logs, arm)
     targets = _targets(out, report, [*(logs or []), Path(servo or "")], force=force)
     search = _search(servo or "", model, change or [], register or [], free, bounds or [], prior or [],
                      priors=not no_priors)
@@ -172,6 +181,22 @@ def _check_words(logs: list[Path] | None, servo: str | None, table: Path | None,
     if servo is None:
         raise InputError("--servo is needed: an id of servotwin catalog list, or a servo file; servotwin catalog "
                          "from-sheet makes one from a data sheet")
+
+
+def _check_no_table(logs: list[Path] | None, arm: str | None) -> None:
+    """Raise where what is given as a log is a table of loads: it has no time, and has a door of its own."""
+    from servotwin.bench import is_load_table
+    from servotwin.errors import InputError
+
+    if arm is not None:
+        raise InputError("--arm", got="no --table", allowed="--table FILE.csv, a table of loads")
+    for path in logs or ():
+        table = False
+        with contextlib.suppress(InputError, OSError):  # whoever reads it says so
+            table = (path.suffix.lower() in _TABLES and path.is_file() and path.stat().st_size < _MOST_BYTES
+                     and is_load_table(path))
+        if table:
+            raise InputError(f"{path}", got="a table of loads and no log", allowed=f"--table {path}")
 
 
 def _check_ladder(model: Model, *, ladder: bool, structures: bool, springs: list[str] | None) -> None:

@@ -1,4 +1,4 @@
-"""`servotwin fit --table`: the calibration that a bench table gives, in words, as JSON, and as a servo file."""
+"""`servotwin fit --table`: what a table of a bench or of loads gives, in words, as JSON, and as a servo file."""
 
 from __future__ import annotations
 
@@ -8,22 +8,33 @@ from typing import TYPE_CHECKING, Any
 from servotwin.cli.terminal import emit_json, pairs, show, table
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from rich.console import RenderableType
+
     from servotwin.bench import TableCalibration
     from servotwin.parameters import Quantity
 
 
-def calibrate_from(path: Path, servo: str | None, out: Path | None, *, force: bool = False,
+def calibrate_from(path: Path, servo: str | None, out: Path | None, *, change: Sequence[str] = (),
+                   arm: str | None = None, columns: Sequence[str] = (), force: bool = False,
                    as_json: bool = False) -> None:
-    """Calibrate from a bench table, show what was found, and write the servo.
+    """Calibrate from a table, show what was found, and write the servo.
 
     Parameters
     ----------
     path : Path
-        The table, a CSV file.
+        The table, a CSV file; or a pattern of the records of lifts, such as ``lift{mass:g}.txt``.
     servo : str or None
         Id in the catalog or path of a servo file, which takes the values.
     out : Path or None
         Where the servo is written, a .toml.
+    change : sequence of str
+        Words of `--set`.
+    arm : str or None
+        On which weights hung, or the radius of the drum, such as "1cm".
+    columns : sequence of str
+        What the columns of records are.
     force : bool
         Replace it where it exists.
     as_json : bool
@@ -34,14 +45,30 @@ def calibrate_from(path: Path, servo: str | None, out: Path | None, *, force: bo
     InputError
         If table, servo or output is not usable.
     """
-    from servotwin.bench import calibrate_table
+    from servotwin.bench import calibrate_table, is_load_table, is_pattern
+    from servotwin.cli.fit_loads import calibrate_of_loads, load_facts, show_loads
+    from servotwin.cli.model_words import servo_of
     from servotwin.cli.outputs import Target, check_targets
-    from servotwin.parameters import load_servo
+    from servotwin.errors import InputError
 
     if out is not None:
         check_targets([Target(option="--out", path=out, endings=(".toml",))], force=force,
                       inputs=[path, *([] if servo is None else [Path(servo)])])
-    loaded = None if servo is None else load_servo(servo)
+    if change and servo is None:
+        raise InputError("--set", got="no --servo", allowed="both")
+    loaded = None if servo is None else servo_of(servo, change)
+    if is_pattern(path) or is_load_table(path):
+        loads, records = calibrate_of_loads(path, loaded, arm, columns)
+        if out is not None:
+            loads.servo.save(out, overwrite=force)
+        if as_json:
+            emit_json(load_facts(loads, records, out))
+        else:
+            show_loads(loads, records, out)
+        return
+    for option, given in (("--arm", arm), ("--columns", columns)):
+        if given:
+            raise InputError(option, got="a table without loads", allowed="a table of loads, or a pattern of records")
     found = calibrate_table(path, loaded)
     if out is not None:
         found.servo.save(out, overwrite=force)
@@ -68,6 +95,8 @@ def calibration_facts(found: TableCalibration, out: Path | None = None) -> dict[
     >>> list(facts["parameters"])
     ['potentiometer.feedback_gain', 'potentiometer.feedback_offset']
     """
+    from servotwin.bench.both_ways import ways_facts
+
     return {
         "source": found.source, "servo": found.servo.name, "rows": found.table.rows,
         "columns": [column.name for column in found.table.columns], "ignored_columns": list(found.table.ignored),
@@ -77,7 +106,8 @@ def calibration_facts(found: TableCalibration, out: Path | None = None) -> dict[
             "intercept_error": fit.line.intercept_error, "covariance": fit.line.covariance, "unit": fit.unit,
             "residuals": list(fit.line.residuals), "largest_residual": fit.line.max_residual,
             "curvature_F": fit.curvature.f_value, "curvature_p": fit.curvature.p_value,
-            "sagitta": fit.curvature.sagitta, "curved": name in found.curved} for name, fit in found.lines.items()},
+            "sagitta": fit.curvature.sagitta, "curved": name in found.curved,
+            "hysteresis": ways_facts(fit)} for name, fit in found.lines.items()},
         "parameters": {name: {"value": one.value, "std": one.std, "unit": one.unit, "source": one.source}
                        for name, one in found.parameters.items()},
         "instruments": [{
@@ -109,9 +139,14 @@ def _lines(found: TableCalibration) -> Any:
 def _parameters(found: TableCalibration) -> list[Any]:
     if not found.parameters:
         return []
+    return [parameter_table(found.parameters), ""]
+
+
+def parameter_table(parameters: Mapping[str, Quantity]) -> RenderableType:
+    """Return what a table sets of a servo, with errors and where each comes from."""
     rows = [(name, *_values(one), one.unit, (one.source or "").rpartition("least squares: ")[2])
-            for name, one in found.parameters.items()]
-    return [table(("parameter", "value", "standard error", "unit", "from"), rows, wraps="from"), ""]
+            for name, one in parameters.items()]
+    return table(("parameter", "value", "standard error", "unit", "from"), rows, wraps="from")
 
 
 def _values(one: Quantity) -> tuple[str, str]:

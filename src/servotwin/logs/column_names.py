@@ -84,6 +84,17 @@ def meaning_of(column: str, below: str = "") -> Meaning | None:
     return None if role is None else Meaning(role, (unit_word(unit) or (unit, ""))[0], dimension)
 
 
+def words_and_unit(column: str, below: str = "") -> tuple[frozenset[str], str]:
+    """Return the words of a name in small letters, and its unit; empty where it has none.
+
+    Examples
+    --------
+    >>> words_and_unit("Weight [kg]")
+    (frozenset({'weight'}), 'kg')
+    """
+    return _parts(column, below)
+
+
 def _parts(column: str, below: str) -> tuple[frozenset[str], str]:
     """Return the words of a name in small letters, and its unit."""
     text, unit = column.strip(), below.strip().strip("[](){}")

@@ -45,7 +45,8 @@ def unit_word(word: str) -> tuple[str, str] | None:
     (('us', 'time'), ('deg', 'angle'), ('kg', 'mass'), None)
     """
     plain = in_letters(word.strip()).casefold()
-    found = _UNITS.get(plain) or _UNITS.get(plain.replace(" per ", "/").replace(" / ", "/"))
+    found = _UNITS.get(plain) or _UNITS.get(plain.replace(" per ", "/").replace(" / ", "/")) or _UNITS.get(
+        plain.replace(" ", "_"))  # the "deg s" of "speed_deg_s"
     return found or _UNITS.get(plain.replace(" ", ""))
 
 
