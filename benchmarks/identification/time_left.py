@@ -3,7 +3,7 @@
     python benchmarks/identification/time_left.py [FITS]
 
 A fit of logs of the independent bench, of servos and conditions of all kinds; time is CPU time, so that others on the
-machine do not count. What is left is told from 2 s on: what has been done, times what is left over what is done.
+machine do not count. What is left is told from 1 s on: what has been done, times what is left over what is done.
 """
 
 import sys
@@ -20,7 +20,7 @@ from reference import bus_rig, rig_fits
 from reference import rig_draws as draws
 from reference.rig_defects import with_defect
 
-FROM = 2.0  # s
+FROM = 1.0  # s
 AT = (0.1, 0.25, 0.5, 0.75)  # of the whole time
 
 

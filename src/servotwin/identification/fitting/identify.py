@@ -185,12 +185,12 @@ def identify(
     seen = checks.checked_sensors(given, sensors, plain)
     space = Space(plain, names, bounds=bounds, priors=priors, load=checks.shared_load(given, names))
     fitted, held_out = split(given, holdout, seed)
-    course = Course(limit, intervals=intervals, beside=len(beside))
+    trials = checks.checked_flag("diagnose", diagnose)
+    course = Course(limit, intervals=intervals, beside=len(beside), trials=trials)
     running = Running(Crew(executor), accuracy_of(accuracy), course.look)
     rig = usual_nuisance(plain) if nuisance is None else checks.checked_words("nuisance", nuisance, NUISANCES)
     forecast = Forecast(given, plain, space, rig, seen, running)
     checks.check_fitted(given, fitted, seen, len(names) + len(rig))
-    trials = checks.checked_flag("diagnose", diagnose)
     task = Task(forecast, Loss(checks.checked_loss(loss, HUBER)), fitted, seed,
                 checks.checked_count("starts", starts, least=1), checks.checked_noise(noise, seen))
     with running.crew, course.watching(), checks.shown(progress) as show, explained(noticed):

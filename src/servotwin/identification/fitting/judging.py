@@ -52,7 +52,6 @@ def with_verdict(task: Task, point: Point, fit: Fit, course: Course, *, trials: 
         if trials:
             causes = _outliers(verdict, fitted, sensor)
         if trials and (verdict.undecided or not verdict.holds):
-            course.budget = _EFFORT
             found = diagnose(task, point, fit.traces, verdict, sensor, _EFFORT * effort, _half_widths(fit),
                              lambda share, text: course(0.96 + 0.04 * share, text))
             causes, verdict = (*causes, *found.causes), replace(verdict, moved=found.moved)

@@ -17,8 +17,8 @@ from servotwin.units import is_finite
 Show = Callable[[float, str], None]
 
 _STAGES = (0.0, 0.7, 0.76, 0.95, 0.96, 1.0)  # where search, priors, intervals, errors and trials begin, as they say it
-_USUAL = (1.0, 0.05, 0.4, 0.1)  # what the first four of these take, in that of the search
-_BESIDE = 1.0  # more of the last for each simpler model
+_USUAL = (1.0, 0.05, 0.3, 0.05, 0.6)  # what these take, in that of the search
+_BESIDE = 0.1  # more of the last for each simpler model
 _OFTEN = 0.2  # s, between two times that the same is told
 
 
@@ -136,23 +136,23 @@ class Course(Stops):
         Whether they are sought.
     beside : int
         How many simpler models are fitted too.
+    trials : bool
+        Whether causes may be tried: what is left counts them until the fit ends without.
     """
 
-    def __init__(self, within: Within, *, intervals: bool = True, beside: int = 0) -> None:
+    def __init__(self, within: Within, *, intervals: bool = True, beside: int = 0, trials: bool = True) -> None:
         super().__init__(within)
-        self._usual = (*_USUAL[:2], _USUAL[2] * intervals, _USUAL[3] + _BESIDE * beside)
-        self.budget: float | None = None  # of the trials, once they begin, in the work of the search
+        self._usual = (*_USUAL[:2], _USUAL[2] * intervals, _USUAL[3] + _BESIDE * beside, _USUAL[4] * trials)
+        self._began = clock.process_time()
+        self._since = 0.0, 0.0  # a share, and when it was told first [s]
 
     def _of_all(self, share: float) -> float:
-        known = self._share(share)
-        return known if self.budget is not None else super()._of_all(known)
-
-    def _share(self, share: float) -> float:
         """Return the share of all work that is done: what lies ahead is as much as usual beside what was measured."""
         stage = max(k for k in range(5) if share >= _STAGES[k])
         inner = (share - _STAGES[stage]) / (_STAGES[stage + 1] - _STAGES[stage])
-        if stage == 4:
-            before, ahead = sum(self._usual), self.budget or 0.0
-            return (before + inner * ahead) / (before + ahead)
-        done = sum(self._usual[:stage]) + inner * self._usual[stage]
-        return done / sum(self._usual)
+        now = clock.process_time() - self._began
+        if share > self._since[0]:
+            self._since = share, now
+        longer = now - self._since[1]  # a step that says nothing: half of the rest after as long
+        inner += (1.0 - inner) * longer / max(longer + now, 1e-9)
+        return super()._of_all((sum(self._usual[:stage]) + inner * self._usual[stage]) / sum(self._usual))
