@@ -66,12 +66,10 @@ def test_the_share_that_is_told_is_of_all_work():
     for share in (0.0, 0.35, 0.7, 0.76, 0.95, 0.955):
         course(share, "")
     assert told == sorted(told)
-    assert told[2] < 0.4  # two simpler models take longer than the search
-    course.budget = 3.0
+    assert 0.4 < told[2] < 0.6  # intervals, simpler models and trials of causes lie ahead
     course(0.96, "trying")
     course(0.98, "trying")
-    assert 0.4 < told[-2] < 0.6  # what the trials may take lies ahead
-    assert told[-2] < told[-1] < 0.8
+    assert 0.6 < told[-2] < told[-1] < 0.95
 
 
 def test_a_ladder_has_one_time_for_all(logs):
