@@ -36,6 +36,8 @@ def validate(
     file_format: log_reading.FormatOption = "auto",
     columns: log_reading.ColumnsOption = None,
     joint: log_reading.JointOption = None,
+    rate: log_reading.RateOption = None,
+    commanded: log_reading.CommandedOption = None,
     change: Annotated[list[str] | None, typer.Option(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable; with a unit, or "
         "in SI units.")] = None,
@@ -61,7 +63,8 @@ def validate(
     """Compare a servo with logs, and say how far it is off."""
     targets = _targets(report, [Path(servo), *logs], force=force)
     found = _run(servo, model, change or [], register or [], nuisance, sensors, mend, lambda: log_reading.read(
-        logs, file_format, columns, joint, leave_out or [], force=force, quiet=as_json, registers=bool(register)))
+        logs, file_format, columns, joint, leave_out or [], mend=mend, rate=rate, commanded=commanded, force=force, quiet=as_json,
+        registers=bool(register)))
     limits = _limits(found, max_error or [])
     files = _write(found, targets, force=force)
     above = exceeded(found, limits)

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError
 from servotwin.logs.columns import TIME, Column
 from servotwin.logs.defined import defined_times, is_defined
-from servotwin.logs.mends import CLOCK16, DROP, RESET, SPREAD, TORN, between, say
+from servotwin.logs.mend_names import CLOCK16, DROP, RESET, SPREAD, TORN
+from servotwin.logs.mends import between, say
 from servotwin.logs.stamps import CLOCKS, stamps_of
 from servotwin.tables import TextTable, said_lines
 

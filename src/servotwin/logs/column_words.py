@@ -75,7 +75,7 @@ def wanted_columns(words: str | Mapping[str, str] | None, option: str = "--colum
 
 def _all(option: str, words: str) -> list[Wanted]:
     given, place = [], 0
-    words = _with_signals(option, words)
+    words = with_signals(option, words)
     while words[place:].strip():
         match = _WORD.match(words, place)
         if match is None:
@@ -87,12 +87,12 @@ def _all(option: str, words: str) -> list[Wanted]:
     return given
 
 
-def _with_signals(option: str, words: str) -> str:
+def with_signals(option: str, words: str) -> str:
     """Return words such as ``1:ms 2:deg`` with the signals that their units say; the second of two times is a pulse.
 
     Examples
     --------
-    >>> _with_signals("--columns", "1:ms 2:us 3:-deg+90")
+    >>> with_signals("--columns", "1:ms 2:us 3:-deg+90")
     'time=1:ms pulse=2:us angle=3:-deg+90'
     """
     found = _BARE.findall(words)

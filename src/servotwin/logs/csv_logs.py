@@ -19,17 +19,8 @@ from servotwin.logs.defined import defined_commands, is_defined
 from servotwin.logs.json_file import write_json
 from servotwin.logs.layout import NEEDS, Layout, is_known_name, layout_of
 from servotwin.logs.log import Log
-from servotwin.logs.mends import (
-    DROP,
-    SPREAD,
-    TORN,
-    checked_mends,
-    say,
-    sound,
-    without_text,
-    without_thousands,
-    without_torn,
-)
+from servotwin.logs.mend_names import DROP, SPREAD, TORN
+from servotwin.logs.mends import checked_mends, say, sound, without_text, without_thousands, without_torn
 from servotwin.logs.reading import Reading
 from servotwin.logs.sidecar import FOLDER_FILE, Sidecar, sidecar_of, sidecar_path, sidecar_words
 from servotwin.parameters import write_file

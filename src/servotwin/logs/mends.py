@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.logs.columns import COMMANDS, TIME, Column
 from servotwin.logs.defined import is_defined
+from servotwin.logs.mend_names import DROP, MENDS, SPREAD, THOUSANDS, TORN
 from servotwin.logs.stamps import CLOCKS, clock_of
 from servotwin.tables import TextTable, said_lines
 from servotwin.tables.dialect import MISSING, Row, has_decimal_commas
@@ -20,17 +21,6 @@ from servotwin.tables.dialect import MISSING, Row, has_decimal_commas
 if TYPE_CHECKING:
     from servotwin.logs.layout import Layout
 
-TORN, RESET, DROP, SPREAD, CLOCK16, THOUSANDS = (
-    "torn", "reset", "drop-repeated", "spread-repeated", "clock16", "thousands")
-MENDS: Mapping[str, str] = {
-    TORN: "leaves out rows that are cut, joined or hold no number",
-    RESET: "makes a log of its own of what comes after the time began again",
-    DROP: "leaves out rows with the stamp of the row before",
-    SPREAD: "spreads rows with one stamp between their neighbours",
-    CLOCK16: "joins times of a counter of 16 bits",
-    THOUSANDS: "takes marks within whole numbers for thousands separators",
-}
-"""What a reader mends when it is asked to; the certain faults are mended unasked."""
 _MOST_TORN = 0.2  # of the rows: with more the table is another one
 _MOSTLY = 0.8  # of the cells of a column
 _SWITCHES = ("true", "false", "on", "off", "yes", "no")
