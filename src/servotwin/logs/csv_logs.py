@@ -16,7 +16,7 @@ from servotwin.logs.clock import Timed, timed
 from servotwin.logs.column_words import Wanted, wanted_columns
 from servotwin.logs.columns import COMMANDS, SWITCH, TIME, Column, switch_value
 from servotwin.logs.defined import defined_commands, is_defined
-from servotwin.logs.json_file import write_json
+from servotwin.logs.json_file import json_bytes
 from servotwin.logs.layout import NEEDS, Layout, is_known_name, layout_of
 from servotwin.logs.log import Log
 from servotwin.logs.mend_names import DROP, SPREAD, TORN
@@ -190,14 +190,20 @@ def write_log(log: Log, path: str | Path, *, overwrite: bool = False) -> None:
     for file in (path, sidecar_path(path)):
         if not overwrite and _exists(file):
             raise OutputExistsError(file)
+    content, sidecar = log_bytes(log)
+    write_file(sidecar_path(path), sidecar, overwrite=overwrite)
+    write_file(path, content, overwrite=overwrite)
+
+
+def log_bytes(log: Log) -> tuple[bytes, bytes]:
+    """Return a log as the contents of a CSV file and of its sidecar."""
     command = next(name for name, kind in COMMANDS.items() if kind == log.command_kind)
     columns: dict[str, list[object]] = {
         name: ["" if math.isnan(x) else x for x in values.tolist()]
         for name, values in {TIME: log.time, command: log.command, **log.measured}.items()}
     if log.torque_on is not None:
         columns[SWITCH] = [int(x) for x in log.torque_on.tolist()]
-    write_json(sidecar_path(path), sidecar_words(log), overwrite=overwrite)
-    write_file(path, csv_text(columns).encode(), overwrite=overwrite)
+    return csv_text(columns).encode(), json_bytes(sidecar_words(log))
 
 
 def _exists(path: Path) -> bool:
