@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from servotwin.identification import Log
+    from servotwin.models import Model
 
 _MOST_REMARKS = 5
 _QUIET = ("named", "sidecar")  # someone said so before
@@ -83,6 +84,31 @@ def read(paths: Sequence[Path], file_format: str, columns: Sequence[str] | None,
     for line in written if quiet else ():
         typer.echo(line, err=True)
     return of_no_robot(logs) if registers else logs
+
+
+def about_the_middle(logs: Sequence[Log], model: Model, *, force: bool = False, quiet: bool = False) -> list[Log]:
+    """Return logs whose commands count from the middle of the servo's travel; what was found is said, and kept.
+
+    Raises
+    ------
+    InputError
+        If the servo cannot follow a command.
+    """
+    from servotwin.errors import InputError
+    from servotwin.identification import keep_columns
+    from servotwin.identification.fitting.suspicions.centre import centred
+
+    found = centred(logs, model)
+    lines = list(found.sentences)
+    try:
+        lines += [f"written  {file}, which keeps this" for file in keep_columns(found.turned, overwrite=force)]
+    except InputError as error:  # the sidecar says otherwise, or cannot be written
+        lines.append(f"this is not kept: {error}")
+    if lines and not quiet:
+        show(*lines, "")
+    for line in lines if quiet else ():
+        typer.echo(line, err=True)
+    return list(found.logs)
 
 
 def columns_said(columns: Sequence[str] | None, rate: str | None, commanded: str | None) -> str | None:

@@ -129,8 +129,8 @@ def _motion(log: Log, motion: Motion) -> Iterator[str]:
         late = 1e3 * motion.lag
         yield (f"begins {late:.0f} ms after the command, in the median of {motion.steps} step"
                f"{'s' * (motion.steps != 1)}" if motion.steps else f"{late:.0f} ms behind the command")
-    elif not len(log.changes):
-        yield f"first seen {1e3 * _onset(log):.0f} ms after the first row"
+    elif not len(log.changes) and math.isfinite(motion.onset):
+        yield f"first seen {1e3 * motion.onset:.0f} ms after the first row"
     if math.isfinite(motion.speed):
         speed, unit = _in_units("output_speed", motion.speed) if log.angle_name == "output_angle" else (
             motion.speed, " V/s")
@@ -143,10 +143,3 @@ def _motion(log: Log, motion: Motion) -> Iterator[str]:
             yield (f"{math.degrees(motion.gain) * 1e-6:.4g} deg/us, 0 at {1e6 * motion.zero:.1f} us; correlation "
                    f"{motion.correlation:.3f}")
 
-
-def _onset(log: Log) -> float:
-    """Return when the angle first leaves where it began [s]."""
-    angle = log.measured[log.angle_name]
-    seen = np.isfinite(angle)
-    way = np.abs(angle[seen] - angle[seen][0])
-    return float(log.time[seen][int(np.argmax(way > 0.03 * way.max()))] - log.start)

@@ -64,7 +64,7 @@ def validate(
     targets = _targets(report, [Path(servo), *logs], force=force)
     found = _run(servo, model, change or [], register or [], nuisance, sensors, mend, lambda: log_reading.read(
         logs, file_format, columns, joint, leave_out or [], mend=mend, rate=rate, commanded=commanded, force=force, quiet=as_json,
-        registers=bool(register)))
+        registers=bool(register)), force=force, quiet=as_json)
     limits = _limits(found, max_error or [])
     files = _write(found, targets, force=force)
     above = exceeded(found, limits)
@@ -82,15 +82,20 @@ def _targets(report: Path | None, inputs: list[Path], *, force: bool) -> list[Ta
 
 
 def _run(servo: str, model: str | None, change: list[str], register: list[str], nuisance: list[str] | None,
-         sensors: list[str] | None, mend: list[str] | None, read: Callable[[], list[Log]]) -> Validation:
+         sensors: list[str] | None, mend: list[str] | None, read: Callable[[], list[Log]], *, force: bool,
+         quiet: bool) -> Validation:
     from servotwin.cli import fit_words
     from servotwin.cli.model_words import class_of, servo_of
+    from servotwin.identification.fitting.checks import checked_servo
+    from servotwin.identification.fitting.validate import recorded_model
     from servotwin.identification.fitting.validate import validate as run
 
     kind = None if model is None else class_of(model, fit_words.MODEL_NAMES)
     changed = servo_of(servo, change, register)
     fitted = fit_words.some_or_none("--nuisance", nuisance, ())
-    return run(read(), changed, kind, mend=fit_words.kinds(mend), nuisance=fitted, sensors=fit_words.names(sensors),
+    logs = log_reading.about_the_middle(read(), checked_servo(changed, recorded_model(changed) if kind is None else kind),
+                                        force=force, quiet=quiet)
+    return run(logs, changed, kind, mend=fit_words.kinds(mend), nuisance=fitted, sensors=fit_words.names(sensors),
                progress=True)
 
 

@@ -64,7 +64,8 @@ def step_in(angle: NDArray[np.float64]) -> Step | None:
         return None
     before, after = float(np.median(angle[:few])), float(np.median(angle[-few:]))
     way = after - before
-    if abs(way) < _LEAST:
+    last = angle[-2 * few:]
+    if abs(way) < _LEAST or abs(np.median(last[:few]) - after) > _STRAYS * abs(way):  # it moves on
         return None
     gone = (angle - before) / way  # 0 to 1
     arrived = int(np.argmax(gone >= 1.0 - _STRAYS)) if (gone >= 1.0 - _STRAYS).any() else len(gone) - 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import re
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,7 +11,7 @@ from servotwin.errors import InputError
 
 _HEAD = 4096  # bytes that tell what a file is
 _MOST_CONTROL = 0.1  # share of control characters in a text
-_MOST_ZEROS = 0.3  # of a text with blocks that were never written
+_ZEROS = re.compile("\0{3,}")
 _NOT_TEXT = {b"PK\x03\x04": "a zip archive or an Excel workbook", b"PAR1": "a Parquet file", b"\x1f\x8b": "a gzip file",
              b"\x89PNG": "a picture", b"\xd0\xcf\x11\xe0": "an Excel workbook", b"\x89HDF": "an HDF5 file",
              b"MATLAB": "a MATLAB file", b"%PDF": "a PDF"}
@@ -115,8 +116,9 @@ def _decoded(data: bytes) -> tuple[str, str]:
 
 def _check(path: Path, text: str, whole: str, *, damaged: bool) -> None:
     head = text[:_HEAD] if text.strip() else whole[:_HEAD]
-    control = sum(c < " " and c not in "\0\t\r\n\f\x1a" for c in head)
-    if control > _MOST_CONTROL * len(head) or head.count("\0") > _MOST_ZEROS * len(head):
+    once = _ZEROS.sub("\0", head)  # a block that was never written counts as one
+    control = sum(c < " " and c not in "\t\r\n\f\x1a" for c in once)
+    if control > _MOST_CONTROL * len(once):
         raise InputError(str(path), got="binary data", allowed="a text, such as CSV")
     if "\0" in text and not damaged:
         before = text[:text.index("\0")]

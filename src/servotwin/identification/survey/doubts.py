@@ -10,6 +10,7 @@ import numpy as np
 
 from servotwin.loads import Load
 from servotwin.logs.columns import COMMANDS
+from servotwin.logs.defined import is_defined
 from servotwin.units.words import unit_shown
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from servotwin.identification.survey.values import Values
     from servotwin.logs.log import Log
 
+_LATE = 0.2  # s: more than a servo's dead time
 _CLEAR = 0.6  # correlation
 _SCALES = {180.0 / math.pi: "degrees were taken for radians", math.pi / 180.0: "radians were taken for degrees",
            2.0: "a factor of two", 0.5: "a factor of two"}
@@ -27,6 +29,7 @@ _PULSE_GAINS = (math.radians(0.03) * 1e6, math.radians(0.4) * 1e6)  # rad/s of p
 _FASTEST = math.radians(3000.0)  # rad/s
 _TURN = 2.0 * math.pi
 _CENTRE = math.radians(90.0)
+_OFF_ZERO = 10.0  # deg
 _OFF_CENTRE = math.radians(10.0)
 _SMALL, _LARGE = {"angle": math.radians(3.0), "pulse_width": 30e-6}, {"angle": math.radians(45.0), "pulse_width": 450e-6}
 
@@ -42,6 +45,9 @@ def wrong_of(log: Log, clock: Clock, values: Values, motion: Motion) -> Iterator
     elif motion.speed > _FASTEST and log.angle_name == "output_angle":
         yield (f"the shaft turns at {math.degrees(motion.speed):.0f} deg/s, faster than any servo: look at the units of "
                f"angle and time ({clock.period:.3g} s a row)")
+    if not len(log.changes) and motion.onset > _LATE and not _defined(log):
+        yield (f"the shaft begins to move {motion.onset:.2g} s after the first row, and the command never changes: look "
+               "which column is the command")
     if log.angle_name == "output_angle":
         yield from _against(log, motion)
     if values.flat_low or values.flat_high:
@@ -51,6 +57,12 @@ def wrong_of(log: Log, clock: Clock, values: Values, motion: Motion) -> Iterator
     if motion.lag < 0.0 and motion.steps == 0 and abs(motion.correlation) > _CLEAR:
         yield (f"the angle comes {-1e3 * motion.lag:.0f} ms before the command: the columns have two clocks, or the "
                "command was logged late")
+
+
+def _defined(log: Log) -> bool:
+    """Tell whether the command was said, and is none of the file."""
+    return log.reading is not None and any(is_defined(one.column) for name, one in log.reading.layout.items()
+                                           if name in COMMANDS)
 
 
 def _against(log: Log, motion: Motion) -> Iterator[str]:
@@ -64,7 +76,7 @@ def _against(log: Log, motion: Motion) -> Iterator[str]:
             yield "the command moves and the shaft does not: look at wiring and supply"
         return
     if gain < 0.0:
-        yield (f"the angle falls where the command grows; unless the servo is built in reverse, {_say(log, -1.0)} turns "
+        yield (f"the angle falls where the command grows; unless the servo is built in reverse, {_say(log, -1.0, motion)} turns "
                "it")
     if kind == "angle":
         known = next((what for factor, what in _SCALES.items() if abs(math.log(abs(gain) / factor)) < _NEAR), "")
@@ -79,12 +91,14 @@ def _against(log: Log, motion: Motion) -> Iterator[str]:
                "the unit of the angle")
 
 
-def _say(log: Log, factor: float) -> str:
-    """Return the words of --columns that multiply the angle."""
+def _say(log: Log, factor: float, motion: Motion | None = None) -> str:
+    """Return the words of --columns that multiply the angle; one that is turned keeps the zero of its command."""
     column = None if log.reading is None else log.reading.layout.get(log.angle_name)
     if column is None:
         return "a scale of the angle"
-    shown = unit_shown(column.unit, float(f"{factor * column.scale:.4g}"), float(f"{factor * column.offset:.4g}"))
+    zero = 0.0 if motion is None or log.command_kind != "angle" or column.unit != "deg" else math.degrees(motion.zero)
+    zero = 0.0 if abs(zero) < _OFF_ZERO else round(zero)
+    shown = unit_shown(column.unit, float(f"{factor * column.scale:.4g}"), float(f"{factor * column.offset + zero:.4g}"))
     return f'--columns "angle={column.column}:{shown}"'
 
 

@@ -15,12 +15,14 @@ from servotwin.logs.log import Log
 Array = NDArray[np.float64]
 
 _HELD = 0.3  # s of one command, after which a shaft has arrived or is on its way for long
+_AT_REST = 0.25  # of a stretch of one command: the end of it
 _STEPS_ONLY = 0.2  # of the rows change the command at most: else it moves all the time
 _LAGS = 61
 _LONGEST_LAG = 0.6  # s
 _SEEN = 0.03  # of a travel, by which a motion has begun
 _SIGMAS = 5.0
 _FEWEST = 8  # rows
+_SPEED_LASTS = 0.03  # s
 _SPEED_OVER = 3  # rows to either side
 
 
@@ -41,6 +43,8 @@ class Motion(NamedTuple):
         Whose dead time was seen; 0 where the command moves all the time.
     speed : float
         The fastest that lasts [rad/s].
+    onset : float
+        When the shaft first leaves where it was, from the first row on; nan where it does not [s].
     still : bool
         Whether the shaft does not move.
     """
@@ -51,6 +55,7 @@ class Motion(NamedTuple):
     lag: float
     steps: int
     speed: float
+    onset: float
     still: bool
 
 
@@ -70,7 +75,7 @@ def motion_of(log: Log) -> Motion:
     used = log.used(log.angle_name) & log.sent
     time, angle, command = log.time[used], log.measured[log.angle_name][used], log.held[used]
     if len(time) < _FEWEST:
-        return Motion(math.nan, math.nan, math.nan, math.nan, 0, math.nan, still=log.is_constant)
+        return Motion(math.nan, math.nan, math.nan, math.nan, 0, math.nan, math.nan, still=log.is_constant)
     changes = np.flatnonzero(np.diff(command) != 0.0) + 1
     noise = rough_noise(angle)
     speed = _speed(time, angle)
@@ -82,15 +87,22 @@ def motion_of(log: Log) -> Motion:
     x = command[np.maximum(np.searchsorted(time, time - (lag if math.isfinite(lag) else 0.0), side="right") - 1, 0)]
     at = _rests(time, changes) if steps else np.ones(len(time), np.bool_)
     gain, zero, correlation = _line(x[at], angle[at])
-    return Motion(gain, zero, correlation, lag, steps, speed, still=log.is_constant)
+    return Motion(gain, zero, correlation, lag, steps, speed, _onset(time - log.start, angle, noise), still=log.is_constant)
+
+
+def _onset(time: Array, angle: Array, noise: float) -> float:
+    way = np.abs(angle - np.median(angle[:3]))
+    away = way > max(_SEEN * float(way.max()), _SIGMAS * noise)
+    return float(time[int(np.argmax(away))]) if away.any() else math.nan
 
 
 def _rests(time: Array, changes: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return the rows that come long after the last change of the command, all where these are few."""
-    last = np.zeros(len(time))
-    last[changes] = time[changes]
-    last = np.maximum.accumulate(np.where(last > 0.0, last, time[0]))
-    rest = time - last > _HELD
+    """Return the rows at the end of each stretch of one command, all where these are few."""
+    rest = np.zeros(len(time), np.bool_)
+    for first, stop in pairwise([0, *changes.tolist(), len(time)]):
+        span = time[stop - 1] - time[first]
+        if span >= _HELD:
+            rest[first:stop] = time[first:stop] >= time[stop - 1] - _AT_REST * span
     return rest if rest.sum() >= _FEWEST else np.ones(len(time), np.bool_)
 
 
@@ -130,7 +142,7 @@ def _line(x: Array, y: Array) -> tuple[float, float, float]:  # gain, zero, corr
 
 def _speed(time: Array, angle: Array) -> float:
     """Return the fastest speed over some rows: single outliers do not count."""
-    apart = 2 * _SPEED_OVER
+    apart = max(2 * _SPEED_OVER, math.ceil(_SPEED_LASTS / float(np.median(np.diff(time)))))
     if len(time) <= apart + 2:
         return math.nan
     smooth = np.median(np.lib.stride_tricks.sliding_window_view(np.pad(angle, 2, mode="edge"), 5), axis=1)

@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from servotwin.errors import InputError
 from servotwin.identification.survey.clock import Clock, clock_of
 from servotwin.identification.survey.doubts import missing_of, wrong_of
 from servotwin.identification.survey.motion import Motion, motion_of
 from servotwin.identification.survey.values import Values, values_of
 from servotwin.logs.log import Log
 
+FEWEST = 8  # rows that say anything
 _MOST_GAPS = 20
 _ANGLES = ("output_angle", "load_angle")
 
@@ -61,6 +63,11 @@ class Survey:
 def survey_of(log: Log) -> Survey:
     """Return what a log says by itself: no servo, no fit.
 
+    Raises
+    ------
+    InputError
+        If it has next to no rows.
+
     Examples
     --------
     >>> import numpy as np
@@ -71,6 +78,9 @@ def survey_of(log: Log) -> Survey:
     >>> survey_of(log).wrong[0]
     'the angle falls where the command grows; unless the servo is built in reverse, a scale of the angle turns it'
     """
+    if len(log) < FEWEST:
+        raise InputError(f"log {log.name!r}" if log.reading is None else log.reading.file, got=f"{len(log)} rows",
+                         allowed=f"at least {FEWEST}")
     clock, motion = clock_of(log.time), motion_of(log)
     values = {name: values_of(found, angle=name in _ANGLES) for name, found in log.measured.items()}
     return Survey(log=log, clock=clock, values=values, motion=motion,
