@@ -11,7 +11,8 @@ from servotwin.logs.formats import FORMATS, LOG_FORMATS, formats_that_hold
 from servotwin.logs.json_file import read_json
 from servotwin.logs.log import Log
 from servotwin.logs.mends import checked_mends
-from servotwin.logs.sidecar import FOLDER_FILE, FORMAT
+from servotwin.logs.name_values import values_in
+from servotwin.logs.sidecar import FOLDER_FILE, FORMAT, patterns_of
 from servotwin.signals.time_base import warn_of_time_base
 
 _CSV_ENDINGS = (".csv", ".tsv")
@@ -102,7 +103,9 @@ def _files(folder: Path, format: str) -> list[Path]:
         files = sorted(file for file in folder.iterdir() if file.is_file() and not file.name.startswith("."))
     except OSError as error:
         raise InputError(f"{folder}: cannot be read ({error.strerror})") from None
-    tables = [file for file in files if file.suffix.lower() in _CSV_ENDINGS]
+    named = patterns_of(folder / FOLDER_FILE)
+    tables = [file for file in files if file.suffix.lower() in _CSV_ENDINGS or (
+        file.suffix.lower() == ".txt" and any(values_in(pattern, file.name) is not None for pattern in named))]
     beside = {file.stem for file in tables}
     others = [file for file in files if file.suffix.lower() == ".json" and file.name != FOLDER_FILE
               and file.stem not in beside]
