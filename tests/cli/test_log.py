@@ -60,15 +60,18 @@ def test_what_is_certain_is_said(cli, seed):
 def test_what_a_log_holds(cli):
     written("run.csv", steps(command=lambda c: 1500 + 10 * c))
     found, = cli("log", "run.csv", "--json").data["logs"]
-    assert found["rows"] == 600 and found["clock"]["period"] == pytest.approx(0.01)
-    assert found["motion"]["lag"] == pytest.approx(0.06, abs=0.011) and found["motion"]["steps"] == 4
+    assert found["rows"] == 600
+    assert found["clock"]["period"] == pytest.approx(0.01)
+    assert found["motion"]["lag"] == pytest.approx(0.06, abs=0.011)
+    assert found["motion"]["steps"] == 4
     assert np.degrees(found["motion"]["gain"]) * 1e-6 == pytest.approx(0.1, rel=1e-3)
     assert found["motion"]["zero"] == pytest.approx(1500e-6, abs=1e-7)
     assert np.degrees(found["motion"]["speed"]) == pytest.approx(300.0, rel=0.01)
     assert found["wrong"] == []
     assert not [one for one in found["missing"] if "large step" in one or "small steps" in one or "way back" in one]
     text = cli("log", "run.csv").out
-    assert "0.1 deg/us, 0 at 1500.0 us" in text and "begins 60 ms after" in " ".join(text.split()).replace("70", "60")
+    assert "0.1 deg/us, 0 at 1500.0 us" in text
+    assert "begins 60 ms after" in " ".join(text.split()).replace("70", "60")
 
 
 @pytest.mark.parametrize(("rows", "words"), [
@@ -99,18 +102,21 @@ def test_gaps_counts_and_the_end_of_a_range(cli):
     del rows[300:330]
     written("run.csv", rows)
     found, = cli("log", "run.csv", "--json").data["logs"]
-    assert found["clock"]["gap_count"] == 1 and found["clock"]["gaps"][0]["length"] == pytest.approx(0.31)
+    assert found["clock"]["gap_count"] == 1
+    assert found["clock"]["gaps"][0]["length"] == pytest.approx(0.31)
     assert found["signals"]["output_angle"]["counts"] == 4096
     assert found["signals"]["output_angle"]["flat_high"] > 50
     assert any("end of its range" in one for one in found["wrong"])
-    assert found["motion"]["steps"] == 0 and found["motion"]["lag"] == pytest.approx(0.05, abs=0.02)
+    assert found["motion"]["steps"] == 0
+    assert found["motion"]["lag"] == pytest.approx(0.05, abs=0.02)
 
 
 def test_files_are_never_written_over(cli):
     written("run.csv", steps(command=lambda c: 1500 + 10 * c))
     before = Path("run.csv").read_bytes()
     assert "run.csv" in cli("log", "run.csv", "--out", "run.csv", "--force").error
-    assert Path("run.csv").read_bytes() == before and not Path("run.json").exists()
+    assert Path("run.csv").read_bytes() == before
+    assert not Path("run.json").exists()
     Path("run.json").write_text('{"format": "servotwin-log-1", "motion": "steps"}')
     assert cli("log", "run.csv", "--out", "m.csv", "--plot", "m.png").code == 0
     assert Path("m.png").read_bytes().startswith(b"\x89PNG")
@@ -120,7 +126,8 @@ def test_files_are_never_written_over(cli):
 
 
 @pytest.mark.parametrize(("content", "words"), [
-    (None, "no such file"), (b"", "an empty file"), (bytes(range(256)) * 20, "binary data"), (b"\0" * 4000, "binary data"),
+    (None, "no such file"), (b"", "an empty file"), (bytes(range(256)) * 20, "binary data"),
+    (b"\0" * 4000, "binary data"),
     (b"ms,pulse_us,angle_deg\n" + b"0,1500,nan\n20,1500,nan\n40,1500,nan\n", "no value"),
     (b"ms,pulse_us,angle_deg\nnan,nan,nan\nnan,nan,nan\nnan,nan,nan\n", "line 2, ms"),
     (b"ms,pulse_us,angle_deg\n0,1500,1\n20,1500,2\n40,1500,3\n", "3 rows"), (b"hello\nworld\n", "hello"),
@@ -157,5 +164,6 @@ def test_a_clean_log_is_left_as_it_is(cli):
     found, = cli("log", "run.csv", "--out", "again.csv", "--json").data["logs"]
     assert found["remarks"] == []
     log, again = read_logs("run.csv")[0], read_logs("again.csv")[0]
-    assert np.array_equal(log.time, again.time) and np.array_equal(log.command, again.command)
+    assert np.array_equal(log.time, again.time)
+    assert np.array_equal(log.command, again.command)
     assert np.array_equal(log.measured["output_angle"], again.measured["output_angle"])

@@ -52,7 +52,8 @@ def test_what_comes_back_is_the_clean_log_to_the_bit(tmp_path, name):
     for log, right in zip(found, clean, strict=True):
         sure = np.ones(len(right), bool)
         sure[list(one.unsure)] = False
-        assert len(log) == len(right) and list(log.measured) == list(right.measured)
+        assert len(log) == len(right)
+        assert list(log.measured) == list(right.measured)
         assert np.array_equal(log.time[sure], right.time[sure])
         assert (np.diff(log.time) > 0.0).all()
         assert np.array_equal(log.command, right.command)
@@ -119,7 +120,8 @@ def test_a_stamp_that_fits_nowhere_is_a_torn_row(tmp_path):
     with pytest.raises(InputError, match=r"--mend torn leaves out line 12"):
         read_logs(file)
     log, = read_logs(file, mend=["torn"])
-    assert len(log) == 39 and 0.2 not in log.time
+    assert len(log) == 39
+    assert 0.2 not in log.time
 
 
 def test_two_faults_are_typed_together(tmp_path):
@@ -144,14 +146,16 @@ def test_unwritten_zeros_within_a_file_are_torn_rows(tmp_path):
 def test_a_note_before_numbers_is_a_row(tmp_path):
     rows = [f"{'start' if k == 3 else ''},{row}" for k, row in enumerate(ROWS)]
     log, = read_logs(written(tmp_path, ["note,ms,pulse_us,angle_deg", *rows]))
-    assert len(log) == 40 and log.reading.unread == ("note",)
+    assert len(log) == 40
+    assert log.reading.unread == ("note",)
 
 
 # ----------------------------------------------------------------------------------------------------- dialects
 
 def test_columns_by_number_and_unit(tmp_path):
     log, = read_logs(written(tmp_path, ROWS), columns="1:ms 2:us 3:deg")
-    assert log.command[0] == 1500e-6 and log.time[1] == 0.02
+    assert log.command[0] == 1500e-6
+    assert log.time[1] == 0.02
     assert np.degrees(log.measured["output_angle"][-1]) == pytest.approx(3.9)
     with pytest.raises(InputError, match="a signal before it"):
         read_logs(tmp_path / "run.csv", columns="1:ms 2:kg 3:deg")
@@ -163,7 +167,8 @@ def test_a_rate_stands_for_times_and_jumps_for_commands(tmp_path):
                      columns="time=50Hz command=0deg@0s,30deg@0.3s")
     assert np.array_equal(log.time, np.arange(40) / 50.0)
     assert np.degrees(log.command[[0, 14, 15]]).round(9).tolist() == [0.0, 0.0, 30.0]
-    for wrong, words in (("time=50Hz command=30deg@0.3s", "at the start"), ("time=50deg command=3deg", "a rate of rows"),
+    for wrong, words in (("time=50Hz command=30deg@0.3s", "at the start"),
+                         ("time=50deg command=3deg", "a rate of rows"),
                          ("time=50Hz command=3deg@0s,4us@1s", "one unit"), ("time=50Hz command=3kg", "pulse width"),
                          ("time=50Hz command=3deg@0s,4deg@0s", "in the order"), ("time=0Hz command=3deg", "a rate")):
         with pytest.raises(InputError, match=re.escape(words)):

@@ -35,7 +35,8 @@ def test_a_weight_on_a_drum_comes_from_the_name(tmp_path):
 
 
 def test_an_arm_and_several_values(tmp_path):
-    lifts(tmp_path, {"arm{mass}g_{length}cm_*.txt": {"load": {"pendulum": {"mass": "{mass}g", "length": "{length}cm"}}}},
+    arm = {"mass": "{mass}g", "length": "{length}cm"}
+    lifts(tmp_path, {"arm{mass}g_{length}cm_*.txt": {"load": {"pendulum": arm}}},
           ["arm100g_12.5cm_a.txt", "arm50g_8cm_b.txt"])
     first, second = read_logs(tmp_path)
     assert (first.load.pendulum.mass, first.load.pendulum.length) == pytest.approx((0.1, 0.125))

@@ -131,8 +131,8 @@ def fit(
                "loss": loss, "level": level, "intervals": intervals, "seed": seed, "compare": compare,
                "diagnose": diagnose, "accuracy": accuracy, "within": within}
     chosen = _options(options)
-    given = log_reading.read(logs, file_format, columns, joint, leave_out or [], mend=mend, rate=rate, commanded=commanded,
-                             force=force, quiet=as_json, registers=bool(register))
+    given = log_reading.read(logs, file_format, columns, joint, leave_out or [], mend=mend, rate=rate,
+                             commanded=commanded, force=force, quiet=as_json, registers=bool(register))
     given = log_reading.about_the_middle(given, search.model, force=force, quiet=as_json)
     climbs = _climber(search, asked=bool(free), ladder=ladder, structures=structures, springs=spring)
     found = _run(search, given, chosen, scheduler, climbs)

@@ -36,7 +36,8 @@ def log(
             f"{name} {what}" for name, what in MENDS.items()) + "; repeatable or with commas.",
         rich_help_panel=log_reading.PANEL)] = None,
     out: Annotated[Path | None, typer.Option(
-        metavar="FILE.csv", help="Write the mended log, in SI, and its sidecar.", rich_help_panel=shared.OUTPUT)] = None,
+        metavar="FILE.csv", help="Write the mended log, in SI, and its sidecar.",
+        rich_help_panel=shared.OUTPUT)] = None,
     plot: Annotated[Path | None, typer.Option(
         metavar="FILE", help="Draw it: .png, .svg or .pdf.", rich_help_panel=shared.OUTPUT)] = None,
     force: Annotated[bool, typer.Option(

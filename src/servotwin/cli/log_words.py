@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 # signal or kind of command -> (unit as printed, of `servotwin.units`, its dimension)
 _UNITS = {"output_angle": ("deg", "angle"), "load_angle": ("deg", "angle"), "angle": ("deg", "angle"),
           "feedback_voltage": ("V", "voltage"), "voltage": ("V", "voltage"), "bus_voltage": ("V", "voltage"),
-          "armature_voltage": ("V", "voltage"), "supply_current": ("A", "current"), "armature_current": ("A", "current"),
+          "armature_voltage": ("V", "voltage"), "supply_current": ("A", "current"),
+          "armature_current": ("A", "current"),
           "output_speed": ("deg/s", "speed"), "pulse_width": ("us", "time")}
 _BLOCKS = "▁▂▃▄▅▆▇█"
 _WIDE = 60  # characters of a curve

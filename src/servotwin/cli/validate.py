@@ -63,8 +63,8 @@ def validate(
     """Compare a servo with logs, and say how far it is off."""
     targets = _targets(report, [Path(servo), *logs], force=force)
     found = _run(servo, model, change or [], register or [], nuisance, sensors, mend, lambda: log_reading.read(
-        logs, file_format, columns, joint, leave_out or [], mend=mend, rate=rate, commanded=commanded, force=force, quiet=as_json,
-        registers=bool(register)), force=force, quiet=as_json)
+        logs, file_format, columns, joint, leave_out or [], mend=mend, rate=rate, commanded=commanded, force=force,
+        quiet=as_json, registers=bool(register)), force=force, quiet=as_json)
     limits = _limits(found, max_error or [])
     files = _write(found, targets, force=force)
     above = exceeded(found, limits)
@@ -93,8 +93,8 @@ def _run(servo: str, model: str | None, change: list[str], register: list[str], 
     kind = None if model is None else class_of(model, fit_words.MODEL_NAMES)
     changed = servo_of(servo, change, register)
     fitted = fit_words.some_or_none("--nuisance", nuisance, ())
-    logs = log_reading.about_the_middle(read(), checked_servo(changed, recorded_model(changed) if kind is None else kind),
-                                        force=force, quiet=quiet)
+    nominal = checked_servo(changed, recorded_model(changed) if kind is None else kind)
+    logs = log_reading.about_the_middle(read(), nominal, force=force, quiet=quiet)
     return run(logs, changed, kind, mend=fit_words.kinds(mend), nuisance=fitted, sensors=fit_words.names(sensors),
                progress=True)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
+from itertools import pairwise
 from typing import NoReturn
 
 import numpy as np
@@ -78,7 +79,7 @@ def timed(table: TextTable, column: Column, mends: Collection[str]) -> list[Time
     rows = _Rows(table, stamps, replace(column, unit="s") if column.unit in CLOCKS else column, mends)
     starts = [0, *_backwards(rows), len(rows.stamps)]
     parts = []
-    for first, stop in zip(starts, starts[1:], strict=False):
+    for first, stop in pairwise(starts):
         if len(starts) > 2 and stop - first < _FEWEST:
             continue
         parts.append(_forwards(_part(rows, first, stop, alone=len(starts) == 2)))
@@ -93,8 +94,8 @@ def _part(rows: _Rows, first: int, stop: int, *, alone: bool) -> _Rows:
     out = np.ones(len(rows.stamps), np.bool_)
     out[first:stop] = False
     lines = f"lines {rows.table.rows[first].line} to {rows.table.rows[stop - 1].line}"
-    return _Rows(rows.table.without(out, f"{lines} are a log of their own: the clock begins again"), rows.stamps[first:stop],
-                 rows.column, rows.mends)
+    table = rows.table.without(out, f"{lines} are a log of their own: the clock begins again")
+    return _Rows(table, rows.stamps[first:stop], rows.column, rows.mends)
 
 
 # ---------------------------------------------------------------------------------------- times that run backwards

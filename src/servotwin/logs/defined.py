@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +60,7 @@ def checked_definition(what: str, signal: str, text: str) -> tuple[str, str]:
     if times[0] > 0.0:
         raise InputError(what, got=text, allowed="what was commanded at the start of the log too, such as "
                          f"0{unit}@0s,{text}")
-    if any(later <= time for time, later in zip(times, times[1:], strict=False)):
+    if any(later <= time for time, later in pairwise(times)):
         raise InputError(what, got=text, allowed="jumps in the order of their times, such as 0deg@0s,90deg@0.5s")
     return _KINDS[dimension], unit
 

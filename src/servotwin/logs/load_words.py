@@ -39,8 +39,8 @@ def load_from_words(content: object) -> Load:
     Parameters
     ----------
     content : mapping
-        `drum`: `mass`, `radius` and perhaps the `inertia` of a weight that the shaft winds up on a drum. `inertia`, `viscous_friction`, `torque`, `coulomb_torque` and the parts `pendulum`, `spring`, `recorded`,
-        `flexible`; each part a mapping of its fields, or a list of such.
+        `inertia`, `viscous_friction`, `torque`, `coulomb_torque` and the parts `pendulum`, `spring`, `recorded`,
+        `flexible`; each part a mapping of its fields, or a list of such; and `drum`, a weight that the shaft winds up.
 
     Raises
     ------

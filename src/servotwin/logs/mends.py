@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -130,9 +130,9 @@ def without_thousands(table: TextTable, mends: Collection[str]) -> TextTable:
                          f"other cells have it; {say(THOUSANDS, mends)}")
     rows = [Row(row.line, [cell.replace(mark, "") if grouped.fullmatch(cell) else cell for cell in row.cells])
             for row in table.rows]
+    said = f"{'points' if mark == '.' else 'commas'} within whole numbers are taken for thousands separators"
     return replace(table, rows=rows, decimal="," if has_decimal_commas(rows, table.separator) else ".",
-                   remarks=(*table.remarks, f"{'points' if mark == '.' else 'commas'} within whole numbers are taken for "
-                            "thousands separators"))
+                   remarks=(*table.remarks, said))
 
 
 def _grouped(mark: str) -> re.Pattern[str]:

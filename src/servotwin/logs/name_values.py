@@ -52,8 +52,8 @@ def filled_in(what: str, content: Any, values: dict[str, str]) -> Any:
 
     Examples
     --------
-    >>> filled_in("load", {"drum": {"mass": "{mass}g", "radius": 0.1}, "note": "run {run}"}, {"mass": "200", "run": "3"})
-    {'drum': {'mass': 0.2, 'radius': 0.1}, 'note': 'run 3'}
+    >>> filled_in("load", {"drum": {"mass": "{mass}g", "radius": 0.1}, "note": "no {k}"}, {"mass": "200", "k": "3"})
+    {'drum': {'mass': 0.2, 'radius': 0.1}, 'note': 'no 3'}
     """
     if isinstance(content, dict):
         return {key: filled_in(f"{what}, {key}", value, values) for key, value in content.items()}

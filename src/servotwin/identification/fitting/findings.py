@@ -106,7 +106,8 @@ def first_looks(logs: Sequence[Log], model: Model, mend: Sequence[str]) -> tuple
     Raises
     ------
     InputError
-        If a kind is unknown, a command lies beyond the travel, whatever its zero, or a shaft turns faster than the servo could by far and no finding says why.
+        If a kind is unknown, a command lies beyond the travel, whatever its zero, or a shaft turns faster than the
+        servo could by far and no finding says why.
     """
     kinds = checks.checked_words("mend", mend, MENDED)
     about = centred(logs, model)

@@ -31,7 +31,8 @@ _TURN = 2.0 * math.pi
 _CENTRE = math.radians(90.0)
 _OFF_ZERO = 10.0  # deg
 _OFF_CENTRE = math.radians(10.0)
-_SMALL, _LARGE = {"angle": math.radians(3.0), "pulse_width": 30e-6}, {"angle": math.radians(45.0), "pulse_width": 450e-6}
+_SMALL = {"angle": math.radians(3.0), "pulse_width": 30e-6}
+_LARGE = {"angle": math.radians(45.0), "pulse_width": 450e-6}
 
 
 def wrong_of(log: Log, clock: Clock, values: Values, motion: Motion) -> Iterator[str]:
@@ -43,11 +44,11 @@ def wrong_of(log: Log, clock: Clock, values: Values, motion: Motion) -> Iterator
         yield (f"the angle jumps by a whole turn, {jumps} times: a sensor that begins again; servotwin fit ... --mend "
                "wrap joins the pieces")
     elif motion.speed > _FASTEST and log.angle_name == "output_angle":
-        yield (f"the shaft turns at {math.degrees(motion.speed):.0f} deg/s, faster than any servo: look at the units of "
-               f"angle and time ({clock.period:.3g} s a row)")
+        yield (f"the shaft turns at {math.degrees(motion.speed):.0f} deg/s, faster than any servo: look at the "
+               f"units of angle and time ({clock.period:.3g} s a row)")
     if not len(log.changes) and motion.onset > _LATE and not _defined(log):
-        yield (f"the shaft begins to move {motion.onset:.2g} s after the first row, and the command never changes: look "
-               "which column is the command")
+        yield (f"the shaft begins to move {motion.onset:.2g} s after the first row, and the command never changes: "
+               "look which column is the command")
     if log.angle_name == "output_angle":
         yield from _against(log, motion)
     if values.flat_low or values.flat_high:
@@ -76,16 +77,16 @@ def _against(log: Log, motion: Motion) -> Iterator[str]:
             yield "the command moves and the shaft does not: look at wiring and supply"
         return
     if gain < 0.0:
-        yield (f"the angle falls where the command grows; unless the servo is built in reverse, {_say(log, -1.0, motion)} turns "
-               "it")
+        yield (f"the angle falls where the command grows; unless the servo is built in reverse, "
+               f"{_say(log, -1.0, motion)} turns it")
     if kind == "angle":
         known = next((what for factor, what in _SCALES.items() if abs(math.log(abs(gain) / factor)) < _NEAR), "")
         if known or not _USUAL[0] < abs(gain) < _USUAL[1]:
             yield (f"the shaft moves {abs(gain):.3g} times as far as it is asked to{f': {known}' if known else ''}; "
                    f"{_say(log, 1.0 / gain)} puts that right if the command is right")
         elif abs(motion.zero - _CENTRE) < _OFF_CENTRE and log.held.min() >= 0.0:
-            yield (f"the angle is 0 where the command is {math.degrees(motion.zero):.0f} deg: the command counts from an "
-                   f"end, as servo.write does; {_say_command(log)} counts it from the centre")
+            yield (f"the angle is 0 where the command is {math.degrees(motion.zero):.0f} deg: the command counts from "
+                   f"an end, as servo.write does; {_say_command(log)} counts it from the centre")
     elif kind == "pulse_width" and not _PULSE_GAINS[0] < abs(gain) < _PULSE_GAINS[1]:
         yield (f"the shaft turns {math.degrees(gain) * 1e-6:.3g} deg per us of pulse, and servos 0.05 to 0.2: look at "
                "the unit of the angle")
@@ -98,7 +99,8 @@ def _say(log: Log, factor: float, motion: Motion | None = None) -> str:
         return "a scale of the angle"
     zero = 0.0 if motion is None or log.command_kind != "angle" or column.unit != "deg" else math.degrees(motion.zero)
     zero = 0.0 if abs(zero) < _OFF_ZERO else round(zero)
-    shown = unit_shown(column.unit, float(f"{factor * column.scale:.4g}"), float(f"{factor * column.offset + zero:.4g}"))
+    scale, offset = (float(f"{value:.4g}") for value in (factor * column.scale, factor * column.offset + zero))
+    shown = unit_shown(column.unit, scale, offset)
     return f'--columns "angle={column.column}:{shown}"'
 
 

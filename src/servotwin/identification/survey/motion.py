@@ -38,7 +38,8 @@ class Motion(NamedTuple):
     correlation : float
         Of angle and command, the lag taken away.
     lag : float
-        The dead time of steps in the median; where the command moves all the time, by how much the angle comes later [s].
+        The dead time of steps in the median; where the command moves all the time, by how much the angle comes later
+        [s].
     steps : int
         Whose dead time was seen; 0 where the command moves all the time.
     speed : float
@@ -87,7 +88,8 @@ def motion_of(log: Log) -> Motion:
     x = command[np.maximum(np.searchsorted(time, time - (lag if math.isfinite(lag) else 0.0), side="right") - 1, 0)]
     at = _rests(time, changes) if steps else np.ones(len(time), np.bool_)
     gain, zero, correlation = _line(x[at], angle[at])
-    return Motion(gain, zero, correlation, lag, steps, speed, _onset(time - log.start, angle, noise), still=log.is_constant)
+    onset = _onset(time - log.start, angle, noise)
+    return Motion(gain, zero, correlation, lag, steps, speed, onset, still=log.is_constant)
 
 
 def _onset(time: Array, angle: Array, noise: float) -> float:

@@ -78,8 +78,8 @@ def _read(raw: bytes, given: dict[str, Any]) -> tuple[list[Log], list[str]]:
     file.write_bytes(raw)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        logs = read_logs(file, columns=given["columns"] or None, mend=[word for word in re.split(r"[,\s]+", given["mend"])
-                                                                    if word])
+        mends = [word for word in re.split(r"[,\s]+", given["mend"]) if word]
+        logs = read_logs(file, columns=given["columns"] or None, mend=mends)
     said = [_plain(str(one.message), label) for one in caught if issubclass(one.category, UserWarning)]
     return [_renamed(log, label) for log in logs], said
 
