@@ -1,16 +1,13 @@
 """`servotwin log`: what a log holds and lacks, and the mended log."""
 
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from reference.broken_logs import KINDS, SEEDS, broken_logs, clean_rows
 from servotwin.logs import read_logs
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "reference"))
-from broken_logs import KINDS, SEEDS, broken_logs, clean_rows
 
 ASKED = [one for one in broken_logs() if not one.certain]
 

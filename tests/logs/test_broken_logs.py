@@ -1,17 +1,14 @@
 """Logs that loggers broke: what is certain is mended by itself, and of the rest one sentence says what to type."""
 
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from reference.broken_logs import SEEDS, Broken, broken_logs
 from servotwin.errors import InputError
 from servotwin.logs import read_logs
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "reference"))
-from broken_logs import SEEDS, Broken, broken_logs
 
 LOGS = {f"{one.kind} {one.seed}": one for one in broken_logs()}
 
