@@ -45,6 +45,7 @@ def log(
     as_json: shared.JsonOption = False,
 ) -> None:
     """Say what a log holds and lacks."""
+    from servotwin.cli.log_words import sections
     from servotwin.identification import read_logs
     from servotwin.identification.survey.survey import survey_of
 
@@ -61,14 +62,8 @@ def log(
         emit_json({"logs": [one.facts for one in found], "files": written})
         return
     for k, one in enumerate(found):
-        show(*sections_of(one, written if k == len(found) - 1 else ()), *([""] if k < len(found) - 1 else []))
-
-
-def sections_of(found: Survey, files: Sequence[str]) -> list[object]:
-    """Return what is shown of one log."""
-    from servotwin.cli.log_words import sections
-
-    return list(sections(found, files))
+        last = k == len(found) - 1
+        show(*sections(one, written if last else ()), *([] if last else [""]))
 
 
 def _mends(words: list[str] | None) -> tuple[str, ...]:

@@ -98,7 +98,7 @@ def with_signals(option: str, words: str) -> str:
     found = _BARE.findall(words)
     if _BARE.sub("", words).strip() or not found:
         return words
-    named = []
+    named: list[str] = []
     for number, unit in found:
         dimension = scaled_unit(f"{option} {number}:{unit}", unit)[1]
         if dimension not in _BY_UNIT:
