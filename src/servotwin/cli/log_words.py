@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -28,7 +29,8 @@ _UNITS = {"output_angle": ("deg", "angle"), "load_angle": ("deg", "angle"), "ang
           "armature_current": ("A", "current"),
           "output_speed": ("deg/s", "speed"), "pulse_width": ("us", "time")}
 _BLOCKS = "▁▂▃▄▅▆▇█"
-_WIDE = 60  # characters of a curve
+_WIDE, _NARROW = 60, 36  # characters of a curve
+_ROOM = 110  # characters of a line, from which on curves are wide
 _MOST_GAPS = 3
 
 
@@ -38,7 +40,7 @@ def sections(found: Survey, files: Sequence[str]) -> list[RenderableType]:
     parts: list[RenderableType] = [f"{log.name}: {len(log)} rows in {log.duration:.4g} s"]
     if log.reading is not None:
         parts += [table(("column", "signal", "unit", "known"), [
-            (one.column, one.signal, one.unit, one.known) for one in log.reading.columns]), ""]
+            (one.column, one.signal, one.unit, one.known) for one in log.reading.columns], wraps="known"), ""]
     rows = [*_curves(log), ("clock", _clock(found.clock)), *_gaps(found.clock)]
     rows += [(name.replace("_", " "), _values(name, one)) for name, one in found.values.items()]
     rows += [("motion", line) for line in _motion(log, found.motion)]
@@ -53,13 +55,14 @@ def sections(found: Survey, files: Sequence[str]) -> list[RenderableType]:
 
 def _curves(log: Log) -> Iterator[tuple[str, str]]:
     """Give command and angle as curves of a line each."""
+    width = _WIDE if shutil.get_terminal_size((_ROOM, 1)).columns >= _ROOM else _NARROW
     for label, kind, values in (("command", log.command_kind, log.command),
                                 (log.angle_name.replace("_", " "), log.angle_name, log.measured[log.angle_name])):
         seen = values[np.isfinite(values)]
-        yield label, f"{curve(log.time, values)}  {_range(kind, float(seen.min()), float(seen.max()))}"
+        yield label, f"{curve(log.time, values, width)}  {_range(kind, float(seen.min()), float(seen.max()))}"
 
 
-def curve(time: NDArray[np.float64], values: NDArray[np.float64], width: int = _WIDE) -> str:
+def curve(time: NDArray[np.float64], values: NDArray[np.float64], width: int) -> str:
     """Return values over time as one line of blocks; a blank where there are none.
 
     Examples

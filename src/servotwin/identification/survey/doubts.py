@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from servotwin.logs.log import Log
 
 _LATE = 0.2  # s: more than a servo's dead time
-_CLEAR = 0.6  # correlation
+_CLEAR, _SURE = 0.6, 0.95  # correlation, that tells a sign, and a scale
 _SCALES = {180.0 / math.pi: "degrees were taken for radians", math.pi / 180.0: "radians were taken for degrees",
            2.0: "a factor of two", 0.5: "a factor of two"}
 _NEAR = 0.07
@@ -79,6 +79,8 @@ def _against(log: Log, motion: Motion) -> Iterator[str]:
     if gain < 0.0:
         yield (f"the angle falls where the command grows; unless the servo is built in reverse, "
                f"{_say(log, -1.0, motion)} turns it")
+    if abs(motion.correlation) < _SURE:
+        return
     if kind == "angle":
         known = next((what for factor, what in _SCALES.items() if abs(math.log(abs(gain) / factor)) < _NEAR), "")
         if known or not _USUAL[0] < abs(gain) < _USUAL[1]:
