@@ -27,6 +27,7 @@ _OVERFLOWS = {2**32 * 1000: "micros() begins again after 4294.967296 s", 2**32 *
     "millis() begins again after 4294967.296 s")}
 _OVERFLOWS_16 = (2**16 * 1000, 2**16 * 10**6)
 _STEPS = 2.0  # usual steps: one more or less than a single one
+_LONG = 50.0  # usual steps: a shorter period may be anything
 _NEAR = 5.5  # usual steps: how far apart neighbours are without a row that is torn
 _FEWEST = 3  # rows of a log
 _SENT_TWICE = 2  # rows, and all of their cells alike
@@ -128,8 +129,8 @@ def _backwards(rows: _Rows) -> list[int]:
 def _overflowed(rows: _Rows, k: int) -> bool:
     """Join times of a counter that began again at a power of two, where that is certain or was said."""
     back = rows.stamps[k - 1] - rows.stamps[k]
-    periods = [*_OVERFLOWS, *_OVERFLOWS_16]
-    found = next((period for period in periods if 0.0 < period / rows.unit - back <= _STEPS * rows.usual), None)
+    found = next((period for period in (*_OVERFLOWS, *_OVERFLOWS_16) if period > _LONG * rows.usual * rows.unit
+                  and 0.0 < period / rows.unit - back <= _STEPS * rows.usual), None)
     if found is None:
         return False
     line = rows.table.rows[k].line
