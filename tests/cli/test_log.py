@@ -164,3 +164,21 @@ def test_a_clean_log_is_left_as_it_is(cli):
     assert np.array_equal(log.time, again.time)
     assert np.array_equal(log.command, again.command)
     assert np.array_equal(log.measured["output_angle"], again.measured["output_angle"])
+
+
+def test_measured_logs_raise_few_doubts(data_folder):
+    from servotwin.identification.survey.survey import survey_of
+
+    logs = [log for path in sorted((data_folder / "bam_xl330" / "raw").glob("*.json")) for log in read_logs(path)]
+    logs += read_logs(data_folder / "miuzei_25kg" / "runs.json")
+    assert len(logs) > 60
+    assert [(log.name, survey_of(log).wrong) for log in logs if survey_of(log).wrong] == []
+
+
+def test_a_column_that_is_not_the_command_is_doubted(data_folder):
+    """The second servo moves while the command of the column `u2` stands."""
+    from servotwin.identification.survey.survey import survey_of
+
+    path, = (data_folder / "maccepa_hitec").glob("servo2_step90*.csv")
+    log, = read_logs(path, columns="time=%time:ns command=field.u2:rad angle=field.servo2_position:rad")
+    assert "look which column is the command" in survey_of(log).wrong[0]

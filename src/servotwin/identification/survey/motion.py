@@ -19,6 +19,7 @@ _AT_REST = 0.25  # of a stretch of one command: the end of it
 _STEPS_ONLY = 0.2  # of the rows change the command at most: else it moves all the time
 _LAGS = 61
 _LONGEST_LAG = 0.6  # s
+_CLEARLY = 0.2  # of what is left without a shift: an angle does not come first unless that is clear
 _SEEN = 0.03  # of a travel, by which a motion has begun
 _SIGMAS = 5.0
 _FEWEST = 8  # rows
@@ -131,7 +132,10 @@ def _lag(time: Array, angle: Array, command: Array) -> float:
         return math.nan
     lags = np.linspace(-0.25 * _LONGEST_LAG, _LONGEST_LAG, _LAGS)
     fits = [abs(np.corrcoef(np.interp(time - lag, time, command), angle)[0, 1]) for lag in lags.tolist()]
-    return float(lags[int(np.nanargmax(fits))])
+    best = int(np.nanargmax(fits))
+    if lags[best] < 0.0 and 1.0 - fits[best] > _CLEARLY * (1.0 - max(fits[int(np.searchsorted(lags, 0.0)):])):
+        best = int(np.searchsorted(lags, 0.0))
+    return float(lags[best])
 
 
 def _line(x: Array, y: Array) -> tuple[float, float, float]:  # gain, zero, correlation
