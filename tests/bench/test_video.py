@@ -350,6 +350,20 @@ def test_logs_that_do_not_fit(filmed, tmp_path, text, says):
         film_log(filmed, tmp_path / "run.csv")
 
 
+def test_a_broken_log_is_mended_as_at_every_other_door(servo_film, tmp_path):
+    text = (servo_film / "step.csv").read_text().splitlines()
+    (tmp_path / "step.json").write_bytes((servo_film / "step.json").read_bytes())
+    file, found = tmp_path / "step.csv", read_clip(servo_film / "clip.mp4", instant="led")
+    file.write_text("\n".join([*text[:5], "rst:0x1 (POWERON_RESET)", *text[5:], "0.9"]))
+    made = film_log(found, file)
+    assert made.columns == film_log(found, servo_film / "step.csv").columns
+    assert any("text in line 6 was left out" in one for one in made.remarks)
+    file.write_text("\n".join([*text[:5], text[5][:4], *text[5:], ""]))
+    with pytest.raises(InputError, match="--mend torn"):
+        film_log(found, file)
+    assert film_log(found, file, mend=["torn"]).columns == made.columns
+
+
 # --- what is no clip of a mark
 
 

@@ -177,7 +177,7 @@ def test_what_is_wrong_with_logs_is_said_and_mended(cli, tmp_path):
         ended = cli("fit", folder, "--servo", fit_logs.SERVO, "--mend", wrong)
         assert ended.code == 2
         assert "mend" in ended.err
-        assert "not followed" in ended.err
+        assert "not-followed" in ended.err
 
 
 

@@ -130,7 +130,7 @@ def test_a_foreign_table_is_read_without_code(run):
 
 def test_a_repeated_stamp_is_passed_over_on_request(run):
     content = HEADER + "0,1500,0\n0.02,1600,9\n0.02,1700,10\n0.04,1600,18\n"
-    refused(run(content), "line 4", "time_s", "stands still", "0.02 s after 0.02 s in line 3", "drop_repeated")
+    refused(run(content), "line 4", "time_s", "stands still", "0.02 s after 0.02 s in line 3", "drop-repeated")
     log = read_csv_log(run(content, {"drop_repeated": True}))
     assert log.time.tolist() == [0.0, 0.02, 0.04]
     np.testing.assert_allclose(log.command, [1.5e-3, 1.6e-3, 1.6e-3], rtol=1e-15)
@@ -246,8 +246,8 @@ def test_nothing_is_overwritten_unasked(tmp_path, run):
     (HEADER + "0,1500,0\n0.02,1500,x\n0.04,1500,2\n", ("line 3, output_angle_deg", "'x'")),
     (HEADER + "0,1500,0\n,1500,1\n0.04,1500,2\n", ("line 3, time_s",)),
     (HEADER + "0,1500,0\n0.04,1500,1\n\n0.02,1500,2\n", ("line 5, time_s", "runs backwards", "in line 3")),
-    (HEADER + "0,1500,0\nnan,1500,1\n0.04,1500,2\n", ("time of sample 1", "nan")),
-    ("time,command_voltage,output_angle\n0,nan,0\n1,1,1\n2,1,2\n", ("command of sample 0", "nan", "only pulses")),
+    (HEADER + "0,1500,0\nnan,1500,1\n0.04,1500,2\n", ("line 3, time_s", "nan")),
+    ("time,command_voltage,output_angle\n0,nan,0\n1,1,1\n2,1,2\n", ("line 2, command_voltage", "nan")),
     (HEADER + "0,1500,\n0.02,1500,\n0.04,1500,\n", ("output_angle", "no value")),
     (HEADER + "0,1500,inf\n0.02,1500,1\n0.04,1500,2\n", ("output_angle of sample 0", "inf")),
     (HEADER + "0,-1500,0\n0.02,1500,1\n0.04,1500,2\n", ("pulse width of sample 0", "positive")),

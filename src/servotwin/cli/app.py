@@ -12,6 +12,9 @@ from servotwin.cli.catalog import catalog
 from servotwin.cli.curves import curves
 from servotwin.cli.fit import fit
 from servotwin.cli.linear import linear
+from servotwin.cli.log import EPILOG as LOG_EPILOG
+from servotwin.cli.log import HELP as LOG_HELP
+from servotwin.cli.log import log
 from servotwin.cli.paper_command import paper
 from servotwin.cli.robot import robot
 from servotwin.cli.simulate import simulate
@@ -67,6 +70,7 @@ app.command("fit", help="Find the parameters of a servo, with intervals, from it
                    "Example: servotwin fit --advise --servo hitec-hs-755hb")(fit)
 app.command("validate", help="Compare a servo with logs, and say how far it is off.",
             epilog="Example: servotwin validate my-servo.toml new-runs/ --max-error 3deg --report check.html")(validate)
+app.command("log", help=LOG_HELP, epilog=LOG_EPILOG)(log)
 app.command("web", help="Open the bench in a browser: turn a servo, and watch its pulses, currents and angles.",
             epilog="Example: servotwin web hitec-hs-755hb\n\n"
                    "Example: servotwin web --lesson deadband\n\n"

@@ -53,6 +53,9 @@ def video(
                                       rich_help_panel=shared.OUTPUT)],
     log: Annotated[Path | None, typer.Option(metavar="FILE.csv", help="The recorder's log of the same run, which has "
                                              "the command; a fit needs it.", rich_help_panel=_TIME)] = None,
+    mend: Annotated[list[str] | None, typer.Option(
+        metavar="KIND", help="What to put right in the recorder's log first, see servotwin log; repeatable.",
+        rich_help_panel=_TIME)] = None,
     instant: Annotated[str | None, typer.Option(metavar="led|jump|none|TIME", help=(
         "Where clip and log meet: a light that goes on at the log's time 0, the first motion (which is that after the "
         "first change of the command), the first picture, or a time in the clip such as 1.25s (default: jump; led "
@@ -75,6 +78,7 @@ def video(
     """Write the angle of a marked horn as a log."""
     from servotwin.bench.video import read_clip
     from servotwin.bench.video.film_log import film_log
+    from servotwin.cli.fit_words import reading_mends
     from servotwin.cli.outputs import check_targets
     from servotwin.units.quantities import quantity
 
@@ -85,7 +89,7 @@ def video(
         "zero": None if zero is None else quantity("--zero", zero, "angle")}
     with patience(f"looking at {clip}"):
         filmed = read_clip(clip, **options)
-    made = film_log(filmed, log)
+    made = film_log(filmed, log, mend=reading_mends(mend))
     _write(targets, made.text, json_text(made.sidecar) + "\n", force=force)
     remarks = [*filmed.remarks, *made.remarks]
     files = [str(target.path) for target in targets]

@@ -36,6 +36,8 @@ def fit(
     file_format: log_reading.FormatOption = "auto",
     columns: log_reading.ColumnsOption = None,
     joint: log_reading.JointOption = None,
+    rate: log_reading.RateOption = None,
+    commanded: log_reading.CommandedOption = None,
     change: Annotated[list[str] | None, typer.Option(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable; with a unit, or "
         "in SI units.", rich_help_panel=_LOGS)] = None,
@@ -139,8 +141,9 @@ def fit(
                "loss": loss, "level": level, "intervals": intervals, "seed": seed, "compare": compare,
                "diagnose": diagnose, "accuracy": accuracy, "within": within}
     chosen = _options(options)
-    given = log_reading.read(logs, file_format, columns, joint, leave_out or [], force=force, quiet=as_json,
-                             registers=bool(register))
+    given = log_reading.read(logs, file_format, columns, joint, leave_out or [], mend=mend, rate=rate,
+                             commanded=commanded, force=force, quiet=as_json, registers=bool(register))
+    given = log_reading.about_the_middle(given, search.model, force=force, quiet=as_json)
     climbs = _climber(search, asked=bool(free), ladder=ladder, structures=structures, springs=spring)
     found = _run(search, given, chosen, scheduler, climbs)
     files = _write(found, targets, force=force)

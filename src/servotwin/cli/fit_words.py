@@ -8,9 +8,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 from servotwin.errors import InputError, ServotwinError, UnknownNameError
+from servotwin.identification.fitting.findings import MENDED
 from servotwin.identification.fitting.free import Space, nominal
 from servotwin.identification.fitting.stopping import Within
 from servotwin.identification.report.shown import dimension_of_free
+from servotwin.logs.mend_names import MENDS
 from servotwin.studies.kinds import Distribution, Normal, Offset, Relative, Uniform
 from servotwin.studies.words import distribution_of
 from servotwin.units.quantities import number_and_unit, quantity
@@ -39,14 +41,34 @@ def names(words: Sequence[str] | None) -> tuple[str, ...] | None:
 
 
 def kinds(words: Sequence[str] | None) -> tuple[str, ...]:
-    """Return kinds of findings, whose words may be joined.
+    """Return the kinds of findings among the words of --mend, which may be joined; those of a reader are others.
 
     Examples
     --------
-    >>> kinds(["wrap,not-followed"]), kinds(None)
+    >>> kinds(["wrap,not-followed", "torn"]), kinds(None)
     (('wrap', 'not followed'), ())
     """
-    return tuple(name.replace("-", " ") for name in names(words) or ())
+    return tuple(name.replace("-", " ") for name in names(words) or () if name not in MENDS)
+
+
+def reading_mends(words: Sequence[str] | None) -> tuple[str, ...]:
+    """Return what a reader mends, among the words of --mend.
+
+    Raises
+    ------
+    UnknownNameError
+        If a word is neither that nor a kind of finding.
+
+    Examples
+    --------
+    >>> reading_mends(["wrap,not-followed", "torn"])
+    ('torn',)
+    """
+    findings = [name.replace(" ", "-") for name in MENDED]
+    for name in names(words) or ():
+        if name not in MENDS and name.replace(" ", "-") not in findings:
+            raise UnknownNameError("kind of --mend", name, (*findings, *MENDS))
+    return tuple(name for name in names(words) or () if name in MENDS)
 
 
 def some_or_none(option: str, words: Sequence[str] | None, usual: Usual) -> tuple[str, ...] | Usual:

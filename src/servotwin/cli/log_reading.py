@@ -10,12 +10,14 @@ import typer
 
 from servotwin.cli.terminal import patience, show, table
 from servotwin.logs.formats import FORMATS, LOG_FORMATS
+from servotwin.logs.mend_names import MENDS
 from servotwin.logs.reading import read_alike
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from servotwin.identification import Log
+    from servotwin.models import Model
 
 _MOST_REMARKS = 5
 _QUIET = ("named", "sidecar")  # someone said so before
@@ -33,12 +35,18 @@ JointOption = Annotated[list[str] | None, typer.Option(
 
 MendOption = Annotated[list[str] | None, typer.Option(
     metavar="KIND", help="What to put right in the logs first, of what is said to be wrong with them: wrap, stamps, "
-    "sign, span, rows, not-followed; repeatable or with commas.", rich_help_panel=PANEL)]
+    f"sign, span, rows, not-followed; and in their files {', '.join(MENDS)}; repeatable or with commas.",
+    rich_help_panel=PANEL)]
+RateOption = Annotated[str | None, typer.Option(
+    metavar="RATE", help="Rows per second of tables without times, such as 50Hz.", rich_help_panel=PANEL)]
+CommandedOption = Annotated[str | None, typer.Option(
+    metavar="VALUE[@TIME]", help="What was commanded in tables without a command: 153deg@0s, or jumps such as "
+    "1500us@0s,1700us@0.5s.", rich_help_panel=PANEL)]
 
 
 def read(paths: Sequence[Path], file_format: str, columns: Sequence[str] | None, joints: Sequence[str] | None,
-         leave_out: Sequence[str], *, force: bool = False, quiet: bool = False,
-         registers: bool = False) -> list[Log]:
+         leave_out: Sequence[str], *, mend: Sequence[str] | None = None, rate: str | None = None,
+         commanded: str | None = None, force: bool = False, quiet: bool = False, registers: bool = False) -> list[Log]:
     """Return the logs of files and folders.
 
     What was guessed or said of columns is shown, unless `quiet`, and what was said is written into sidecars. Where the
@@ -55,11 +63,12 @@ def read(paths: Sequence[Path], file_format: str, columns: Sequence[str] | None,
     from servotwin.identification.fitting.robot_registers import of_no_robot
 
     windows = fit_words.left_out(leave_out)
-    said = None if not columns else " ".join(columns)
+    said = columns_said(columns, rate, commanded)
+    mends = fit_words.reading_mends(mend)
     chosen = None if not joints else ",".join(joints)
     written: list[str] = []
     with patience("reading"):
-        given = [(path, read_logs(path, file_format, columns=said, joints=chosen)) for path in paths]
+        given = [(path, read_logs(path, file_format, columns=said, joints=chosen, mend=mends)) for path in paths]
         logs = fit_words.without([log for _, some in given for log in some], windows)
         for path, some in given if said else ():
             try:
@@ -75,6 +84,55 @@ def read(paths: Sequence[Path], file_format: str, columns: Sequence[str] | None,
     for line in written if quiet else ():
         typer.echo(line, err=True)
     return of_no_robot(logs) if registers else logs
+
+
+def about_the_middle(logs: Sequence[Log], model: Model, *, force: bool = False, quiet: bool = False) -> list[Log]:
+    """Return logs whose commands count from the middle of the servo's travel; what was found is said, and kept.
+
+    Raises
+    ------
+    InputError
+        If the servo cannot follow a command.
+    """
+    from servotwin.errors import InputError
+    from servotwin.identification import keep_columns
+    from servotwin.identification.fitting.suspicions.centre import centred
+
+    found = centred(logs, model)
+    lines = list(found.sentences)
+    try:
+        lines += [f"written  {file}, which keeps this" for file in keep_columns(found.turned, overwrite=force)]
+    except InputError as error:  # the sidecar says otherwise, or cannot be written
+        lines.append(f"this is not kept: {error}")
+    if lines and not quiet:
+        show(*lines, "")
+    for line in lines if quiet else ():
+        typer.echo(line, err=True)
+    return list(found.logs)
+
+
+def columns_said(columns: Sequence[str] | None, rate: str | None, commanded: str | None) -> str | None:
+    """Return the words of `--columns`, with those of `--rate` and `--commanded` among them.
+
+    Raises
+    ------
+    InputError
+        If a rate or a command is none.
+
+    Examples
+    --------
+    >>> columns_said(["angle=1:deg"], "50Hz", "153deg@0s")
+    'angle=1:deg time=50Hz command=153deg@0s'
+    """
+    from servotwin.logs.column_words import with_signals
+    from servotwin.logs.defined import checked_definition
+
+    words = [] if not columns else [with_signals("--columns", " ".join(columns))]
+    for option, signal, text in (("--rate", "time", rate), ("--commanded", "command", commanded)):
+        if text is not None:
+            checked_definition(option, signal, text)
+            words.append(f"{signal}={text}")
+    return " ".join(words) or None
 
 
 def _parts(logs: Sequence[Log]) -> list[RenderableType]:

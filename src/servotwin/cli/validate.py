@@ -36,6 +36,8 @@ def validate(
     file_format: log_reading.FormatOption = "auto",
     columns: log_reading.ColumnsOption = None,
     joint: log_reading.JointOption = None,
+    rate: log_reading.RateOption = None,
+    commanded: log_reading.CommandedOption = None,
     change: Annotated[list[str] | None, typer.Option(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable; with a unit, or "
         "in SI units.")] = None,
@@ -61,7 +63,8 @@ def validate(
     """Compare a servo with logs, and say how far it is off."""
     targets = _targets(report, [Path(servo), *logs], force=force)
     found = _run(servo, model, change or [], register or [], nuisance, sensors, mend, lambda: log_reading.read(
-        logs, file_format, columns, joint, leave_out or [], force=force, quiet=as_json, registers=bool(register)))
+        logs, file_format, columns, joint, leave_out or [], mend=mend, rate=rate, commanded=commanded, force=force,
+        quiet=as_json, registers=bool(register)), force=force, quiet=as_json)
     limits = _limits(found, max_error or [])
     files = _write(found, targets, force=force)
     above = exceeded(found, limits)
@@ -79,15 +82,20 @@ def _targets(report: Path | None, inputs: list[Path], *, force: bool) -> list[Ta
 
 
 def _run(servo: str, model: str | None, change: list[str], register: list[str], nuisance: list[str] | None,
-         sensors: list[str] | None, mend: list[str] | None, read: Callable[[], list[Log]]) -> Validation:
+         sensors: list[str] | None, mend: list[str] | None, read: Callable[[], list[Log]], *, force: bool,
+         quiet: bool) -> Validation:
     from servotwin.cli import fit_words
     from servotwin.cli.model_words import class_of, servo_of
+    from servotwin.identification.fitting.checks import checked_servo
+    from servotwin.identification.fitting.validate import recorded_model
     from servotwin.identification.fitting.validate import validate as run
 
     kind = None if model is None else class_of(model, fit_words.MODEL_NAMES)
     changed = servo_of(servo, change, register)
     fitted = fit_words.some_or_none("--nuisance", nuisance, ())
-    return run(read(), changed, kind, mend=fit_words.kinds(mend), nuisance=fitted, sensors=fit_words.names(sensors),
+    nominal = checked_servo(changed, recorded_model(changed) if kind is None else kind)
+    logs = log_reading.about_the_middle(read(), nominal, force=force, quiet=quiet)
+    return run(logs, changed, kind, mend=fit_words.kinds(mend), nuisance=fitted, sensors=fit_words.names(sensors),
                progress=True)
 
 

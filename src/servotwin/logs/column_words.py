@@ -15,6 +15,8 @@ COMMAND = "command"  # its kind is told by its unit
 SHORT = {"pulse": "pulse_width", "angle": "output_angle", "feedback": "feedback_voltage", "current": "supply_current",
          "voltage": "bus_voltage", "speed": "output_speed"}
 SIGNALS = ("time", COMMAND, *SHORT, *(name for name in NAMES if name != "time"))
+_BARE = re.compile(r"""(\d+):([^\s=:'"]+)(?:\s+|$)""")  # "1:ms": a column by its number, a signal by its unit
+_BY_UNIT = {"time": "time", "angle": "angle", "current": "current", "voltage": "voltage", "speed": "speed"}
 _FORM = 'SIGNAL=COLUMN:UNIT, such as "time=t:ms angle=pos:deg-90"'
 _KINDS = {dimension_of_signal(name): name for name in COMMANDS}
 _WORD = re.compile(r"""\s*(?P<signal>[^\s=:'"]+)\s*=\s*
@@ -73,6 +75,7 @@ def wanted_columns(words: str | Mapping[str, str] | None, option: str = "--colum
 
 def _all(option: str, words: str) -> list[Wanted]:
     given, place = [], 0
+    words = with_signals(option, words)
     while words[place:].strip():
         match = _WORD.match(words, place)
         if match is None:
@@ -82,6 +85,27 @@ def _all(option: str, words: str) -> list[Wanted]:
     if not given:
         raise InputError(option, got="nothing", allowed=_FORM)
     return given
+
+
+def with_signals(option: str, words: str) -> str:
+    """Return words such as ``1:ms 2:deg`` with the signals that their units say; the second of two times is a pulse.
+
+    Examples
+    --------
+    >>> with_signals("--columns", "1:ms 2:us 3:-deg+90")
+    'time=1:ms pulse=2:us angle=3:-deg+90'
+    """
+    found = _BARE.findall(words)
+    if _BARE.sub("", words).strip() or not found:
+        return words
+    named: list[str] = []
+    for number, unit in found:
+        dimension = scaled_unit(f"{option} {number}:{unit}", unit)[1]
+        if dimension not in _BY_UNIT:
+            raise UnitError(f"{option} {number}:{unit}", got=unit, allowed=f"a signal before it: {_FORM}")
+        known = dimension == "time" and any(word.startswith("time=") for word in named)
+        named.append(f"{'pulse' if known else _BY_UNIT[dimension]}={number}:{unit}")
+    return " ".join(named)
 
 
 def _one(option: str, word: str) -> Wanted:

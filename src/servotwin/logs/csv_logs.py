@@ -3,29 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from decimal import Decimal, InvalidOperation
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, OutputError, OutputExistsError, UnknownNameError
-from servotwin.logs.column_words import wanted_columns
+from servotwin.logs.clock import Timed, timed
+from servotwin.logs.column_words import Wanted, wanted_columns
 from servotwin.logs.columns import COMMANDS, SWITCH, TIME, Column, switch_value
-from servotwin.logs.json_file import write_json
-from servotwin.logs.layout import is_known_name, layout_of
+from servotwin.logs.defined import defined_commands, is_defined
+from servotwin.logs.json_file import json_bytes
+from servotwin.logs.layout import NEEDS, Layout, is_known_name, layout_of
 from servotwin.logs.log import Log
+from servotwin.logs.mend_names import DROP, SPREAD, TORN
+from servotwin.logs.mends import checked_mends, say, sound, without_text, without_thousands, without_torn
 from servotwin.logs.reading import Reading
 from servotwin.logs.sidecar import FOLDER_FILE, Sidecar, sidecar_of, sidecar_path, sidecar_words
-from servotwin.logs.stamps import CLOCKS, stamps_of
 from servotwin.parameters import write_file
 from servotwin.tables import TextTable, csv_text, read_table
+from servotwin.tables.text import NUL
 
 
 def read_csv_log(path: str | Path, *, sidecar: str | Path | None = None,
-                 columns: str | Mapping[str, str] | None = None) -> Log:
+                 columns: str | Mapping[str, str] | None = None, mend: Sequence[str] = ()) -> Log:
     r"""Return the log in a CSV file.
 
     Columns are named after their signal, with the unit behind it (`time_s`, `pulse_width_us`, `output_angle_deg`) or
@@ -40,7 +44,10 @@ def read_csv_log(path: str | Path, *, sidecar: str | Path | None = None,
         A file in place of the folder's `logs.json`.
     columns : str or mapping, optional
         Which column is which signal in which unit, such as ``"time=t:ms angle=pos:deg-90"`` or
-        ``{"angle": "pos:deg-90"}``; counts before the sidecar.
+        ``{"angle": "pos:deg-90"}``; counts before the sidecar. A rate of rows stands for a time (``"time=50Hz"``), and
+        a value or jumps for a command (``"command=0deg@0s,90deg@0.5s"``).
+    mend : sequence of str
+        What to put right of what is not certain: names of `servotwin.logs.mends.MENDS`, such as "torn".
 
     Raises
     ------
@@ -57,27 +64,89 @@ def read_csv_log(path: str | Path, *, sidecar: str | Path | None = None,
     >>> log.name, log.used("output_angle").tolist()
     ('run', [True, False, True])
     """
-    path = Path(path)
-    wanted = wanted_columns(columns)
+    logs = logs_of(Path(path), sidecar=sidecar, columns=columns, mend=mend)
+    if len(logs) > 1:
+        raise InputError(str(path), got=f"{len(logs)} logs, as its clock begins again", allowed="read_logs, which "
+                         "returns all of them")
+    return logs[0]
+
+
+def logs_of(path: Path, *, sidecar: str | Path | None, columns: str | Mapping[str, str] | None,
+            mend: Sequence[str] = (), unknown_step: bool = False) -> list[Log]:
+    """Return the logs of a table: one, or where its clock begins again and that is mended as many as there are."""
+    mends = checked_mends(mend)
+    table, layout, said = read_log_table(path, mends, wanted_columns(columns), sidecar=sidecar,
+                                         unknown_step=unknown_step)
+    if said.drop_repeated and SPREAD not in mends:
+        mends = tuple(dict.fromkeys((*mends, DROP)))
+    parts = timed(table, layout.columns[TIME], mends)
+    return [_log(path, part, layout, said, f" ({k})" if len(parts) > 1 else "") for k, part in enumerate(parts, 1)]
+
+
+class LogTable(NamedTuple):
+    """The table of a log without rows that are none, which of its columns is what, and its sidecar."""
+
+    table: TextTable
+    layout: Layout
+    sidecar: Sidecar
+
+
+def read_log_table(path: Path, mends: Sequence[str], wanted: Mapping[str, Wanted], *,
+                   sidecar: str | Path | None = None, needs: Sequence[str] = NEEDS,
+                   unknown_step: bool = False) -> LogTable:
+    """Read a table as that of a log.
+
+    Parameters
+    ----------
+    path : Path
+    mends : sequence of str
+        What is mended of what is not certain.
+    wanted : mapping
+        What the user says of columns.
+    sidecar : str or Path, optional
+        A file in place of the folder's `logs.json`.
+    needs : sequence of str
+        What there has to be: "time", "command", "angle".
+    unknown_step : bool
+        Whether a command that lacks may be the one step that the angle shows.
+
+    Raises
+    ------
+    InputError
+        As `read_csv_log` does.
+    """
     asked = {one.column for one in wanted.values()}
-    table = read_table(path, lambda name: name in asked or is_known_name(name), unended=False)
+    try:
+        table = read_table(path, lambda name: name in asked or is_known_name(name), unended=False, serial=True,
+                           damaged=TORN in mends)
+    except InputError as error:
+        if error.got != NUL:
+            raise
+        raise InputError(error.what, error.got, f"{error.allowed}; {say(TORN, mends)}") from None
     said = sidecar_of(path, None if sidecar is None else Path(sidecar))
-    table.check_lengths()
-    layout = layout_of(table, said.columns, wanted)
-    of = layout.columns
+    table = without_thousands(without_text(table), mends)
+    layout = layout_of(sound(table), said.columns, wanted, needs=needs, unknown_step=unknown_step)
+    return LogTable(without_torn(table, layout, mends), layout, said)
+
+
+def _log(path: Path, part: Timed, layout: Layout, said: Sidecar, suffix: str) -> Log:
+    table, of = part.table, layout.columns
     command = _command_of(table, of, said)
-    time, table = _times(table, of[TIME], said.drop_repeated)
     measured = {name: column.to_si(table.numbers(column.column, missing=math.nan), name)
                 for name, column in of.items() if name not in (TIME, SWITCH, *COMMANDS)}
-    missing = None if COMMANDS[command] == "voltage" else math.nan  # no pulses
-    values = of[command].to_si(table.numbers(of[command].column, missing=missing), command)
+    if is_defined(of[command].column):
+        values = defined_commands(command, of[command].column, part.time)
+    else:
+        missing = None if COMMANDS[command] == "voltage" else math.nan  # no pulses
+        values = of[command].to_si(table.numbers(of[command].column, missing=missing), command)
     switch = _switch(table, of[SWITCH]) if SWITCH in of else None
     used = {column.column for column in layout.shown}
     reading = Reading(file=str(path), columns=layout.shown, remarks=(*table.remarks, *_silences(values)),
                       layout=of, unread=tuple(name for name in table.header if name and name not in used))
     given = {"name": path.stem, "source": str(path), **said.log}
+    given["name"] = f"{given['name']}{suffix}"
     with in_file(path, str(given["name"])):
-        return Log(time=time, command=values, command_kind=COMMANDS[command], measured=measured, torque_on=switch,
+        return Log(time=part.time, command=values, command_kind=COMMANDS[command], measured=measured, torque_on=switch,
                    reading=reading, **given)
 
 
@@ -85,11 +154,6 @@ def _silences(command: NDArray[np.float64]) -> tuple[str, ...]:
     """Return what is said of a command that is missing at times: a logger may have meant that it did not change."""
     count = int(np.isnan(command).sum())
     return (f"{count} of {command.size} samples have no command: no pulses were sent there",) if count else ()
-
-
-def logs_of(path: Path, *, sidecar: str | Path | None, columns: str | Mapping[str, str] | None) -> list[Log]:
-    """Return the log of a table, alone in a list."""
-    return [read_csv_log(path, sidecar=sidecar, columns=columns)]
 
 
 @contextmanager
@@ -126,14 +190,20 @@ def write_log(log: Log, path: str | Path, *, overwrite: bool = False) -> None:
     for file in (path, sidecar_path(path)):
         if not overwrite and _exists(file):
             raise OutputExistsError(file)
+    content, sidecar = log_bytes(log)
+    write_file(sidecar_path(path), sidecar, overwrite=overwrite)
+    write_file(path, content, overwrite=overwrite)
+
+
+def log_bytes(log: Log) -> tuple[bytes, bytes]:
+    """Return a log as the contents of a CSV file and of its sidecar."""
     command = next(name for name, kind in COMMANDS.items() if kind == log.command_kind)
     columns: dict[str, list[object]] = {
         name: ["" if math.isnan(x) else x for x in values.tolist()]
         for name, values in {TIME: log.time, command: log.command, **log.measured}.items()}
     if log.torque_on is not None:
         columns[SWITCH] = [int(x) for x in log.torque_on.tolist()]
-    write_json(sidecar_path(path), sidecar_words(log), overwrite=overwrite)
-    write_file(path, csv_text(columns).encode(), overwrite=overwrite)
+    return csv_text(columns).encode(), json_bytes(sidecar_words(log))
 
 
 def _exists(path: Path) -> bool:
@@ -149,48 +219,6 @@ def _command_of(table: TextTable, columns: Mapping[str, Column], said: Sidecar) 
     if said.command is not None and said.command not in found:
         raise InputError(f"{table.path}: command", got=said.command, allowed=", ".join(found) or "a column of the file")
     return said.command or found[0]
-
-
-def _times(table: TextTable, column: Column, drop_repeated: bool) -> tuple[NDArray[np.float64], TextTable]:
-    """Return the times, and the table without the rows that are passed over."""
-    time = _seconds(table, column)
-    same = np.append(False, np.diff(time) == 0.0)
-    if drop_repeated and same.any():
-        table, time = table.without(same), time[~same]
-    bad = np.flatnonzero(np.diff(time) <= 0.0)
-    if bad.size:
-        k = int(bad[0]) + 1
-        stands = "stands still" if time[k] == time[k - 1] else "runs backwards"
-        help_ = ' ("drop_repeated" of a sidecar passes such rows over)' if time[k] == time[k - 1] else ""
-        raise InputError(f"{table.path}: line {table.rows[k].line}, {column.column}: time {stands}",
-                         got=f"{time[k]:.9g} s after {time[k - 1]:.9g} s in line {table.rows[k - 1].line}",
-                         allowed=f"increasing times{help_}")
-    return time, table
-
-
-def _seconds(table: TextTable, column: Column) -> NDArray[np.float64]:
-    """Return the times of all rows as the file has them [s]."""
-    if column.unit in CLOCKS:
-        stamps = stamps_of(table, column.column)
-        if stamps is None or stamps.unit != column.unit:
-            raise InputError(f"{table.path}: line {table.rows[0].line}, {column.column}",
-                             got=table.cells(column.column)[0] or "nothing", allowed=CLOCKS[column.unit])
-        return stamps.time
-    raw = _since_first(table, column) if column.from_first else table.numbers(column.column)
-    return column.to_si(raw, TIME)
-
-
-def _since_first(table: TextTable, column: Column) -> NDArray[np.float64]:
-    """Return stamps less the first one, subtracted before they are rounded: nanoseconds since 1970 have 19 digits."""
-    cells = table.cells(column.column)
-    try:
-        stamps = [Decimal(cell.replace(",", ".", 1) if table.decimal == "," else cell) for cell in cells]
-        return np.array([float(stamp - stamps[0]) for stamp in stamps])
-    except (InvalidOperation, OverflowError):
-        # not all are plain numbers: the ordinary way names the line
-        values = table.numbers(column.column)
-        with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is refused with its line
-            return np.asarray(values - values[0])
 
 
 def _switch(table: TextTable, column: Column) -> NDArray[np.bool_]:

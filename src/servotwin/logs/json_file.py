@@ -54,8 +54,12 @@ def write_json(path: str | Path, content: Mapping[str, Any], *, overwrite: bool 
     OutputExistsError, OutputError
         If the file exists and `overwrite` is false, or it cannot be written.
     """
-    text = json.dumps(content, indent=1) + "\n"
-    write_file(path, text.encode(), overwrite=overwrite)
+    write_file(path, json_bytes(content), overwrite=overwrite)
+
+
+def json_bytes(content: Mapping[str, Any]) -> bytes:
+    """Return the contents of a JSON file."""
+    return (json.dumps(content, indent=1) + "\n").encode()
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

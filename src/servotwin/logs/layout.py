@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -11,12 +11,18 @@ from servotwin.logs import column_names as names
 from servotwin.logs.column_values import Guess, guess, is_increasing, range_of
 from servotwin.logs.column_words import COMMAND, SHORT, Wanted, column_said
 from servotwin.logs.columns import COMMANDS, SWITCH, TIME, Column, columns_of, dimension_of_signal, si_unit_of
+from servotwin.logs.defined import checked_definition, is_defined
 from servotwin.logs.log import ANGLES
 from servotwin.logs.reading import ReadColumn
+from servotwin.logs.stamps import clock_of
+from servotwin.logs.unknown_step import step_of
 from servotwin.tables import TextTable
+from servotwin.tables.serial import ARRIVAL
 from servotwin.units.words import COUNTS, unit_shown, units_written
 
 NAMED, SAID, SIDECAR = "named", "--columns", "sidecar"
+NEEDS = (TIME, COMMAND, "angle")
+"""What a table has to have to be a log."""
 _SHORT = {**{name: short for short, name in SHORT.items()}, TIME: TIME}
 _DIMENSIONS = {names.PULSE: "time", names.COMMAND_ANGLE: "angle", names.ANGLE: "angle", names.TIME: "time",
                names.SOME_TIME: "time", names.FEEDBACK: "voltage", names.VOLTAGE: "voltage", names.SPEED: "speed",
@@ -55,12 +61,23 @@ def is_known_name(column: str) -> bool:
         return True
 
 
-def layout_of(table: TextTable, sidecar: Mapping[str, Column] | None, wanted: Mapping[str, Wanted]) -> Layout:
+def layout_of(table: TextTable, sidecar: Mapping[str, Column] | None, wanted: Mapping[str, Wanted], *,
+              needs: Sequence[str] = NEEDS, unknown_step: bool = False) -> Layout:
     """Return which column of a table is which signal.
 
     What `wanted` says counts before the sidecar, that before the names of `servotwin`; what these leave out is guessed
     from names, units and values: time, a command and an angle where they lack, currents, voltage and speed if there is
     one of each.
+
+    Parameters
+    ----------
+    table : TextTable
+    sidecar : mapping, optional
+    wanted : mapping
+    needs : sequence of str
+        What there has to be, of `NEEDS`.
+    unknown_step : bool
+        Whether a command that lacks may be the one step that the angle shows.
 
     Raises
     ------
@@ -86,12 +103,17 @@ def layout_of(table: TextTable, sidecar: Mapping[str, Column] | None, wanted: Ma
         if made.get(TIME, (None, ""))[1] == NAMED and made[TIME][0].column == TIME and not table.units and not (
                 any(name in made for name in COMMANDS) and any(name in made for name in ANGLES)):
             del made[TIME]  # among foreign names it is one of them, and need not be in seconds
-        _guess_rest(table, made)
-    _check(table, made)
+        _guess_rest(table, made, needs, unknown_step=unknown_step)
+    _check(table, made, needs)
     shown = tuple(ReadColumn(column.column, signal, "" if signal == SWITCH else unit_shown(
         column.unit, column.scale, column.offset), known)
-        for signal, (column, known) in sorted(made.items(), key=lambda one: table.header.index(one[1][0].column)))
+        for signal, (column, known) in sorted(made.items(), key=lambda one: _place(table, one[1][0].column)))
     return Layout({signal: column for signal, (column, _) in made.items()}, shown)
+
+
+def _place(table: TextTable, column: str) -> int:
+    """Return where a column stands; what no file holds stands behind."""
+    return table.header.index(column) if column in table.header else len(table.header)
 
 
 def _named(table: TextTable, others: list[str], made: Mapping[str, object]) -> dict[str, Column]:
@@ -104,14 +126,17 @@ def _named(table: TextTable, others: list[str], made: Mapping[str, object]) -> d
                 raise UnitError(f"{table.path}: unit of column {signal}", got=below,
                                 allowed=units_written(dimension_of_signal(signal)))
             column = Column(column.column, meaning.unit)
-        found[signal] = column
+        clock = clock_of(table.cells(column.column)[0]) if signal == TIME else ""
+        found[signal] = Column(column.column, clock, from_first=True) if clock else column
     return found
 
 
 def _in_header(table: TextTable, signal: str, name: str) -> str:
     own = table.name_of(name)
-    if own is None and name.isdigit() and 1 <= int(name) <= len(table.header):
-        own = table.header[int(name) - 1]
+    if own is None and name.isdigit() and 1 <= int(name) <= len(table.header) - table.added:
+        own = table.header[table.added + int(name) - 1]
+    if own is None and signal in (TIME, COMMAND, *COMMANDS) and is_defined(name):
+        return name
     if own is None:
         raise InputError(f"{table.path}: column of {signal}", got=name, allowed=", ".join(table.header))
     return own
@@ -120,6 +145,9 @@ def _in_header(table: TextTable, signal: str, name: str) -> str:
 def _said(table: TextTable, one: Wanted) -> tuple[str, Column]:
     """Return the signal and the column of words; a unit that they do not say is that of the name, or of the values."""
     own = _in_header(table, one.signal, one.column)
+    if own not in table.header:
+        signal, unit = checked_definition(f"{SAID} {one.signal}", one.signal, own)
+        return signal, Column(own, unit)
     if one.signal == SWITCH and not one.unit:
         return SWITCH, Column(own, si_unit_of(SWITCH))
     if one.unit:
@@ -151,7 +179,8 @@ def _below(table: TextTable, column: str) -> str:
     return table.units[table.header.index(column)] if table.units else ""
 
 
-def _guess_rest(table: TextTable, made: dict[str, tuple[Column, str]]) -> None:
+def _guess_rest(table: TextTable, made: dict[str, tuple[Column, str]], needed: Sequence[str], *,
+                unknown_step: bool) -> None:
     """Add what is not known yet and can be guessed."""
     taken = {column.column for column, _ in made.values()}
     found: list[tuple[str, names.Meaning]] = []
@@ -166,15 +195,21 @@ def _guess_rest(table: TextTable, made: dict[str, tuple[Column, str]]) -> None:
     for what, roles in ((TIME, (names.TIME, names.SOME_TIME)),
                         (COMMAND, (names.PULSE, names.COMMAND, names.COMMAND_ANGLE)),
                         ("angle", (names.ANGLE, names.FEEDBACK, COUNTS))):
-        if needs[what]:
+        if needs[what] and what in needed:
             chosen = _chosen(table, what, _candidates(table, found, roles))
+            if chosen is None and what == TIME and table.added:
+                made[TIME] = Column(ARRIVAL, "clock", from_first=True), "guessed from the Serial Monitor's times"
+                continue
             if chosen is None:
                 lacking.append(what)
                 continue
             signal = _signal_of(chosen)
             made[signal] = (_column(chosen), f"guessed from {chosen.found.why}" if chosen.found else "")
             found = [(name, meaning) for name, meaning in found if name != chosen.column]
-    if lacking:
+    step = step_of(table, made) if lacking == [COMMAND] and unknown_step else None
+    if step is not None:
+        made["command_angle"] = Column(step.command, "deg"), f"guessed: an unknown step, {step.words}"
+    elif lacking:
         raise _unknown(table, lacking, made)
     for role in _OPTIONAL:
         some = [one for one in _candidates(table, found, (role,)) if one.found is not None]
@@ -288,13 +323,18 @@ def _unknown(table: TextTable, lacking: list[str], made: Mapping[str, tuple[Colu
     nothing = " and no ".join(", no ".join(text[one] for one in some) for some in (lacking[:-1], lacking[-1:]) if some)
     what = f"no {nothing} among the columns{' of the sidecar' * sidecar}"
     got = ", ".join(table.header) if table.has_header else f"no header, {len(table.header)} columns"
-    return InputError(f"{table.path}: {what}", got=got,
-                      allowed=f'names such as {", ".join(usual[one] for one in lacking)}, or {SAID} "{words}"')
+    more = ["--rate 50Hz, where rows come at such a rate"] if TIME in lacking else []
+    if COMMAND in lacking:
+        step = step_of(table, made)
+        more.append("--commanded 153deg@0s, a jump that was commanded" if step is None else
+                    f"--commanded {step.command}, as the angle shows an unknown step {step.words}")
+    return InputError(f"{table.path}: {what}", got=got, allowed=", or ".join(
+        [*more, f"names such as {', '.join(usual[one] for one in lacking)}", f'{SAID} "{words}"']))
 
 
-def _check(table: TextTable, made: Mapping[str, tuple[Column, str]]) -> None:
+def _check(table: TextTable, made: Mapping[str, tuple[Column, str]], needs: Sequence[str]) -> None:
     lacking = [what for what, some in ((TIME, (TIME,)), (COMMAND, tuple(COMMANDS)), ("angle", ANGLES))
-               if not any(name in made for name in some)]
+               if what in needs and not any(name in made for name in some)]
     if lacking:
         raise _unknown(table, lacking, made, sidecar=any(known == SIDECAR for _, known in made.values()) or not made)
     seen: dict[str, str] = {}

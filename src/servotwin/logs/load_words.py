@@ -3,15 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, dataclass, fields
 from typing import Any
 
 from servotwin.errors import LoadError, UnknownNameError
 from servotwin.loads import Flexible, Load, Pendulum, Recorded, Spring
+from servotwin.loads.parts import STANDARD_GRAVITY
+from servotwin.units import is_finite
 
 _PARTS: dict[str, tuple[str, Any]] = {"pendulum": ("pendulums", Pendulum), "spring": ("springs", Spring),
                                       "recorded": ("recorded", Recorded), "flexible": ("flexibles", Flexible)}
 _NUMBERS = ("inertia", "viscous_friction", "torque", "coulomb_torque")
+
+
+@dataclass(frozen=True)
+class Drum:
+    """A weight that the shaft winds up.
+
+    Parameters
+    ----------
+    mass, radius : float
+        [kg], [m]
+    inertia : float
+        Of the drum [kg m²].
+    """
+
+    mass: float
+    radius: float
+    inertia: float = 0.0
 
 
 def load_from_words(content: object) -> Load:
@@ -21,7 +40,7 @@ def load_from_words(content: object) -> Load:
     ----------
     content : mapping
         `inertia`, `viscous_friction`, `torque`, `coulomb_torque` and the parts `pendulum`, `spring`, `recorded`,
-        `flexible`; each part a mapping of its fields, or a list of such.
+        `flexible`; each part a mapping of its fields, or a list of such; and `drum`, a weight that the shaft winds up.
 
     Raises
     ------
@@ -36,16 +55,28 @@ def load_from_words(content: object) -> Load:
     if not isinstance(content, Mapping):
         raise LoadError("load", got=content, allowed='a mapping, such as {"inertia": 0.001}')
     given: dict[str, Any] = {}
+    drum = Load()
     for name, value in content.items():
         if name in _NUMBERS:
             given[name] = value
+        elif name == "drum":
+            drum = _drum(value)
         elif name in _PARTS:
             key, kind = _PARTS[name]
             given[key] = tuple(_part(f"load.{name}", kind, each) for each in
                                (value if isinstance(value, list) else [value]))
         else:
-            raise UnknownNameError("name in a load", name, (*_NUMBERS, *_PARTS))
-    return Load(**given)
+            raise UnknownNameError("name in a load", name, (*_NUMBERS, *_PARTS, "drum"))
+    return Load(**given) + drum
+
+
+def _drum(content: object) -> Load:
+    """Return the load of a weight on a drum: its torque, and what turns with the shaft."""
+    drum = _part("load.drum", Drum, content)
+    for name, value in (("mass", drum.mass), ("radius", drum.radius), ("inertia", drum.inertia)):
+        if not is_finite(value) or value < 0.0:
+            raise LoadError(f"load.drum: {name}", got=value, allowed="a number, 0 or more")
+    return Load(torque=drum.mass * STANDARD_GRAVITY * drum.radius, inertia=drum.mass * drum.radius**2 + drum.inertia)
 
 
 def words_of_load(load: Load) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,9 @@ from servotwin.errors import InputError, UnknownNameError
 from servotwin.logs.formats import FORMATS, LOG_FORMATS, formats_that_hold
 from servotwin.logs.json_file import read_json
 from servotwin.logs.log import Log
-from servotwin.logs.sidecar import FOLDER_FILE, FORMAT
+from servotwin.logs.mends import checked_mends
+from servotwin.logs.name_values import values_in
+from servotwin.logs.sidecar import FOLDER_FILE, FORMAT, patterns_of
 from servotwin.signals.time_base import warn_of_time_base
 
 _CSV_ENDINGS = (".csv", ".tsv")
@@ -18,7 +20,7 @@ _CSV_ENDINGS = (".csv", ".tsv")
 
 def read_logs(path: str | Path, format: str = "auto", *, sidecar: str | Path | None = None,
               columns: str | Mapping[str, str] | None = None, joints: str | Mapping[str, str] | None = None,
-              ) -> list[Log]:
+              mend: Sequence[str] = (), unknown_step: bool = False) -> list[Log]:
     r"""Return the logs in a file or folder, in the order of the file names.
 
     Parameters
@@ -35,6 +37,11 @@ def read_logs(path: str | Path, format: str = "auto", *, sidecar: str | Path | N
         out is known by name or guessed; `Log.reading` shows it.
     joints : str or mapping, optional
         Which joints of a LeRobot dataset, and their unit: ``"shoulder_pan:deg"``.
+    mend : sequence of str
+        What to put right in tables, of what is not certain: "torn", "reset", "drop-repeated", "spread-repeated",
+        "clock16", "thousands".
+    unknown_step : bool
+        Whether the command of a table without one may be the one step that its angle shows.
 
     Raises
     ------
@@ -59,7 +66,7 @@ def read_logs(path: str | Path, format: str = "auto", *, sidecar: str | Path | N
     """
     if format not in FORMATS:
         raise UnknownNameError("format of logs", str(format), FORMATS)
-    path = Path(path)
+    path, mends = Path(path), checked_mends(mend)
     for name, dataset in formats_that_hold("dataset").items():
         if format == name or (format == "auto" and dataset.room.recognises(path)):
             if columns is not None:
@@ -69,7 +76,7 @@ def read_logs(path: str | Path, format: str = "auto", *, sidecar: str | Path | N
     if joints is not None:
         raise InputError(f"--joint for {path}", got="no dataset", allowed="--columns (columns=) for tables")
     files = _files(path, format) if _is_folder(path) else [path]
-    given = {"sidecar": sidecar, "columns": columns}
+    given = {"sidecar": sidecar, "columns": columns, "mend": mends, "unknown_step": unknown_step}
     logs = [log for file in files for log in _logs(file, format, given, alone=file is path)]
     if not logs:
         raise InputError(f"{path}", got="a folder without logs", allowed="*.csv, *.json of a known format ("
@@ -96,7 +103,9 @@ def _files(folder: Path, format: str) -> list[Path]:
         files = sorted(file for file in folder.iterdir() if file.is_file() and not file.name.startswith("."))
     except OSError as error:
         raise InputError(f"{folder}: cannot be read ({error.strerror})") from None
-    tables = [file for file in files if file.suffix.lower() in _CSV_ENDINGS]
+    named = patterns_of(folder / FOLDER_FILE)
+    tables = [file for file in files if file.suffix.lower() in _CSV_ENDINGS or (
+        file.suffix.lower() == ".txt" and any(values_in(pattern, file.name) is not None for pattern in named))]
     beside = {file.stem for file in tables}
     others = [file for file in files if file.suffix.lower() == ".json" and file.name != FOLDER_FILE
               and file.stem not in beside]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +11,7 @@ from servotwin.errors import InputError, UnknownNameError
 from servotwin.logs.columns import COMMANDS, NAMES, SWITCH, TIME, Column, check_unit, si_unit_of
 from servotwin.logs.json_file import read_json
 from servotwin.logs.load_words import load_from_words, words_of_load
+from servotwin.logs.name_values import filled_in, has_values, values_in
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
@@ -82,6 +82,13 @@ def sidecar_of(path: Path, shared: Path | None = None) -> Sidecar:
                    drop_repeated=said.get("drop_repeated", False))
 
 
+def patterns_of(shared: Path) -> tuple[str, ...]:
+    """Return the patterns of names under `files` of a folder's sidecar; none where there is no such file."""
+    content = read_json(shared) if shared.is_file() else {}
+    files = content.get("files", {}) if isinstance(content, dict) else {}
+    return tuple(files) if isinstance(files, dict) else ()
+
+
 def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
     made = {**below, **above}
     for key in _MERGED:
@@ -108,9 +115,10 @@ def _checked(file: Path, content: object, member: str | None) -> dict[str, Any]:
         what = f"{file}: files, {pattern}"
         if not isinstance(entries, dict):
             raise InputError(what, got=entries, allowed="an object with the keys of a sidecar")
-        more = _entries(what, entries)
-        if fnmatchcase(member, pattern):
-            said = _merged(said, more)
+        values = values_in(pattern, member)
+        if values is not None or not has_values(pattern):
+            more = _entries(what, filled_in(what, entries, values or {}) if values else entries)
+            said = said if values is None else _merged(said, more)
     return said
 
 

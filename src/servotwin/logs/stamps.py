@@ -31,6 +31,19 @@ class Stamps(NamedTuple):
         return "dates" if self.unit == "iso" else "times of day"
 
 
+def clock_of(cell: str) -> str:
+    """Return what a cell is as a time: "iso" for a date, "clock" for a time of day, else nothing.
+
+    Examples
+    --------
+    >>> clock_of("12:00:01.25"), clock_of("2024-05-03T12:00"), clock_of("1.25")
+    ('clock', 'iso', '')
+    """
+    if ":" not in cell:
+        return ""
+    return "iso" if _ISO.fullmatch(cell) else "clock" if _CLOCK.fullmatch(cell) else ""
+
+
 def stamps_of(table: TextTable, column: str) -> Stamps | None:
     """Return the times of a column of ISO 8601 dates or times of day, None where its first cell is neither.
 
@@ -40,11 +53,8 @@ def stamps_of(table: TextTable, column: str) -> Stamps | None:
         If a further cell is none: names the line.
     """
     cells = table.cells(column)
-    if _ISO.fullmatch(cells[0]):
-        return Stamps("iso", _iso(table, column, cells))
-    if _CLOCK.fullmatch(cells[0]):
-        return Stamps("clock", _clock(table, column, cells))
-    return None
+    unit = clock_of(cells[0])
+    return Stamps(unit, (_iso if unit == "iso" else _clock)(table, column, cells)) if unit else None
 
 
 def _iso(table: TextTable, column: str, cells: Sequence[str]) -> NDArray[np.float64]:

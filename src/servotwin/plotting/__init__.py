@@ -18,6 +18,7 @@ from servotwin.plotting.diagram import Diagram
 from servotwin.plotting.files import save
 from servotwin.plotting.formula import Formula, formula_svg
 from servotwin.plotting.loops import loop_curve
+from servotwin.plotting.measured import log_over_time
 from servotwin.plotting.panels import Curve, Limit, curves, pulses
 from servotwin.plotting.paths import PathTrace, robot_paths
 from servotwin.plotting.ranking import ranking
@@ -66,6 +67,7 @@ __all__ = [
     "joint_tracking",
     "joint_use",
     "lift_curve",
+    "log_over_time",
     "loop_curve",
     "metric_shown",
     "pulses",

@@ -2,6 +2,6 @@
 
 from servotwin.tables.columns import csv_text, read_columns
 from servotwin.tables.dialect import SEPARATORS
-from servotwin.tables.reading import TextTable, read_table
+from servotwin.tables.reading import TextTable, read_table, said_lines
 
-__all__ = ["SEPARATORS", "TextTable", "csv_text", "read_columns", "read_table"]
+__all__ = ["SEPARATORS", "TextTable", "csv_text", "read_columns", "read_table", "said_lines"]

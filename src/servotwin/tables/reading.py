@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from servotwin.tables.dialect import (
     rows,
     separator_of,
 )
+from servotwin.tables.serial import ARRIVAL, labelled_rows, without_times
 from servotwin.tables.text import Text, read_text
 from servotwin.units.words import is_unit
 
@@ -50,6 +51,10 @@ class TextTable:
         What was passed over, each in one line.
     also : mapping of str to str
         Other names of columns: `%time`, where a header that begins with `%` is that of `time`.
+    breaks : tuple of int
+        Lines below the first header that are no rows: further headers, and what `without_rows` took for text.
+    added : int
+        Columns before those of the file: times of the Serial Monitor.
     """
 
     path: Path
@@ -62,6 +67,8 @@ class TextTable:
     encoding: str
     remarks: tuple[str, ...] = ()
     also: dict[str, str] = field(default_factory=dict)
+    breaks: tuple[int, ...] = ()
+    added: int = 0
     _cells: dict[str, list[str]] = field(default_factory=dict, init=False, repr=False, compare=False)
     _numbers: dict[tuple[str, bool], NDArray[np.float64]] = field(default_factory=dict, init=False, repr=False,
                                                                   compare=False)
@@ -169,9 +176,12 @@ class TextTable:
                 raise InputError(f"{self.path}: line {line}", got=f"{count} cell{'s' * (count != 1)}",
                                  allowed=f"{n}, as the header, with {SEPARATORS[self.separator]} between{commas}")
 
-    def without(self, drop: NDArray[np.bool_]) -> TextTable:
-        """Return the table without some rows."""
-        return replace(self, rows=[self.rows[k] for k in np.flatnonzero(~drop).tolist()])
+    def without(self, drop: NDArray[np.bool_], remark: str = "", *, text: bool = False) -> TextTable:
+        """Return the table without some rows, what is said of it, and whether they were text between rows."""
+        breaks = [self.rows[k].line for k in np.flatnonzero(drop).tolist()] if text else []
+        return replace(self, rows=[self.rows[k] for k in np.flatnonzero(~drop).tolist()],
+                       breaks=tuple(sorted((*self.breaks, *breaks))),
+                       remarks=(*self.remarks, remark) if remark else self.remarks)
 
 
 def _frozen(values: list[float]) -> NDArray[np.float64]:
@@ -181,7 +191,7 @@ def _frozen(values: list[float]) -> NDArray[np.float64]:
 
 
 def read_table(path: str | Path, known: Callable[[str], bool] = lambda name: False, *,
-               unended: bool = True) -> TextTable:
+               unended: bool = True, serial: bool = False, damaged: bool = False) -> TextTable:
     r"""Return the table in a text file.
 
     Commas, semicolons, tabs, bars or blanks separate its cells; decimals have a point or, unless commas separate, a
@@ -196,6 +206,10 @@ def read_table(path: str | Path, known: Callable[[str], bool] = lambda name: Fal
     unended : bool
         Whether a last row counts that does not end in a newline: what a logger was writing when its power went does
         not.
+    serial : bool
+        Whether lines may be those of the Arduino IDE: `12:03:11.123 -> 20,1500`, `pwm:1500,adc:512`.
+    damaged : bool
+        Whether there may be zeros within the text.
 
     Raises
     ------
@@ -212,24 +226,39 @@ def read_table(path: str | Path, known: Callable[[str], bool] = lambda name: Fal
     (('t', 'angle'), [9.5, -11.78], ('line 6 does not end in a newline and was left out',))
     """
     path = Path(path)
-    text = read_text(path)
+    text = read_text(path, damaged=damaged)
     remarks = []
     lines = text.lines
+    if text.unwritten:
+        remarks.append(f"{text.unwritten} zeros at the end, which were never written, were left out")
     if text.rest.strip():
-        if unended:
+        if unended and not text.unwritten:
             lines = [*lines, text.rest]
         elif lines:
             remarks.append(f"line {len(lines) + 1} does not end in a newline and was left out")
     if not any(line.strip() for line in lines):
         raise InputError(str(path), got="no line that ends in a newline" if text.rest.strip() else "an empty file",
                          allowed="a header and at least one row")
-    filled = [line for line in lines if line.strip()]
-    separator = separator_of(filled)
+    arrivals: dict[int, str] = {}
+    if serial:
+        lines, arrivals = without_times(lines)
+        text = text._replace(lines=lines)
+        remarks += ["the Serial Monitor's times stand before the lines"] if arrivals else []
+    labelled = labelled_rows(lines) if serial else None
+    remarks += [] if labelled is None else ["labels stand before the numbers, as for the Serial Plotter"]
+    separator = "," if labelled is not None else separator_of([line for line in lines if line.strip()])
     try:
-        found = list(rows(lines, separator))
+        found = list(rows(lines, separator)) if labelled is None else labelled
     except csv.Error as error:
         raise InputError(f"{path}: not readable as CSV ({error})") from None
-    return _table(path, text, found, separator, known, remarks)
+    table = _table(path, text, found, separator, known, remarks)
+    return _with_arrivals(table, arrivals) if arrivals else table
+
+
+def _with_arrivals(table: TextTable, arrivals: Mapping[int, str]) -> TextTable:
+    """Return a table with the times of the Serial Monitor before its columns."""
+    return replace(table, header=(ARRIVAL, *table.header), units=("", *table.units) if table.units else (), added=1,
+                   rows=[Row(row.line, [arrivals.get(row.line, ""), *row.cells]) for row in table.rows])
 
 
 def _table(path: Path, text: Text, found: list[Row], separator: str, known: Callable[[str], bool],
@@ -246,9 +275,13 @@ def _table(path: Path, text: Text, found: list[Row], separator: str, known: Call
     units: list[str] = []
     data: list[Row] = []
     heads = {cells[0] for cells in bare if cells}
+    again = []
     for row in below:
         first = row.cells[0]
-        if (first in heads and row.cells in bare) or (first[:1] in _MARKS and is_comment(row.cells, separator)):
+        if first in heads and row.cells in bare:
+            again.append(row.line)
+            continue
+        if first[:1] in _MARKS and is_comment(row.cells, separator):
             continue
         if not data and header is not None and _is_units(row.cells, len(names)):
             units = row.cells
@@ -262,11 +295,27 @@ def _table(path: Path, text: Text, found: list[Row], separator: str, known: Call
     if header is not None and any(is_data(row.cells) and not is_comment(row.cells, separator)
                                   for row in found[:header]):
         remarks.append(f"what stands before the header in line {found[header].line} was left out")
+    between = [line for line in again if line > data[0].line]
+    if between:
+        remarks.append(f"the header comes again in {said_lines(between)} and was left out there")
     return TextTable(
         path=path, header=tuple(names) or tuple(str(k) for k in range(1, len(data[0].cells) + 1)),
         has_header=header is not None, units=tuple(units), rows=data, separator=separator,
         decimal="," if has_decimal_commas(data, separator) else ".", encoding=text.encoding, remarks=tuple(remarks),
-        also=also)
+        also=also, breaks=tuple(between))
+
+
+def said_lines(lines: Sequence[int], most: int = 3) -> str:
+    """Return numbers of lines in words.
+
+    Examples
+    --------
+    >>> said_lines([7]), said_lines([7, 9, 12, 40])
+    ('line 7', '4 lines (7, 9, 12, ...)')
+    """
+    if len(lines) == 1:
+        return f"line {lines[0]}"
+    return f"{len(lines)} lines ({', '.join(map(str, lines[:most]))}{', ...' if len(lines) > most else ''})"
 
 
 def _width(found: Sequence[Row], separator: str) -> int:

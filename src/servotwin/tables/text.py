@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import re
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,9 +11,11 @@ from servotwin.errors import InputError
 
 _HEAD = 4096  # bytes that tell what a file is
 _MOST_CONTROL = 0.1  # share of control characters in a text
+_ZEROS = re.compile("\0{3,}")
 _NOT_TEXT = {b"PK\x03\x04": "a zip archive or an Excel workbook", b"PAR1": "a Parquet file", b"\x1f\x8b": "a gzip file",
              b"\x89PNG": "a picture", b"\xd0\xcf\x11\xe0": "an Excel workbook", b"\x89HDF": "an HDF5 file",
              b"MATLAB": "a MATLAB file", b"%PDF": "a PDF"}
+NUL = "a NUL"
 _UTF16 = {codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
 
 
@@ -26,11 +29,14 @@ class Text(NamedTuple):
     rest : str
         What stands behind the last line end.
     encoding : str
+    unwritten : int
+        Zeros behind the text, which a card holds where its last block was not written.
     """
 
     lines: list[str]
     rest: str
     encoding: str
+    unwritten: int = 0
 
 
 def read_bytes(path: str | Path) -> bytes:
@@ -51,8 +57,14 @@ def read_bytes(path: str | Path) -> bytes:
         raise InputError(f"{path}: cannot be read ({error})") from None
 
 
-def read_text(path: Path) -> Text:
+def read_text(path: Path, *, damaged: bool = False) -> Text:
     r"""Return the lines of a text file: UTF-8 with or without a mark, UTF-16, else Windows-1252 or Latin-1.
+
+    Parameters
+    ----------
+    path : Path
+    damaged : bool
+        Whether there may be zeros within the text too.
 
     Raises
     ------
@@ -65,18 +77,20 @@ def read_text(path: Path) -> Text:
     >>> file = Path(tempfile.mkdtemp()) / "run.csv"
     >>> _ = file.write_bytes("t;Winkel (\xb0)\r\n0;9\r\n0.02;1".encode("latin-1"))
     >>> read_text(file)
-    Text(lines=['t;Winkel (°)', '0;9'], rest='0.02;1', encoding='cp1252')
+    Text(lines=['t;Winkel (°)', '0;9'], rest='0.02;1', encoding='cp1252', unwritten=0)
     """
     data = read_bytes(path)
     for start, what in _NOT_TEXT.items():
         if data.startswith(start):
             raise InputError(str(path), got=what, allowed="a text, such as CSV")
-    text, encoding = _decoded(data)
-    _check(path, text)
+    whole, encoding = _decoded(data)
+    text = whole.rstrip("\0")
+    unwritten = len(whole) - len(text)
+    _check(path, text, whole, damaged=damaged)
     # "−" is the minus sign of typesetters; \x1a ended files of old
     text = text.rstrip("\x1a").replace("\u2212", "-").replace("\r\n", "\n").replace("\r", "\n")
     *lines, rest = text.split("\n")
-    return Text(lines, rest, encoding)
+    return Text(lines, rest, encoding, unwritten)
 
 
 def _decoded(data: bytes) -> tuple[str, str]:
@@ -100,12 +114,13 @@ def _decoded(data: bytes) -> tuple[str, str]:
     return data.decode("latin-1"), "latin-1"
 
 
-def _check(path: Path, text: str) -> None:
-    head = text[:_HEAD]
-    control = sum(c < " " and c not in "\t\r\n\f\x1a" for c in head)
-    if control > _MOST_CONTROL * len(head):
+def _check(path: Path, text: str, whole: str, *, damaged: bool) -> None:
+    head = text[:_HEAD] if text.strip() else whole[:_HEAD]
+    once = _ZEROS.sub("\0", head)  # a block that was never written counts as one
+    control = sum(c < " " and c not in "\t\r\n\f\x1a" for c in once)
+    if control > _MOST_CONTROL * len(once):
         raise InputError(str(path), got="binary data", allowed="a text, such as CSV")
-    if "\0" in text:
+    if "\0" in text and not damaged:
         before = text[:text.index("\0")]
         line = 1 + before.replace("\r\n", "\n").replace("\r", "\n").count("\n")
-        raise InputError(f"{path}: line {line}", got="a NUL", allowed="a text; the file was damaged")
+        raise InputError(f"{path}: line {line}", got=NUL, allowed="a text; the file was damaged")

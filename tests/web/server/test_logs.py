@@ -217,7 +217,7 @@ def test_the_guess_can_be_changed_and_rows_that_stand_still_passed_over(server, 
     assert is_line(told(page, "own", "wrong"))
     page.ask(log={"columns": said})
     assert "stands still" in told(page, "own", "wrong")
-    page.ask(log={"columns": said, "drop_repeated": True})
+    page.ask(log={"columns": said, "mend": "drop-repeated"})
     log = told(page, "own", "reading")
     assert log["runs"][0]["rows"] == 4
     assert [one["known"] for one in log["columns"]] == ["--columns"] * 3
@@ -365,7 +365,7 @@ def test_measured_logs_are_read_and_compared(server, page, data_folder):
     file = data_folder / "maccepa_hitec" / "servo1_step60.0_2017-05-09_21-02-48.csv"
     assert "one, said by" in handed_in(server, token(page), file.read_bytes(), file.name)[1]["wrong"]
     said = "time=%time:ns command=field.u1:rad angle=field.servo1_position:rad"
-    page.ask(log={"columns": said, "drop_repeated": True})
+    page.ask(log={"columns": said, "mend": "drop-repeated"})
     assert told(page, "own", "reading")["runs"][0]["command"]["high"] == pytest.approx(60.0, abs=0.01)
     page.ask(log={"show": True, "servo": 0})
     overlay = told(page, "own", "overlay")

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 from servotwin.bench.video.filmed import Filmed
 from servotwin.bench.video.instant import JUMP, LED
 from servotwin.errors import InputError, OutputError, OutputExistsError
-from servotwin.logs.columns import COMMANDS, SWITCH, TIME, Column, columns_of
+from servotwin.logs.clock import timed
+from servotwin.logs.columns import COMMANDS, SWITCH, TIME, Column
+from servotwin.logs.csv_logs import read_log_table
 from servotwin.logs.json_file import read_json, write_json
-from servotwin.logs.layout import is_known_name
+from servotwin.logs.mends import checked_mends
 from servotwin.logs.sidecar import FORMAT, sidecar_path
 from servotwin.parameters import write_file
-from servotwin.tables import TextTable, csv_text, read_table
+from servotwin.tables import TextTable, csv_text
 
 ANGLE, SECONDS = "output_angle_deg", "time_s"
 _FRAME_PERIOD = 0.02  # s, usual
@@ -51,7 +53,7 @@ class FilmLog:
         return csv_text(self.columns)
 
 
-def film_log(filmed: Filmed, log: str | Path | None = None) -> FilmLog:
+def film_log(filmed: Filmed, log: str | Path | None = None, *, mend: Sequence[str] = ()) -> FilmLog:
     """Return the log of a filmed angle.
 
     Parameters
@@ -59,6 +61,8 @@ def film_log(filmed: Filmed, log: str | Path | None = None) -> FilmLog:
     filmed : Filmed
     log : str or Path, optional
         CSV file of the recorder, with time and command; its sidecar is taken over. Without it the log has no command.
+    mend : sequence of str
+        What to put right in it, see `read_logs`.
 
     Raises
     ------
@@ -80,18 +84,17 @@ def film_log(filmed: Filmed, log: str | Path | None = None) -> FilmLog:
     if not isinstance(said, dict) or "columns" in said:
         raise InputError(f"{sidecar_path(path)}: columns", got="said by the sidecar",
                          allowed="a log of `servotwin bench record`, whose header says what is what")
-    table = read_table(path, is_known_name, unended=False)
-    table.check_lengths()
-    columns = columns_of(table.header, path)
-    time, command = _time_and_command(table, columns)
+    read = read_log_table(path, checked_mends(mend), {}, needs=(TIME, "command"))
+    table, columns, time, command = _time_and_command(read.table, read.layout.columns, mend)
     start, shift = _alignment(filmed, table.cells(columns[command].column), time, said)
     seen = filmed.time + start + shift
     made = _merged(table, columns, time, command, seen, filmed.angle)
     return FilmLog(columns=made, sidecar=_sidecar(filmed, said, shift),
-                   remarks=_sign(table, columns[command], command, time, seen, filmed.angle))
+                   remarks=(*table.remarks, *_sign(table, columns[command], command, time, seen, filmed.angle)))
 
 
-def write_film_log(filmed: Filmed, path: str | Path, *, log: str | Path | None = None, overwrite: bool = False) -> None:
+def write_film_log(filmed: Filmed, path: str | Path, *, log: str | Path | None = None, mend: Sequence[str] = (),
+                   overwrite: bool = False) -> None:
     """Write a filmed angle as a CSV file and its sidecar, see `film_log`.
 
     Parameters
@@ -101,6 +104,8 @@ def write_film_log(filmed: Filmed, path: str | Path, *, log: str | Path | None =
         Ends in .csv; the sidecar gets the same name with .json.
     log : str or Path, optional
         The recorder's.
+    mend : sequence of str
+        What to put right in it, see `read_logs`.
     overwrite : bool
         Replace files that are there.
 
@@ -114,7 +119,7 @@ def write_film_log(filmed: Filmed, path: str | Path, *, log: str | Path | None =
     path = Path(path)
     if path.suffix != ".csv":
         raise OutputError(f"{path}", got=path.suffix or "no ending", allowed="a name that ends in .csv")
-    made = film_log(filmed, log)
+    made = film_log(filmed, log, mend=mend)
     for file in (path, sidecar_path(path)):
         if file.exists() and not overwrite:
             raise OutputExistsError(file)
@@ -122,19 +127,23 @@ def write_film_log(filmed: Filmed, path: str | Path, *, log: str | Path | None =
     write_file(path, made.text.encode(), overwrite=overwrite)
 
 
-def _time_and_command(table: TextTable, columns: Mapping[str, Column]) -> tuple[NDArray[np.float64], str]:
-    command = next((name for name in COMMANDS if name in columns), None)
-    if TIME not in columns or command is None:
-        raise InputError(f"{table.path}: columns", got=", ".join(table.header),
-                         allowed="time_s and pulse_width_us or command_angle_deg among them")
+class _Told(NamedTuple):
+    table: TextTable
+    columns: Mapping[str, Column]
+    time: NDArray[np.float64]
+    command: str
+
+
+def _time_and_command(table: TextTable, columns: Mapping[str, Column], mend: Sequence[str]) -> _Told:
+    command = next(name for name in COMMANDS if name in columns)
     if "output_angle" in columns:
         raise InputError(f"{table.path}: column", got=columns["output_angle"].column,
                          allowed="a log without an angle, which the clip is to give")
-    time = columns[TIME].to_si(table.numbers(columns[TIME].column), TIME)
-    if not (np.diff(time) > 0.0).all():
-        raise InputError(f"{table.path}: {columns[TIME].column}", got="times that stand still or run backwards",
-                         allowed="increasing times")
-    return time, command
+    parts = timed(table, columns[TIME], mend)
+    if len(parts) > 1:
+        raise InputError(f"{table.path}", got=f"{len(parts)} logs, as its clock begins again",
+                         allowed="the one log of the clip, in a file of its own")
+    return _Told(parts[0].table, columns, parts[0].time, command)
 
 
 def _alignment(filmed: Filmed, cells: list[str], time: NDArray[np.float64], said: Mapping[str, Any],

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from servotwin.errors import InputError
 from servotwin.identification.fitting import checks
+from servotwin.identification.fitting.suspicions.centre import centred
 from servotwin.identification.fitting.suspicions.followed import not_followed
 from servotwin.identification.fitting.suspicions.look import Finding, Look, look
 from servotwin.identification.fitting.suspicions.pulses import refused
@@ -105,13 +106,15 @@ def first_looks(logs: Sequence[Log], model: Model, mend: Sequence[str]) -> tuple
     Raises
     ------
     InputError
-        If a kind is unknown, or a shaft turns faster than the servo could by far and no finding says why.
+        If a kind is unknown, a command lies beyond the travel, whatever its zero, or a shaft turns faster than the
+        servo could by far and no finding says why.
     """
     kinds = checks.checked_words("mend", mend, MENDED)
-    done = mended(logs, model, kinds)
+    about = centred(logs, model)
+    done = mended(about.logs, model, kinds)
     left = _checked(done.logs, model, KINDS)
     checks.check_speeds(left.steadied, model)
-    return done.logs, (*(f"mended: {one.sentence}" for one in done.findings),
+    return done.logs, (*about.sentences, *(f"mended: {one.sentence}" for one in done.findings),
                        *(one.sentence for one in left.findings))
 
 

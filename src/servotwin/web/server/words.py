@@ -118,7 +118,7 @@ async def _guess(visitor: Visitor, message: dict[str, Any]) -> Answer:
 async def _log(visitor: Visitor, message: dict[str, Any]) -> Answer:
     asked = _table(message, "log")
     if "columns" in asked:
-        visitor.brought.read_again(asked["columns"], asked.get("drop_repeated", False))
+        visitor.brought.read_again(asked["columns"], asked.get("mend", ""))
     elif "show" in asked:
         visitor.brought.compare(asked)
     elif "play" in asked:

@@ -26,14 +26,16 @@ export function mount(root, bench) {
   const of = choice("Over servo", [], () => {});
   const run = choice("Run", [], () => { tell(); compare(); });
   const rig = tick("Fit delay, pulses' phase and zero of the angle first", true);
-  const repeated = tick("Pass over rows whose time stands still", false);
-  const id = unique();
+  const [id, mendId] = [unique(), unique()];
   const columns = el("input", { type: "text", id, placeholder: "time=t:ms angle=pos:deg-90", autocomplete: "off",
     spellcheck: "false", onkeydown: (/** @type {KeyboardEvent} */ event) => { if (event.key === "Enter") again(); } });
+  const mend = el("input", { type: "text", id: mendId, placeholder: "torn,reset", autocomplete: "off", spellcheck: "false",
+    onkeydown: (/** @type {KeyboardEvent} */ event) => { if (event.key === "Enter") again(); } });
   const table = el("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "how the columns were read" });
   body.append(el("p", { class: "soft", text: "Drop a table (CSV, TSV) or a JSON log of a known format anywhere on the page, 20 MB at most." }),
     el("label", {}, "Open a log ", input), said, place, words);
-  words.append(el("label", { for: id, text: "What its columns mean (as --columns of servotwin fit)" }), columns, repeated.row,
+  words.append(el("label", { for: id, text: "What its columns mean (as --columns of servotwin fit; time=50Hz is --rate, command=30deg@0s --commanded)" }), columns,
+    el("label", { for: mendId, text: "What to mend (as --mend)" }), mend,
     el("div", { class: "buttons" }, el("button", { text: "Read again", onclick: () => again() })));
   place.append(table, run.row, of.row, rig.row, el("div", { class: "buttons" },
     el("button", { class: "primary", text: "Compare", onclick: () => compare() }),
@@ -69,7 +71,7 @@ export function mount(root, bench) {
         { method: "POST", headers: { "x-visitor": bench.hello.visitor ?? "" }, body: given });
       const found = await answer.json();
       if (file !== given) return;
-      columns.value = "";
+      columns.value = mend.value = "";
       if (found.log) took(found.log); else wrong(found.wrong ?? found.error, Boolean(found.wrong));
     } catch {
       wrong(`${given.name}: the line to the bench was cut, or the file cannot be read`, false);
@@ -88,7 +90,7 @@ export function mount(root, bench) {
   const again = async () => {
     say("Reading …");
     try {
-      await bench.ask({ log: { columns: columns.value, drop_repeated: repeated.input.checked } });
+      await bench.ask({ log: { columns: columns.value, mend: mend.value } });
     } catch (error) { say(error instanceof Error ? error.message : String(error)); }
   };
 

@@ -100,9 +100,9 @@ class Brought:
             If it cannot be read; what columns mean can then be said with `read_again`.
         """
         self._log = None
-        return await self._read({"raw": raw, "packed": False, "label": label, "columns": "", "drop_repeated": False})
+        return await self._read({"raw": raw, "packed": False, "label": label, "columns": "", "mend": ""})
 
-    def read_again(self, columns: object, drop_repeated: object) -> None:
+    def read_again(self, columns: object, mend: object) -> None:
         """Begin to read the log once more with words for its columns; the page is told what comes of it.
 
         Raises
@@ -115,10 +115,10 @@ class Brought:
         if not isinstance(columns, str) or len(columns) > _LONGEST_WORDS:
             raise InputError("columns", got=type(columns).__name__,
                              allowed='words such as "time=t:ms angle=pos:deg-90"')
-        if not isinstance(drop_repeated, bool):
-            raise InputError("drop_repeated", got=drop_repeated, allowed="true or false")
+        if not isinstance(mend, str) or len(mend) > _LONGEST_WORDS:
+            raise InputError("mend", got=type(mend).__name__, allowed='words such as "torn,reset"')
         given = {"raw": self._log.raw, "packed": True, "label": self._log.label, "columns": columns.strip(),
-                 "drop_repeated": drop_repeated}
+                 "mend": mend.strip()}
 
         async def reading() -> None:
             self.tell({"own": {"reading": await self._read(given)}})

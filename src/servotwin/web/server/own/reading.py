@@ -6,6 +6,7 @@ import contextlib
 import json
 import os
 import pickle
+import re
 import warnings
 import zlib
 from dataclasses import replace
@@ -17,7 +18,6 @@ import numpy as np
 from servotwin.errors import InputError, ServotwinError
 from servotwin.logs import Log, Reading, read_logs
 from servotwin.logs.reading import reading_facts
-from servotwin.logs.sidecar import FOLDER_FILE, FORMAT
 from servotwin.web.server.limits import LONGEST_UPLOAD
 from servotwin.web.server.own.frames import RefusedError
 
@@ -41,7 +41,7 @@ def work(given: dict[str, Any], tell: Tell) -> tuple[dict[str, Any], list[bytes]
     Parameters
     ----------
     given : dict
-        `raw` (bytes of the file, packed where `packed`), `label`, `folder` (empty), `columns`, `drop_repeated`.
+        `raw` (bytes of the file, packed where `packed`), `label`, `folder` (empty), `columns`, `mend`.
     tell : callable
 
     Raises
@@ -76,11 +76,10 @@ def _read(raw: bytes, given: dict[str, Any]) -> tuple[list[Log], list[str]]:
     ending = Path(label).suffix.lower()
     file = Path(f"{_STEM}{ending if ending in _ENDINGS else '.csv'}")
     file.write_bytes(raw)
-    if given["drop_repeated"]:
-        Path(FOLDER_FILE).write_text(json.dumps({"format": FORMAT, "drop_repeated": True}), "utf-8")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        logs = read_logs(file, columns=given["columns"] or None)
+        mends = [word for word in re.split(r"[,\s]+", given["mend"]) if word]
+        logs = read_logs(file, columns=given["columns"] or None, mend=mends)
     said = [_plain(str(one.message), label) for one in caught if issubclass(one.category, UserWarning)]
     return [_renamed(log, label) for log in logs], said
 
