@@ -48,7 +48,7 @@ def list_servos(as_json: _Json = False) -> None:
              _number(servo["stall_torque"], "{:.3g} N m"),
              _number(servo["twin_stall_torque"], "{:.3g} N m"), _number(servo["speed"], "{:.0f} deg/s"),
              _brief(servo["flags"])) for servo in found]
-    show(table(("id", "title", "at", "torque", "of twin", "speed", "flags"), rows, wraps="flags"))
+    show(table(("id", "title", "at", "torque", "of twin", "speed", "flags"), rows))
 
 
 @catalog.command("show", help="Show every parameter of a servo and its source.",

@@ -52,7 +52,7 @@ def _answer(found: Lifters) -> list[Any]:
         return ["no servo of the catalog can", tail]
     rows = [(each.servo.name, _weight(each), f"{each.margin:.2f}", f"{each.most_torque:.3g} N m", f"{each.time:.2f} s",
              "; ".join(each.notes)) for each in found.found]
-    return ["", table(("id", "mass", "margin", "lifts", "60 deg in", "note"), rows, wraps="note"), "", tail]
+    return ["", table(("id", "mass", "margin", "lifts", "60 deg in", "note"), rows), "", tail]
 
 
 def _weight(each: Lifter) -> str:
@@ -60,7 +60,7 @@ def _weight(each: Lifter) -> str:
 
 
 def _refused(found: Lifters) -> Any:
-    return table(("cannot", "why"), [(each.servo.name, each.reason) for each in found.refused], wraps="why")
+    return table(("cannot", "why"), [(each.servo.name, each.reason) for each in found.refused])
 
 
 def _facts(found: Lifters) -> dict[str, Any]:

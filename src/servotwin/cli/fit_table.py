@@ -111,7 +111,7 @@ def _parameters(found: TableCalibration) -> list[Any]:
         return []
     rows = [(name, *_values(one), one.unit, (one.source or "").rpartition("least squares: ")[2])
             for name, one in found.parameters.items()]
-    return [table(("parameter", "value", "standard error", "unit", "from"), rows, wraps="from"), ""]
+    return [table(("parameter", "value", "standard error", "unit", "from"), rows), ""]
 
 
 def _values(one: Quantity) -> tuple[str, str]:

@@ -176,4 +176,4 @@ def _log_table(found: Validation) -> Any:
         rows.append((error.log, error.motion or "other", f"{error.rms * factor:.3g} {unit}",
                      f"{error.largest * factor:.3g} {unit}"))
     more = f"log ({_MOST_LOGS} worst of {len(errors)})" if len(errors) > _MOST_LOGS else "log"
-    return table((more, "motion", "rms error", "largest"), rows, wraps=more)
+    return table((more, "motion", "rms error", "largest"), rows)
