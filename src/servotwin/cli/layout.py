@@ -20,7 +20,8 @@ _WORTH = 1.5  # times the lines of a table that folds: what one that wraps may t
 _LEAST = 20  # columns; a narrower terminal is treated as this wide
 _KEPT = "\N{NO-BREAK SPACE}"
 # What stays on one line: numbers with their units, ranges in brackets, units of several words
-_WHOLE = re.compile(r"\d (?:N m|kgf cm|deg C|[^\W\d]{1,4}(?:/\w+)?|%|°)(?![\w.])|\([^() ]+ to [^() ]+\)|\b(?:N m|kgf cm|deg C)\b")
+_WHOLE = re.compile(r"\d (?:N m|kgf cm|deg C|[^\W\d]{1,4}(?:/\w+)?|%|°)(?![\w.])|\([^() ]+ to [^() ]+\)|"
+                    r"\b(?:N m|kgf cm|deg C)\b")
 
 
 class Line(NamedTuple):
@@ -72,13 +73,13 @@ def pair_lines(rows: Sequence[tuple[str, str]], width: int) -> list[Line]:
 
 
 def table_lines(header: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> list[Line]:
-    """Return a table, in as few lines as hold all of it.
+    r"""Return a table, in as few lines as hold all of it.
 
     Examples
     --------
     >>> rows = [("a", "0.916 N m", "its sheet ends at 6 V, computed as an analog one")]
     >>> for wide in (80, 40, 24):
-    ...     print("\\n".join(line.text for line in table_lines(("id", "torque", "note"), rows, wide)))
+    ...     print("\n".join(line.text for line in table_lines(("id", "torque", "note"), rows, wide)))
     id  torque     note
     a   0.916 N m  its sheet ends at 6 V, computed as an analog one
     id  torque     note

@@ -92,12 +92,12 @@ def show(*parts: RenderableType) -> None:
 
 
 def drawn(parts: Sequence[RenderableType], width: int | None, *, terminal: bool = False) -> str:
-    """Return tables and texts as they are drawn in a width, that of the terminal unless given.
+    r"""Return tables and texts as they are drawn in a width, that of the terminal unless given.
 
     Examples
     --------
     >>> drawn(["a word, and more of them"], 20)
-    'a word, and more of\\nthem'
+    'a word, and more of\nthem'
     """
     from rich.console import Console
 
