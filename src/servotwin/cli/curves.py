@@ -84,6 +84,8 @@ def curves(
         return
     for sheet in sheets:
         _show(sheet, asked.torque)
+    if len(sheets) > 1:
+        _show_beside(sheets)
     if files:
         show(pairs([("written", name) for name in files]))
 
@@ -171,6 +173,19 @@ def _write_points(sheets: list[DataSheet], path: Path) -> None:
             for point in zip([from_si(w, "deg/s", "speed") for w in curve.speed.tolist()], curve.torque,
                              curve.current, curve.power, curve.efficiency, strict=True)]
     path.write_bytes(csv_text(dict(zip(names, zip(*rows, strict=True), strict=True)), digits=12).encode())
+
+
+def _show_beside(sheets: list[DataSheet]) -> None:
+    """Show all servos in one table."""
+    from servotwin.cli.curves_words import beside
+    from servotwin.cli.which_words import side_by_side
+
+    lifts = sheets[0].voltages[0].lift is not None
+    volts = {part.voltage for sheet in sheets for part in sheet.voltages}
+    at = f", at {volts.pop():g} V" if len(volts) == 1 else ""
+    show(f"side by side, cold{at}", table(*side_by_side(beside(sheets))),
+         "10 min: winding, after holding the arm horizontal; droop: below its command there" if lifts else
+         "quarter load: held below its command, by a quarter of its own stall torque; at rest: free", "")
 
 
 def _show(sheet: DataSheet, torque: float | None) -> None:

@@ -19,9 +19,9 @@ _FOLD = "    "  # before what follows below a row
 _WORTH = 1.5  # times the lines of a table that folds: what one that wraps may take, which is easier to compare
 _LEAST = 20  # columns; a narrower terminal is treated as this wide
 _KEPT = "\N{NO-BREAK SPACE}"
-# What stays on one line: numbers with their units, ranges in brackets, units of several words
-_WHOLE = re.compile(r"\d (?:N m|kgf cm|deg C|[^\W\d]{1,4}(?:/\w+)?|%|°)(?![\w.])|\([^() ]+ to [^() ]+\)|"
-                    r"\b(?:N m|kgf cm|deg C)\b")
+# What stays on one line: numbers with their units, units of several words, and ranges in brackets if there is room
+_WHOLE = re.compile(r"\d (?:N m|kgf cm|deg C|[^\W\d]{1,4}(?:/\w+)?|%|°)(?![\w.])|\b(?:N m|kgf cm|deg C)\b")
+_RANGE = re.compile(r"\([^() ]+ to [^() ]+\)")
 
 
 class Line(NamedTuple):
@@ -31,8 +31,10 @@ class Line(NamedTuple):
     bold: int = 0
 
 
-def wrapped(text: str, width: int, indent: str = "") -> list[str]:
+def wrapped(text: str, width: int, indent: str = "", *, ranges: bool = True) -> list[str]:
     """Return the lines of a text; those after the first have an indent beyond the blanks in front of the text.
+
+    Unless `ranges`, those in brackets may part.
 
     Examples
     --------
@@ -43,7 +45,7 @@ def wrapped(text: str, width: int, indent: str = "") -> list[str]:
     if len(text) <= room and "\n" not in text:
         return [text.rstrip()]
     front = text[:len(text) - len(text.lstrip(" "))]
-    lines = textwrap.wrap(whole(text), room, subsequent_indent=front + indent, break_long_words=False,
+    lines = textwrap.wrap(whole(text, ranges=ranges), room, subsequent_indent=front + indent, break_long_words=False,
                           break_on_hyphens=False)
     return [line.replace(_KEPT, " ") for line in lines] or [""]
 
@@ -94,23 +96,30 @@ def table_lines(header: Sequence[str], rows: Sequence[Sequence[str]], width: int
     room, count = max(width, _LEAST), len(header)
     cells = [[*row, *[""] * (count - len(row))] for row in rows]
     columns = [[header[k], *(row[k] for row in cells)] for k in range(count)]
-    widths = _widths(columns, room)
+    widths, ranges = _widths(columns, room, ranges=True), True
+    if widths is None:
+        widths, ranges = _widths(columns, room, ranges=False), False
     folded = _folded(header, cells, columns, room)
     if widths is None:
         return folded
-    found = [*_row(header, widths, bold=True), *(line for row in cells for line in _row(row, widths))]
+    found = [*_row(header, widths, bold=True), *(line for row in cells for line in _row(row, widths, ranges=ranges))]
     return found if len(found) <= _WORTH * len(folded) else folded
 
 
-def whole(text: str) -> str:
-    """Return a text whose numbers do not part from their units."""
-    return _WHOLE.sub(lambda match: match[0].replace(" ", _KEPT), text)
+def whole(text: str, *, ranges: bool = True) -> str:
+    """Return a text whose numbers do not part from their units, nor ranges in brackets."""
+    kept = _RANGE.sub(_joined, text) if ranges else text
+    return _WHOLE.sub(_joined, kept)
 
 
-def _widths(columns: Sequence[Sequence[str]], room: int) -> list[int] | None:
+def _joined(match: re.Match[str]) -> str:
+    return match[0].replace(" ", _KEPT)
+
+
+def _widths(columns: Sequence[Sequence[str]], room: int, *, ranges: bool) -> list[int] | None:
     """Return the width of each column; None where their longest words do not fit beside each other."""
     widths = [max(map(len, cells)) for cells in columns]
-    words = [[[len(word) for word in _words(cell)] for cell in cells] for cells in columns]
+    words = [[[len(word) for word in _words(cell, ranges=ranges)] for cell in cells] for cells in columns]
     least = [max(max(cell, default=0) for cell in cells) for cells in words]
     free = room - _GAP * (len(columns) - 1)
     if sum(widths) > free and sum(least) > free:
@@ -136,14 +145,14 @@ def _height(words: Sequence[int], width: int) -> int:
     return lines
 
 
-def _words(cell: str) -> list[str]:
+def _words(cell: str, *, ranges: bool) -> list[str]:
     """Return what of a cell does not part; the blanks in front of it belong to each."""
     front = cell[:len(cell) - len(cell.lstrip(" "))]
-    return [front + word for word in re.split(r"[ \n]+", whole(cell).strip(" "))]
+    return [front + word for word in re.split(r"[ \n]+", whole(cell, ranges=ranges).strip(" "))]
 
 
-def _row(cells: Sequence[str], widths: Sequence[int], *, bold: bool = False) -> list[Line]:
-    parts = [wrapped(cell, width) for cell, width in zip(cells, widths, strict=True)]
+def _row(cells: Sequence[str], widths: Sequence[int], *, bold: bool = False, ranges: bool = True) -> list[Line]:
+    parts = [wrapped(cell, width, ranges=ranges) for cell, width in zip(cells, widths, strict=True)]
     gap, found = " " * _GAP, []
     for k in range(max(map(len, parts), default=0)):
         at = (part[k] if k < len(part) else "" for part in parts)

@@ -55,8 +55,8 @@ SUPPLY_HELP = "usb (5 V, 0.5 A), or a voltage with resistance and limit of curre
 SupplyOption = Annotated[str | None, typer.Option(
     metavar=SUPPLY_FORM, help=f"Supply of the servo: {SUPPLY_HELP} (default: its own).", rich_help_panel=PLANT)]
 LogSupplyOption = Annotated[str | None, typer.Option(
-    "--supply", metavar=SUPPLY_FORM, help=f"Supply that the servo had: {SUPPLY_HELP} (default: its own); a voltage that "
-    "a log has beside it comes before.", rich_help_panel="Logs and servo")]
+    "--supply", metavar=SUPPLY_FORM, help=f"Supply that the servo had: {SUPPLY_HELP} (default: its own); a voltage "
+    "that a log has beside it comes before.", rich_help_panel="Logs and servo")]
 SchedulerOption = Annotated[str | None, typer.Option(
     metavar="ADDRESS", help="Run on the workers of a dask scheduler, such as tcp://host:8786.", rich_help_panel=OUTPUT)]
 AccuracyOption = Annotated[float, typer.Option(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from servotwin.errors import InputError
 from servotwin.parameters import printed_points
-from servotwin.parameters.servo import SET_BY_USER
+from servotwin.parameters.quantity import SET_BY_USER
 from servotwin.physics import Temperatures, magnet_factor, winding_resistance
 from servotwin.units import is_finite
 
