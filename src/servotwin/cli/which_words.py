@@ -29,6 +29,7 @@ _NAMES = ("servo", "id")
 _PRICE = "price"
 _FORM = "NAME=VALUE, such as current=1A, mass=60g, voltage=7.4V, travel=180deg, time=0.2s, kind=digital or price=20"
 _ZERO_CELSIUS = 273.15
+_BURNT = 300.0  # °C
 _MANY = 100.0  # times; beyond it a margin is not told in numbers
 
 
@@ -210,8 +211,15 @@ def mass_cell(mass: float) -> str:
 
 
 def celsius(kelvin: Real) -> str:
-    """Return a temperature [K] in degrees Celsius."""
-    return f"{float(kelvin) - _ZERO_CELSIUS:.0f}"
+    """Return a temperature [K] in degrees Celsius; what has burnt long before is not told in numbers.
+
+    Examples
+    --------
+    >>> celsius(298.15), celsius(900.0)
+    ('25', '> 300')
+    """
+    found = float(kelvin) - _ZERO_CELSIUS
+    return f"> {_BURNT:g}" if found > _BURNT else f"{found:.0f}"
 
 
 def degrees(angle: float, span: Span | None, form: str) -> str:

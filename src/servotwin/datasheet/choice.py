@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from servotwin.simulation import Rest
 
 
+_ABOVE = 1.25  # times the highest voltage of its sheet, at which nobody is told to buy a servo; assumed
+
+
 class Reason(NamedTuple):
     """Why a servo does not suit: what it is about, such as "torque" or "mass", and one phrase."""
 
@@ -173,7 +176,7 @@ def candidate(servo: Servo, supply: Supply | float, *, lift: tuple[float, float]
     volts = float(supply if isinstance(supply, int | float) else supply.open_circuit_voltage or 0.0)
     mass, most = printed_fact(servo.sheet, "mass"), highest_voltage(servo)
     known = {"servo": servo, "mass": math.nan if mass is None else mass, "price": price, "travel": travel_of(servo)}
-    if volts > 2.0 * most > 0.0:
+    if volts > _ABOVE * most > 0.0:
         return _judged(known, [Reason("voltage", f"its sheet ends at {most:g} V")], limits)
     try:
         with warnings.catch_warnings():
