@@ -136,6 +136,6 @@ def test_which_knows_voltages_and_unknown_masses():
     assert "impossible sheet" in found.found[2].notes
     assert math.isnan(found.found[-1].mass)
     high = st.servos_that_lift(0.05, 0.05, voltage=13.0, servos=light)
-    assert [each.kind for each in high.refused] == ["voltage"] * 3
+    assert [each.kind for each in high.refused] == ["voltage"] * 4
     with pytest.raises(InputError, match="time: got -1"):
         st.servos_that_lift(0.05, 0.05, voltage=6.0, time=-1.0)

@@ -4,12 +4,16 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import servotwin as st
 from robots.robots_cases import links, servo
 from servotwin.datasheet import FullDrive
+from servotwin.datasheet.warming import masses_by_mass
 from servotwin.errors import InputError
+from servotwin.physics import winding_resistance
 from servotwin.robots import Motion, Mount, run_motion, sizing_of
+from servotwin.robots.heat import heating
 from servotwin.robots.sizing import supplied
 
 mujoco = pytest.importorskip("mujoco", reason="the extra `robots` is not installed")
@@ -163,3 +167,17 @@ def test_a_shared_supply_replaces_the_servos_own():
     assert supplied(SERVO, None) is SERVO
     with pytest.raises(InputError, match="open_circuit_voltage"):
         supplied(SERVO, st.Supply(internal_resistance=0.3))
+
+
+def test_ten_minutes_of_a_motion_are_those_of_its_two_masses():
+    """Beside the same two masses integrated, with copper whose resistance grows."""
+    masses = masses_by_mass(0.05)
+
+    def rates(_, now):
+        heat = 1.5 * float(winding_resistance(now[0], 1.0))
+        passed = (now[0] - now[1]) / masses.winding_to_housing
+        return [(heat - passed) / masses.winding_capacity,
+                (passed - (now[1] - masses.ambient) / masses.housing_to_ambient) / masses.housing_capacity]
+
+    expected = solve_ivp(rates, (0.0, 600.0), [masses.ambient] * 2, rtol=1e-9, atol=1e-9).y[:, -1]
+    assert tuple(heating(1.5, masses.ambient, masses).soon) == pytest.approx(tuple(expected), abs=0.3)

@@ -51,6 +51,7 @@ app.command("paper", help="Reproduce the paper's figures and tables in a report.
             epilog="Example: servotwin paper --out paper-report --force")(paper)
 app.command("simulate", help="Simulate one servo under one command and one load.",
             epilog="Example: servotwin simulate hitec-hs-755hb --step 0:180 --plot run.png\n\n"
+                   "Example: servotwin simulate towerpro-sg90 --step 0:60 --supply usb\n\n"
                    "Example: servotwin simulate my-servo.toml --sine 1500:200:2 --unit us --out run.csv")(simulate)
 app.command("curves", help="Compute the data sheets of servos: torque, speed, current, holding, lifting, warming.",
             epilog="Example: servotwin curves towerpro-mg996r --voltage 4.8,6 --out mg996r.html\n\n"

@@ -48,7 +48,7 @@ def list_servos(as_json: _Json = False) -> None:
              _number(servo["stall_torque"], "{:.3g} N m"),
              _number(servo["twin_stall_torque"], "{:.3g} N m"), _number(servo["speed"], "{:.0f} deg/s"),
              _brief(servo["flags"])) for servo in found]
-    show(table(("id", "title", "at", "torque", "of twin", "speed", "flags"), rows, wraps="flags"))
+    show(table(("id", "title", "at", "torque", "of twin", "speed", "flags"), rows))
 
 
 @catalog.command("show", help="Show every parameter of a servo and its source.",
@@ -135,5 +135,9 @@ catalog.command("from-sheet", help="Make a servo file from a data sheet.", epilo
     "Example: servotwin catalog from-sheet --csv sheets.csv --out my-catalog"))(from_sheet)
 catalog.command("registers", help="Show what the registers of a model of bus servo hold when it is new, and which page "
                 "prints it.", epilog="Example: servotwin catalog registers XL330-M288")(registers)
-catalog.command("which", help="List the servos that can lift a mass on an arm, lightest first.", epilog=(
-    "Example: servotwin catalog which --lift 0.5kg --arm 10cm --voltage 5 --time 0.3"))(which)
+catalog.command("which", help="Which servo: those that lift a mass, follow a motion or keep limits, side by side, "
+                "and why the others do not.", epilog=(
+    "Example: servotwin catalog which --lift 0.5kg --arm 10cm --voltage 5 --time 0.3\n\n"
+    "Example: servotwin catalog which --lift 50g --arm 8cm --supply usb "
+    "--among towerpro-sg90,towerpro-mg90s,hitec-hs-422\n\n"
+    "Example: servotwin catalog which --robot arm.xml --motion wave.csv --limit mass=60g,current=1A"))(which)

@@ -31,7 +31,7 @@ def _all(*, as_json: bool) -> None:
         return
     rows = [(str(each["family"]), str(each["model"]), str(each["number"]), str(each["registers"]),
              str(each["assumed"]), str(each["page"]) or "none was seen") for each in found]
-    show(table(("family", "model", "number", "registers", "assumed", "page"), rows, wraps="page"))
+    show(table(("family", "model", "number", "registers", "assumed", "page"), rows))
 
 
 def _one(name: str, *, as_json: bool) -> None:
@@ -48,4 +48,4 @@ def _one(name: str, *, as_json: bool) -> None:
                 ("registers", f"{model.rows}, {model.assumed} of them assumed")]), "",
          table(("address", "register", "new", "range", "printed in"),
                [(str(row["address"]), row["name"], str(row["value"]), f"{row['lower']} to {row['upper']}",
-                 row["document"] or "assumed") for row in rows], wraps="printed in"))
+                 row["document"] or "assumed") for row in rows]))

@@ -49,6 +49,7 @@ def curves(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of all servos; repeatable.",
         rich_help_panel=shared.PLANT)] = None,
     register: shared.RegisterOption = None,
+    supply: shared.SupplyOption = None,
     out: Annotated[Path | None, typer.Option(
         metavar="FILE.html", help="Write a page with tables and pictures.", rich_help_panel=shared.OUTPUT)] = None,
     plot: Annotated[Path | None, typer.Option(
@@ -66,10 +67,13 @@ def curves(
     """Compute the sheets of servos from their parameters, beside what their makers print."""
     from servotwin.cli.curves_words import facts
     from servotwin.cli.lift_words import loads_of
+    from servotwin.errors import InputError
 
     asked = loads_of(lift, arm, load or [])
     targets = _targets({"--out": out, "--plot": plot, "--loop": loop, "--csv": csv}, servos, force=force)
-    models = _models(servos, model, change or [], register or [])
+    models = _models(servos, model, change or [], register or [], supply)
+    if voltage and supply:
+        raise InputError("--supply", got=f"also --voltage {','.join(voltage)}", allowed="one of them")
     _check_loop(loop, models)
     sheets = _computed(models, {
         "voltage": _voltages(voltage), "lift": asked.lift, "hot": hot + _ZERO_CELSIUS, "bandwidth": not quick})
@@ -80,6 +84,8 @@ def curves(
         return
     for sheet in sheets:
         _show(sheet, asked.torque)
+    if len(sheets) > 1:
+        _show_beside(sheets)
     if files:
         show(pairs([("written", name) for name in files]))
 
@@ -106,12 +112,13 @@ def _voltages(words: list[str] | None) -> list[float] | None:
             for word in words for part in word.split(",")]
 
 
-def _models(servos: list[str], model: str | None, change: list[str], register: list[str]) -> list[Model]:
+def _models(servos: list[str], model: str | None, change: list[str], register: list[str],
+            supply: str | None) -> list[Model]:
     from servotwin.cli.model_words import model_of
 
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=".*: computed as a")  # the notes say which model stands for it
-        return [model_of(servo, model, change, _MODELS, register) for servo in servos]
+        return [model_of(servo, model, change, _MODELS, register, supply) for servo in servos]
 
 
 def _check_loop(path: Path | None, models: list[Model]) -> None:
@@ -166,6 +173,19 @@ def _write_points(sheets: list[DataSheet], path: Path) -> None:
             for point in zip([from_si(w, "deg/s", "speed") for w in curve.speed.tolist()], curve.torque,
                              curve.current, curve.power, curve.efficiency, strict=True)]
     path.write_bytes(csv_text(dict(zip(names, zip(*rows, strict=True), strict=True)), digits=12).encode())
+
+
+def _show_beside(sheets: list[DataSheet]) -> None:
+    """Show all servos in one table."""
+    from servotwin.cli.curves_words import beside
+    from servotwin.cli.which_words import side_by_side
+
+    lifts = sheets[0].voltages[0].lift is not None
+    volts = {part.voltage for sheet in sheets for part in sheet.voltages}
+    at = f", at {volts.pop():g} V" if len(volts) == 1 else ""
+    show(f"side by side, cold{at}", table(*side_by_side(beside(sheets))),
+         "10 min: winding, after holding the arm horizontal; droop: below its command there" if lifts else
+         "quarter load: held below its command, by a quarter of its own stall torque; at rest: free", "")
 
 
 def _show(sheet: DataSheet, torque: float | None) -> None:

@@ -167,6 +167,31 @@ def lift_pairs(lift: Lift) -> list[tuple[str, str]]:
     return [*found, ("after ten minutes", _warm(lift))]
 
 
+def beside(sheets: Sequence[DataSheet]) -> list[dict[str, str]]:
+    """Return several servos side by side, a row for each voltage, by the names of columns."""
+    from servotwin.cli.which_words import degrees, lift_cells, mass_cell, times
+    from servotwin.parameters import printed_fact
+
+    several = len({part.voltage for sheet in sheets for part in sheet.voltages}) > 1
+    found = []
+    for sheet in sheets:
+        mass = printed_fact(sheet.servo.sheet, "mass")
+        for part in sheet.voltages:
+            free = part.lift is None
+            held = next((each for each in part.holding
+                         if math.isclose(each.torque, 0.25 * part.cold.stall_torque, rel_tol=1e-6)), None)
+            rest = None if part.buzz is None else part.buzz.rest
+            found.append({
+                "id": sheet.servo.name, "at, V": f"{part.voltage:g}" if several else "",
+                "mass, g": mass_cell(math.nan if mass is None else mass), "stall, N m": f"{part.cold.stall_torque:.3g}",
+                "stall, A": f"{part.cold.stall_current:.2f}" if free else "", "60 deg, s": f"{part.cold.time_60:.3f}",
+                "margin": "" if part.lift is None else times(part.lift.margin), **lift_cells(part.lift),
+                "quarter load, deg off": degrees(held.error, None, ".1f") if held is not None and free else "",
+                "at rest, A": f"{rest.current:.3f}" if rest is not None and free else "",
+                "least move, deg": degrees(part.smallest_move, part.move_span, ".2f")})
+    return found
+
+
 def _off(held: Held) -> str:
     """Return how far a load pulls a servo off its command."""
     return with_span(math.degrees(held.error), held.span, ".1f", "deg", scale=math.degrees(1.0))
@@ -262,7 +287,7 @@ def _facts(part: VoltageSheet, torque: float | None) -> dict[str, Any]:
     if part.buzz is not None:
         found["at_rest"] = buzz_facts(part.buzz)
     if part.lift is not None:
-        found["lift"] = _lift(part.lift)
+        found["lift"] = lift_facts(part.lift)
     return found
 
 
@@ -279,7 +304,8 @@ def _curve(curve: SpeedCurve, torque: float | None) -> dict[str, Any]:
         "speed", "torque", "current", "power", "efficiency")}
 
 
-def _lift(lift: Lift) -> dict[str, Any]:
+def lift_facts(lift: Lift) -> dict[str, Any]:
+    """Return what a lift comes to in SI, ready for JSON."""
     found: dict[str, Any] = {
         "mass": lift.mass, "arm": lift.arm, "torque": lift.torque, "most_torque": lift.most_torque,
         "lifts": lift.lifts, "margin": lift.margin, "blocked": lift.blocked, "time_60": lift.swing.time,

@@ -42,6 +42,7 @@ def fit(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable; with a unit, or "
         "in SI units.", rich_help_panel=_LOGS)] = None,
     register: shared.LogRegisterOption = None,
+    supply: shared.LogSupplyOption = None,
     holdout: Annotated[str | None, typer.Option(
         metavar="SHARE|NAMES", help="Logs to predict rather than fit: a share of each kind of motion, such as "
         "0.25, or names with commas; 0 for none (default: a quarter of each kind with four logs or more).",
@@ -126,12 +127,12 @@ def fit(
     if table is not None:
         from servotwin.cli.fit_table import calibrate_from
 
-        calibrate_from(table, servo, out, change=change or (), arm=arm, columns=columns or (), force=force,
-                       as_json=as_json)
+        calibrate_from(table, servo, out, change=change or (), supply=supply, arm=arm, columns=columns or (),
+                       force=force, as_json=as_json)
         return
     _check_no_table(logs, arm)
     targets = _targets(out, report, [*(logs or []), Path(servo or "")], force=force)
-    search = _search(servo or "", model, change or [], register or [], free, bounds or [], prior or [],
+    search = _search(_model(servo or "", model, change or [], register or [], supply), free, bounds or [], prior or [],
                      priors=not no_priors)
     if not logs:
         _show_advice(_first_advice(search), as_json=as_json)
@@ -228,13 +229,17 @@ def _targets(out: Path | None, report: Path | None, inputs: list[Path], *, force
     return targets
 
 
-def _search(servo: str, model: str | None, change: list[str], register: list[str], free: list[str] | None,
-            bounds: list[str], prior: list[str], *, priors: bool) -> _Search:
+def _model(servo: str, model: str | None, change: list[str], register: list[str], supply: str | None) -> Model:
     from servotwin.cli import fit_words
     from servotwin.cli.model_words import model_of
+
+    return model_of(servo, model, change, fit_words.MODEL_NAMES, register, supply)
+
+
+def _search(nominal: Model, free: list[str] | None, bounds: list[str], prior: list[str], *, priors: bool) -> _Search:
+    from servotwin.cli import fit_words
     from servotwin.identification.fitting.checks import usual_free
 
-    nominal = model_of(servo, model, change, fit_words.MODEL_NAMES, register)
     names = fit_words.names(free) or usual_free(nominal)
     fit_words.check_free(names, nominal)
     return _Search(nominal, names, fit_words.bounds_of(bounds, names),

@@ -63,8 +63,7 @@ def _verdict(fit: Fit) -> list[RenderableType]:
         factor, unit = error_shown(fit.traces)
         rows = [(cause.name, f"{cause.before * factor:.3g}", f"{cause.after * factor:.3g}", cause.remedy)
                 for cause in fit.verdict.causes]
-        lines += ["", table(("what may be the matter", f"error ({unit})", f"with it ({unit})", "what to do"), rows,
-                            wraps="what to do")]
+        lines += ["", table(("what may be the matter", f"error ({unit})", f"with it ({unit})", "what to do"), rows)]
     return lines
 
 
@@ -84,7 +83,7 @@ def _estimates(fit: Fit) -> RenderableType:
         rows.append((line.name, line.value, line.interval, line.unit, found_by, line.prior,
                      "rig" if line.nuisance else line.sheet))
     level = f"{100.0 * fit.level:g} % interval"
-    return table(("parameter", "value", level, "unit", "found by", "prior", "before"), rows, wraps="parameter")
+    return table(("parameter", "value", level, "unit", "found by", "prior", "before"), rows)
 
 
 def errors(tables: Mapping[str, ErrorTable], traces: Sequence[Trace], label: str) -> RenderableType:
@@ -198,7 +197,7 @@ def advice_table(advice: Advice) -> list[RenderableType]:
         best = advice.experiments[0]
         rows.insert(3, ("the same, by logs alone, without priors", *_widths(best.alone, worst)))
     return ["next experiments, and how surely what is known worst would be known with them (half a 95 % interval)",
-            table(("experiment", *worst, "widest"), rows, wraps="experiment"), str(advice)]
+            table(("experiment", *worst, "widest"), rows), str(advice)]
 
 
 def _widths(widths: Mapping[str, float], names: Sequence[str]) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from servotwin.parameters import Quantity
 
 
-def calibrate_from(path: Path, servo: str | None, out: Path | None, *, change: Sequence[str] = (),
+def calibrate_from(path: Path, servo: str | None, out: Path | None, *, change: Sequence[str] = (), supply: str | None = None,
                    arm: str | None = None, columns: Sequence[str] = (), force: bool = False,
                    as_json: bool = False) -> None:
     """Calibrate from a table, show what was found, and write the servo.
@@ -31,6 +31,8 @@ def calibrate_from(path: Path, servo: str | None, out: Path | None, *, change: S
         Where the servo is written, a .toml.
     change : sequence of str
         Words of `--set`.
+    supply : str or None
+        Words of `--supply`.
     arm : str or None
         On which weights hung, or the radius of the drum, such as "1cm".
     columns : sequence of str
@@ -54,9 +56,9 @@ def calibrate_from(path: Path, servo: str | None, out: Path | None, *, change: S
     if out is not None:
         check_targets([Target(option="--out", path=out, endings=(".toml",))], force=force,
                       inputs=[path, *([] if servo is None else [Path(servo)])])
-    if change and servo is None:
-        raise InputError("--set", got="no --servo", allowed="both")
-    loaded = None if servo is None else servo_of(servo, change)
+    if (change or supply) and servo is None:
+        raise InputError("--set" if change else "--supply", got="no --servo", allowed="both")
+    loaded = None if servo is None else servo_of(servo, list(change), [], supply)
     if is_pattern(path) or is_load_table(path):
         loads, records = calibrate_of_loads(path, loaded, arm, columns)
         if out is not None:
@@ -146,7 +148,7 @@ def parameter_table(parameters: Mapping[str, Quantity]) -> RenderableType:
     """Return what a table sets of a servo, with errors and where each comes from."""
     rows = [(name, *_values(one), one.unit, (one.source or "").rpartition("least squares: ")[2])
             for name, one in parameters.items()]
-    return table(("parameter", "value", "standard error", "unit", "from"), rows, wraps="from")
+    return table(("parameter", "value", "standard error", "unit", "from"), rows)
 
 
 def _values(one: Quantity) -> tuple[str, str]:

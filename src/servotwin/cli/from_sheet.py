@@ -216,8 +216,8 @@ def _many(path: Path, how: dict[str, bool], out: Path | None, *, force: bool, as
         return
     show(table(("id", "resistance", "torque per current", "efficiency", "flags"), [
         (row["id"], *(ranged(row["motor"][name]) for name in (
-            "resistance", "output_torque_constant", "gear_efficiency")), "; ".join(row["flags"])) for row in rows],
-        wraps="flags"), "", *[f"left out: {text}" for text in left],
+            "resistance", "output_torque_constant", "gear_efficiency")), "; ".join(row["flags"])) for row in rows]),
+         "", *[f"left out: {text}" for text in left],
          *([f"written: {len(files)} servo files to {out}"] if out is not None else []))
 
 

@@ -54,6 +54,7 @@ def linear(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter; repeatable.",
         rich_help_panel=shared.PLANT)] = None,
     register: shared.RegisterOption = None,
+    supply: shared.SupplyOption = None,
     out: Annotated[Path | None, typer.Option(
         metavar="FILE.html", help="Write a page with tables and pictures.", rich_help_panel=shared.OUTPUT)] = None,
     plot: Annotated[Path | None, typer.Option(
@@ -71,7 +72,7 @@ def linear(
     from servotwin.cli.load_words import load_from
     from servotwin.cli.model_words import model_of
 
-    chosen = model_of(servo, model, change or [], _MODELS, register or [])
+    chosen = model_of(servo, model, change or [], _MODELS, register or [], supply)
     hangs = load_from(load or [], chosen)
     words.check_together({"--amplitude": amplitude, "--angle": angle, "--phase-margin": phase_margin,
                           "--overshoot": overshoot, "--step": step, "--derivative": derivative or None}, tune=tune)

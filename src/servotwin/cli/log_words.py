@@ -40,7 +40,7 @@ def sections(found: Survey, files: Sequence[str]) -> list[RenderableType]:
     parts: list[RenderableType] = [f"{log.name}: {len(log)} rows in {log.duration:.4g} s"]
     if log.reading is not None:
         parts += [table(("column", "signal", "unit", "known"), [
-            (one.column, one.signal, one.unit, one.known) for one in log.reading.columns], wraps="known"), ""]
+            (one.column, one.signal, one.unit, one.known) for one in log.reading.columns]), ""]
     rows = [*_curves(log), ("clock", _clock(found.clock)), *_gaps(found.clock)]
     rows += [(name.replace("_", " "), _values(name, one)) for name, one in found.values.items()]
     rows += [("motion", line) for line in _motion(log, found.motion)]

@@ -39,7 +39,7 @@ def class_of(name: str, among: Sequence[str] | None = None) -> type[Model]:
 
 
 def model_of(servo: str, name: str | None, change: Sequence[str], among: Sequence[str] | None = None,
-             register: Sequence[str] = ()) -> Model:
+             register: Sequence[str] = (), supply: str | None = None) -> Model:
     """Return the model of a servo.
 
     Parameters
@@ -54,6 +54,8 @@ def model_of(servo: str, name: str | None, change: Sequence[str], among: Sequenc
         Names that are allowed; all unless given.
     register : sequence of str
         Words of `--register`; they come first.
+    supply : str, optional
+        Words of `--supply`; what `--set` says comes after it.
 
     Raises
     ------
@@ -68,12 +70,12 @@ def model_of(servo: str, name: str | None, change: Sequence[str], among: Sequenc
     from servotwin.models import default_model
 
     kind = None if name is None else class_of(name, among)
-    changed = servo_of(servo, change, register)
+    changed = servo_of(servo, change, register, supply)
     return default_model(changed) if kind is None else kind(changed)
 
 
-def servo_of(servo: str, change: Sequence[str], register: Sequence[str] = ()) -> Servo:
-    """Return a servo with the registers that `--register` sets, and then the parameters that `--set` changes.
+def servo_of(servo: str, change: Sequence[str], register: Sequence[str] = (), supply: str | None = None) -> Servo:
+    """Return a servo with the registers of `--register`, on the supply of `--supply`, as `--set` changes it.
 
     Examples
     --------
@@ -84,5 +86,10 @@ def servo_of(servo: str, change: Sequence[str], register: Sequence[str] = ()) ->
     from servotwin.cli.settings import settings
     from servotwin.parameters import load_servo
 
-    loaded = with_registers(load_servo(servo), register)
-    return loaded.replace(settings(change), source="set by --set") if change else loaded
+    found = with_registers(load_servo(servo), register)
+    if supply is not None:
+        from servotwin.datasheet.conditions import on_supply
+        from servotwin.parameters import Supply
+
+        found = on_supply(found, Supply.of(supply, what="--supply"), source="set by --supply")
+    return found.replace(settings(change), source="set by --set") if change else found

@@ -45,7 +45,7 @@ SetOption = Annotated[list[str] | None, typer.Option(
     "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of all servos; repeatable; with a unit, or in SI "
     "units.", rich_help_panel=_ARM)]
 SupplyOption = Annotated[str | None, typer.Option(
-    metavar="VOLTS[:OHMS]", help="Supply that all servos share, such as 6V:0.1ohm (default: each its own).",
+    metavar=shared.SUPPLY_FORM, help=f"Supply that all servos share: {shared.SUPPLY_HELP} (default: each its own).",
     rich_help_panel=_ARM)]
 PayloadOption = Annotated[str | None, typer.Option(
     metavar="MASS", help="That the tool carries, such as 100g (default: none).", rich_help_panel=_ARM)]

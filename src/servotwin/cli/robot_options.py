@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from servotwin.cli import shared_options as shared
+
 if TYPE_CHECKING:
     from servotwin.parameters import Supply
     from servotwin.robots import Motion, Mount
@@ -35,7 +37,7 @@ RegisterOption = Annotated[list[str] | None, typer.Option(
     metavar="NAME=VALUE", help="Write a register of all servos, such as P_Coefficient=16, or a set such as "
     "lerobot; repeatable, or with commas.", rich_help_panel=ROBOT)]
 SupplyOption = Annotated[str | None, typer.Option(
-    metavar="VOLTS[:OHMS]", help="Supply that all servos share, such as 12V:0.1ohm (default: each its own).",
+    metavar=shared.SUPPLY_FORM, help=f"Supply that all servos share: {shared.SUPPLY_HELP} (default: each its own).",
     rich_help_panel=ROBOT)]
 FrictionOption = Annotated[str, typer.Option(
     metavar="HOW", help="What to do with damping and friction that the model's joints have themselves: refuse, "

@@ -176,7 +176,7 @@ def _mount(joint: str, text: str, kind: str) -> dict[str, Any]:
 
 
 def supply_of(text: str | None) -> Supply | None:
-    """Return the supply that all servos share, voltage and resistance; None where each has its own.
+    """Return the supply that all servos share; None where each has its own.
 
     Raises
     ------
@@ -190,15 +190,8 @@ def supply_of(text: str | None) -> Supply | None:
     (12.0, 0.15)
     """
     from servotwin.parameters import Supply
-    from servotwin.units.quantities import quantity
 
-    if text is None:
-        return None
-    volts, colon, ohms = (part.strip() for part in text.partition(":"))
-    if colon and not ohms:
-        raise InputError("--supply", got=text, allowed="VOLTS[:OHMS], such as 12V:0.1ohm")
-    return Supply(open_circuit_voltage=quantity("--supply", volts, "voltage", bare=True, positive=True),
-                  internal_resistance=quantity("--supply: resistance", ohms, "resistance", bare=True) if ohms else None)
+    return None if text is None else Supply.of(text, what="--supply")
 
 
 def units_of(words: Sequence[str]) -> str | dict[str, str] | None:

@@ -41,7 +41,7 @@ def parameter_table(rows: list[dict[str, Any]]) -> list[RenderableType]:
             group = table_name
         source = f"[{sources.index(row['source']) + 1}]" if row["source"] else ""
         lines.append((f"  {key}", _value(row["value"]), row["unit"], row["origin"], row["spread"], source))
-    return [table(("parameter", "value", "unit", "origin", "spread", "source"), lines, wraps="spread"), "",
+    return [table(("parameter", "value", "unit", "origin", "spread", "source"), lines), "",
             *[f"[{k}] {source}" for k, source in enumerate(sources, start=1)]]
 
 

@@ -50,6 +50,13 @@ LogRegisterOption = Annotated[list[str] | None, typer.Option(
     "--register", metavar="NAME=VALUE", help="Registers that the bus servo had (Feetech STS, Dynamixel), such as "
     "P_Coefficient=16, or a set: lerobot, lerobot-gripper; repeatable, or with commas. Of datasets of an SO-100 or "
     "SO-101 lerobot is assumed unless given.", rich_help_panel="Logs and servo")]
+SUPPLY_FORM = "VOLTS[:OHMS][:AMPERES]"
+SUPPLY_HELP = "usb (5 V, 0.5 A), or a voltage with resistance and limit of current, such as 12V:0.1ohm or 5V:0.5A"
+SupplyOption = Annotated[str | None, typer.Option(
+    metavar=SUPPLY_FORM, help=f"Supply of the servo: {SUPPLY_HELP} (default: its own).", rich_help_panel=PLANT)]
+LogSupplyOption = Annotated[str | None, typer.Option(
+    "--supply", metavar=SUPPLY_FORM, help=f"Supply that the servo had: {SUPPLY_HELP} (default: its own); a voltage "
+    "that a log has beside it comes before.", rich_help_panel="Logs and servo")]
 SchedulerOption = Annotated[str | None, typer.Option(
     metavar="ADDRESS", help="Run on the workers of a dask scheduler, such as tcp://host:8786.", rich_help_panel=OUTPUT)]
 AccuracyOption = Annotated[float, typer.Option(

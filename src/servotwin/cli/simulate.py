@@ -56,6 +56,7 @@ def simulate(
         "supply.current_limit=1A; repeatable; with a unit, or in SI units.",
         rich_help_panel=shared.PLANT)] = None,
     register: shared.RegisterOption = None,
+    supply: shared.SupplyOption = None,
     seed: Annotated[int, typer.Option(
         metavar="NUMBER", help="Seed for the noise of the potentiometer.", rich_help_panel=shared.PLANT)] = 0,
     duration: shared.DurationOption = 1.5,
@@ -77,7 +78,7 @@ def simulate(
     words = CommandWords(step=step, ramp=ramp, sine=sine, chirp=chirp, prbs=prbs, constant=constant, pulses=pulses,
                          command=command, unit=unit, at=at, over=over, hold=hold, column=column)
     targets = _checked_targets(out, plot, servo, words, load or [], force=force)
-    made = model_of(servo, model, change or [], register=register or [])
+    made = model_of(servo, model, change or [], register=register or [], supply=supply)
     result = _run(made, words, load or [], duration, output_step, seed)
     found = _write(result, targets, force=force)
     if duration <= _LONGEST_RANGED:

@@ -46,6 +46,7 @@ def sweep(
         "--set", metavar="GROUP.NAME=VALUE",
         help="Change a nominal parameter, or add one that the servo lacks; repeatable; with a unit, or in SI units.",
         rich_help_panel=shared.PLANT)] = None,
+    supply: shared.SupplyOption = None,
     vary: Annotated[list[str] | None, typer.Option(
         metavar="NAME=DISTRIBUTION", help="Draw a parameter of the servo or load, repeatable: normal:10%, uniform:10%, "
         "uniform:4us..8us, normal:3ohm±0.3ohm, lognormal:10%, triangular:4us..6us..8us, choice:brake,coast. A single "
@@ -90,7 +91,7 @@ def sweep(
     words = CommandWords(step=step, ramp=ramp, sine=sine, chirp=chirp, prbs=prbs, constant=constant, pulses=pulses,
                          command=command, unit=unit, at=at, over=over, hold=hold, column=column)
     _check_options(out, resume=resume, plot=plot, varies=bool(vary or from_file or draws))
-    nominal = model_of(servo, model, change or [])
+    nominal = model_of(servo, model, change or [], supply=supply)
     study = _run(nominal, words, load or [], metric or [], {
         "duration": duration, "vary": _varied(nominal, vary or [], from_file=from_file), "draws": _draws(draws),
         "lanes": lanes, "seed": seed, "sampling": sampling, "truncate": truncate, "output_step": output_step,

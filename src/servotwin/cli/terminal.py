@@ -10,13 +10,18 @@ import os
 import shlex
 import subprocess
 import sys
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from servotwin.cli.layout import pair_lines, table_lines, text_lines
+
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     import typer
-    from rich.console import RenderableType
+    from rich.console import Console, ConsoleOptions, RenderableType
+
+    from servotwin.cli.layout import Line
 
 _PIPE_WIDTH = 120  # characters of a line where no terminal says how wide it is
 
@@ -76,7 +81,7 @@ def json_text(data: Any) -> str:
 
 
 def show(*parts: RenderableType) -> None:
-    """Write tables and texts as `rich` draws them, as wide as the terminal.
+    """Write tables and texts, no wider than the terminal.
 
     Examples
     --------
@@ -84,15 +89,25 @@ def show(*parts: RenderableType) -> None:
     one
     two
     """
+    terminal = sys.stdout is not None and sys.stdout.isatty()
+    emit(drawn(parts, None if terminal or os.environ.get("COLUMNS", "").isdigit() else _PIPE_WIDTH, terminal=terminal))
+
+
+def drawn(parts: Sequence[RenderableType], width: int | None, *, terminal: bool = False) -> str:
+    r"""Return tables and texts as they are drawn in a width, that of the terminal unless given.
+
+    Examples
+    --------
+    >>> drawn(["a word, and more of them"], 20)
+    'a word, and more of\nthem'
+    """
     from rich.console import Console
 
     page = io.StringIO()
-    terminal = sys.stdout is not None and sys.stdout.isatty()
-    width = None if terminal or os.environ.get("COLUMNS", "").isdigit() else _PIPE_WIDTH
     console = Console(file=page, force_terminal=terminal, width=width, markup=False, highlight=False, emoji=False)
     for part in parts:
-        console.print(part)
-    emit("\n".join(line.rstrip() for line in page.getvalue().rstrip("\n").split("\n")))
+        console.print(_Drawn(partial(text_lines, part)) if isinstance(part, str) else part, crop=False)
+    return "\n".join(line.rstrip() for line in page.getvalue().rstrip("\n").split("\n"))
 
 
 @contextlib.contextmanager
@@ -152,6 +167,22 @@ def typed(*words: object) -> str:
     return subprocess.list2cmdline(texts) if os.name == "nt" else shlex.join(texts)
 
 
+class _Drawn:
+    """Lines that are laid out when the width of the terminal is known."""
+
+    def __init__(self, lines: Callable[[int], list[Line]]) -> None:
+        self.lines = lines
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[RenderableType]:
+        """Give each line to `rich`, which draws the bold part of it where the terminal can."""
+        from rich.text import Text
+
+        for line in self.lines(options.max_width):
+            drawn = Text(line.text, no_wrap=True, overflow="ignore")
+            drawn.stylize("bold", 0, line.bold)
+            yield drawn
+
+
 def pairs(rows: Sequence[tuple[str, str]]) -> RenderableType:
     """Return labels and texts side by side.
 
@@ -161,18 +192,11 @@ def pairs(rows: Sequence[tuple[str, str]]) -> RenderableType:
       final angle  180.00 deg
       energy       1 J
     """
-    from rich.table import Table
-
-    drawn = Table.grid(padding=(0, 2))
-    drawn.add_column(no_wrap=True, style="bold")
-    drawn.add_column(overflow="fold")
-    for label, text in rows:
-        drawn.add_row("  " + label, text)
-    return drawn
+    return _Drawn(partial(pair_lines, rows))
 
 
-def table(header: Sequence[str], rows: Sequence[Sequence[str]], *, wraps: str = "") -> RenderableType:
-    """Return a table without frame; only the column `wraps` may break its lines.
+def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> RenderableType:
+    """Return a table without frame, of which no number is cut however narrow the terminal: `layout` says how.
 
     Examples
     --------
@@ -180,11 +204,4 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]], *, wraps: str = 
     id  torque
     a   1 N m
     """
-    from rich.table import Table
-
-    drawn = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="bold")
-    for name in header:
-        drawn.add_column(name, no_wrap=name != wraps, overflow="fold")
-    for row in rows:
-        drawn.add_row(*row)
-    return drawn
+    return _Drawn(partial(table_lines, header, rows))

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from servotwin.cli.outputs import Target
     from servotwin.identification import Log
     from servotwin.identification.fitting.validate import Validation
+    from servotwin.parameters import Servo
 
 _EXCEEDED = 1  # exit code
 _MOST_LOGS = 30
@@ -42,6 +43,7 @@ def validate(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable; with a unit, or "
         "in SI units.")] = None,
     register: shared.LogRegisterOption = None,
+    supply: shared.LogSupplyOption = None,
     nuisance: Annotated[list[str] | None, typer.Option(
         metavar="NAME", help="Effects of the rig to fit to these logs: delay, log_delay, frame_phase, "
         "frame_period, control_phase, angle_offset, angle_sag, initial_state; repeatable or with commas (default: "
@@ -61,8 +63,11 @@ def validate(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.")] = False,
 ) -> None:
     """Compare a servo with logs, and say how far it is off."""
+    from servotwin.cli.model_words import servo_of
+
     targets = _targets(report, [Path(servo), *logs], force=force)
-    found = _run(servo, model, change or [], register or [], nuisance, sensors, mend, lambda: log_reading.read(
+    changed = servo_of(servo, change or [], register or [], supply)
+    found = _run(changed, model, nuisance, sensors, mend, lambda: log_reading.read(
         logs, file_format, columns, joint, leave_out or [], mend=mend, rate=rate, commanded=commanded, force=force,
         quiet=as_json, registers=bool(register)), force=force, quiet=as_json)
     limits = _limits(found, max_error or [])
@@ -81,21 +86,19 @@ def _targets(report: Path | None, inputs: list[Path], *, force: bool) -> list[Ta
     return targets
 
 
-def _run(servo: str, model: str | None, change: list[str], register: list[str], nuisance: list[str] | None,
-         sensors: list[str] | None, mend: list[str] | None, read: Callable[[], list[Log]], *, force: bool,
-         quiet: bool) -> Validation:
+def _run(servo: Servo, model: str | None, nuisance: list[str] | None, sensors: list[str] | None,
+         mend: list[str] | None, read: Callable[[], list[Log]], *, force: bool, quiet: bool) -> Validation:
     from servotwin.cli import fit_words
-    from servotwin.cli.model_words import class_of, servo_of
+    from servotwin.cli.model_words import class_of
     from servotwin.identification.fitting.checks import checked_servo
     from servotwin.identification.fitting.validate import recorded_model
     from servotwin.identification.fitting.validate import validate as run
 
     kind = None if model is None else class_of(model, fit_words.MODEL_NAMES)
-    changed = servo_of(servo, change, register)
     fitted = fit_words.some_or_none("--nuisance", nuisance, ())
-    nominal = checked_servo(changed, recorded_model(changed) if kind is None else kind)
+    nominal = checked_servo(servo, recorded_model(servo) if kind is None else kind)
     logs = log_reading.about_the_middle(read(), nominal, force=force, quiet=quiet)
-    return run(logs, changed, kind, mend=fit_words.kinds(mend), nuisance=fitted, sensors=fit_words.names(sensors),
+    return run(logs, servo, kind, mend=fit_words.kinds(mend), nuisance=fitted, sensors=fit_words.names(sensors),
                progress=True)
 
 
@@ -184,4 +187,4 @@ def _log_table(found: Validation) -> Any:
         rows.append((error.log, error.motion or "other", f"{error.rms * factor:.3g} {unit}",
                      f"{error.largest * factor:.3g} {unit}"))
     more = f"log ({_MOST_LOGS} worst of {len(errors)})" if len(errors) > _MOST_LOGS else "log"
-    return table((more, "motion", "rms error", "largest"), rows, wraps=more)
+    return table((more, "motion", "rms error", "largest"), rows)

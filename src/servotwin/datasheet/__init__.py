@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from servotwin.datasheet.beside import Figure, Motion, beside_flags, motion_of, printed_beside
     from servotwin.datasheet.buzzing import Buzz, Remedy, buzz
+    from servotwin.datasheet.choice import Candidate, Limits, Reason, candidate, standing_of, travel_of
     from servotwin.datasheet.curve import OperatingPoint, SpeedCurve
     from servotwin.datasheet.full_drive import FullDrive, Swing
     from servotwin.datasheet.guesses import Span
@@ -19,16 +20,18 @@ if TYPE_CHECKING:
     from servotwin.datasheet.which import Lifter, Lifters, Refused, servos_that_lift
 
 __all__ = [
-    "Bandwidth", "Buzz", "DataSheet", "Figure", "FullDrive", "Held", "Lift", "Lifter", "Lifters", "Loop", "Masses",
-    "Motion", "OperatingPoint", "Protection", "Refused", "Remedy", "Span", "SpeedCurve", "SpeedMap", "Standing",
-    "Swing", "VoltageSheet", "Warming", "beside_flags", "buzz", "curves", "lift_of", "motion_of", "printed_beside",
-    "servos_that_lift", "slow_rotor", "thermal_masses", "time_constant_of", "wheel_speed_of",
+    "Bandwidth", "Buzz", "Candidate", "DataSheet", "Figure", "FullDrive", "Held", "Lift", "Lifter", "Lifters", "Limits",
+    "Loop", "Masses", "Motion", "OperatingPoint", "Protection", "Reason", "Refused", "Remedy", "Span", "SpeedCurve",
+    "SpeedMap", "Standing", "Swing", "VoltageSheet", "Warming", "beside_flags", "buzz", "candidate", "curves",
+    "lift_of", "motion_of", "printed_beside", "servos_that_lift", "slow_rotor", "standing_of", "thermal_masses",
+    "time_constant_of", "travel_of", "wheel_speed_of",
 ]
 
 # public name -> file that defines it: `simulate` asks for ranges, and must not wait for what `curves` loads
 _FILES = {
     **dict.fromkeys(("Figure", "Motion", "beside_flags", "motion_of", "printed_beside"), "beside"),
     **dict.fromkeys(("Buzz", "Remedy", "buzz"), "buzzing"),
+    **dict.fromkeys(("Candidate", "Limits", "Reason", "candidate", "standing_of", "travel_of"), "choice"),
     **dict.fromkeys(("OperatingPoint", "SpeedCurve"), "curve"), **dict.fromkeys(("FullDrive", "Swing"), "full_drive"),
     **dict.fromkeys(("Lift", "lift_of"), "lift"), **dict.fromkeys(("Loop", "Protection", "Standing"), "loop"),
     **dict.fromkeys(("slow_rotor", "time_constant_of"), "rotor"), "Held": "holding", "Span": "guesses",

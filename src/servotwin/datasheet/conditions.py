@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from servotwin.errors import InputError
 from servotwin.parameters import printed_points
+from servotwin.parameters.quantity import SET_BY_USER
 from servotwin.physics import Temperatures, magnet_factor, winding_resistance
 from servotwin.units import is_finite
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from servotwin.models import Model
-    from servotwin.parameters import Servo
+    from servotwin.parameters import Servo, Supply
 
 _Model = TypeVar("_Model", bound="Model")
 _MOST = 2.0  # times the highest voltage that the sheet prints
@@ -61,17 +62,45 @@ def at_voltage(model: _Model, voltage: float) -> _Model:
     >>> at_voltage(st.PulseServo(st.load_servo("hitec-hs-755hb")), 4.8).servo.supply.open_circuit_voltage
     4.8
     """
-    servo = model.servo
+    return changed(model, _voltage_values(model.servo, voltage))
+
+
+def on_supply(servo: Servo, supply: Supply, *, source: str = SET_BY_USER) -> Servo:
+    """Return a servo on another supply: its voltage, resistance and limit of current replace those of the servo.
+
+    Raises
+    ------
+    InputError
+        If the supply has no voltage, or one that is not for this servo.
+
+    Examples
+    --------
+    >>> from servotwin.parameters import Supply, load_servo
+    >>> on_supply(load_servo("hitec-hs-755hb"), Supply.of("usb")).supply.current_limit
+    0.5
+    """
+    return servo.replace(supply_values(servo, supply), source=source)
+
+
+def supply_values(servo: Servo, supply: Supply) -> dict[str, Any]:
+    """Return the parameters of a servo that another supply changes, by dotted name."""
+    if supply.open_circuit_voltage is None:
+        raise InputError("open_circuit_voltage of a supply", allowed="a positive number [V]")
+    return _voltage_values(servo, supply.open_circuit_voltage) | {
+        f"supply.{name}": getattr(supply, name) for name in ("internal_resistance", "current_limit")}
+
+
+def _voltage_values(servo: Servo, voltage: float) -> dict[str, Any]:
     check_voltage(servo, voltage)
-    drop = model.value_or("supply.bridge_drop_voltage", 0.0)
-    if voltage <= drop + model.value_or("motor.brush_drop_voltage", 0.0):
+    drop = servo.supply.bridge_drop_voltage or 0.0
+    if voltage <= drop + (servo.motor.brush_drop_voltage or 0.0):
         raise InputError(f"{servo.name} does not turn at {voltage:g} V",
                          allowed="a supply that overcomes bridge, brushes and friction")
     values: dict[str, Any] = {"supply.open_circuit_voltage": voltage}
     gain, own = servo.electronics.bridge_gain, servo.supply.open_circuit_voltage
     if gain is not None and own is not None and own > drop:
         values["electronics.bridge_gain"] = gain * (voltage - drop) / (own - drop)
-    return changed(model, values)
+    return values
 
 
 def at_temperatures(model: _Model, now: Temperatures, magnet_coefficient: float) -> _Model:

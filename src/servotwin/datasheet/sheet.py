@@ -243,10 +243,11 @@ def _at(model: Model, voltage: float, lift: tuple[float, float] | None, hot: flo
         smallest_move=step, smallest_pulse=_as_pulse(model, step), move_span=moves.get(""),
         holding=with_spans(holding_errors(model, cold.stall_torque), others),
         bandwidth=bandwidths(model) if bandwidth else (), printed=printed,
-        lift=None if lift is None else _lift(model, *lift, others), loop=loop_of(model), buzz=buzz(model))
+        lift=None if lift is None else spanned_lift(model, *lift, others), loop=loop_of(model), buzz=buzz(model))
 
 
-def _lift(model: Model, mass: float, arm: float, others: Sequence[Model]) -> Lift:
+def spanned_lift(model: Model, mass: float, arm: float, others: Sequence[Model]) -> Lift:
+    """Return what a servo does with a mass [kg] on an arm [m], and by its variants the range of the error."""
     found = lift_of(model, mass, arm)
     return replace(found, held=with_spans([found.held], others, inertia=mass * arm * arm)[0])
 

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from servotwin.datasheet.conditions import at_voltage, highest_voltage
-from servotwin.datasheet.full_drive import FullDrive
-from servotwin.datasheet.lift import check_lift, swing_up
+from servotwin.datasheet.choice import Limits, candidate
+from servotwin.datasheet.lift import check_lift
 from servotwin.errors import InputError
-from servotwin.models import DigitalServo, default_model
-from servotwin.parameters import catalog_names, load_servo, printed_fact, printed_flags
+from servotwin.parameters import catalog_names, load_servo
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
-    from servotwin.models import Model
     from servotwin.parameters import Servo
 
 
@@ -111,33 +107,8 @@ def servos_that_lift(mass: float, arm: float, *, voltage: float, time: float | N
 
 
 def _judged(servo: Servo, mass: float, arm: float, voltage: float, time: float | None) -> Lifter | Refused:
-    torque, most = check_lift(mass, arm), highest_voltage(servo)
-    if voltage > 2.0 * most > 0.0:
-        return Refused(servo=servo, kind="voltage", reason=f"its sheet ends at {most:g} V")
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # said in the notes
-            drive = FullDrive(at_voltage(default_model(servo), voltage))
-    except InputError as error:
-        return Refused(servo=servo, kind="voltage", reason=str(error))
-    capable = min(drive.stall_torque, drive.starting_torque)
-    if capable <= torque:
-        return Refused(servo=servo, kind="torque", reason=f"lifts {capable:.3g} N m of {torque:.3g}")
-    swing = swing_up(drive, mass, arm)
-    if math.isnan(swing.time) or (time is not None and swing.time > time):
-        return Refused(servo=servo, kind="time", reason="creeps" if math.isnan(swing.time) else
-                       f"takes {swing.time:.2f} s")
-    weight = printed_fact(servo.sheet, "mass")
-    return Lifter(servo=servo, mass=math.nan if weight is None else weight, most_torque=capable,
-                     margin=capable / torque, time=swing.time, notes=_notes(drive.model, voltage, most))
-
-
-def _notes(model: Model, voltage: float, most: float) -> tuple[str, ...]:
-    servo = model.servo
-    notes = [f"its sheet ends at {most:g} V"] if 0.0 < most < voltage else []
-    if servo.kind != "analog":
-        notes.append(servo.kind if isinstance(model, DigitalServo) else f"{servo.kind}, computed as analog")
-    flags = printed_flags(servo)
-    notes += ["impossible sheet"] if any(flag.startswith("impossible") for flag in flags) else []
-    notes += ["sources disagree"] if any(flag.startswith("sources disagree") for flag in flags) else []
-    return tuple(notes)
+    found = candidate(servo, voltage, lift=(mass, arm), limits=Limits(time=time))
+    if found.reasons:
+        return Refused(servo=servo, kind=found.reasons[0].kind, reason=found.reasons[0].text)
+    return Lifter(servo=servo, mass=found.mass, most_torque=found.most_torque, margin=found.margin, time=found.time,
+                  notes=found.notes)

@@ -225,6 +225,32 @@ class Supply(Group):
     current_limit: float | None = parameter(
         "", "current", POSITIVE, "most that the source gives", THEORY.of(0.01, 100.0))
 
+    @classmethod
+    def of(cls, text: str, *, what: str = "supply") -> Supply:
+        """Return the supply that a text names, such as "usb", "12V:0.1ohm" or "5V:0.5A".
+
+        Parameters
+        ----------
+        text : str
+            "usb" (5 V, 0.5 A), or a voltage and, each after a colon, resistance and limit of current; numbers without
+            a unit are volts and ohms.
+        what : str
+            What to call it in an error.
+
+        Raises
+        ------
+        InputError
+            If it has another form.
+
+        Examples
+        --------
+        >>> Supply.of("usb") == Supply.of("5V:0.5A"), Supply.of("12:0.15").internal_resistance
+        (True, 0.15)
+        """
+        from servotwin.parameters.supplies import supply_numbers
+
+        return cls(**supply_numbers(text, what))
+
     def _relations(self) -> Iterator[Relation]:
         yield from self._less("bridge_drop_voltage", "open_circuit_voltage")
 

@@ -27,6 +27,7 @@ _NUMBERS = ("winding_capacity", "housing_capacity", "winding_to_housing", "housi
             "magnet_coefficient")
 _DUTIES = ("firmware.torque_limit", "firmware.duty_limit")
 _LONGEST = 3600.0  # s; what is not too hot by then never gets so
+_SOON = 600.0  # s
 _STEPS = 720
 _MELTED = 1e4  # K; beyond it numbers say nothing
 
@@ -47,6 +48,8 @@ class Heating:
         Of the housing, at which the program trips; inf where it does not [K].
     trip_time : float
         When it gets so hot, likewise [s].
+    soon : Temperatures
+        After ten minutes, beginning cool [K].
     masses : Masses
     """
 
@@ -56,6 +59,7 @@ class Heating:
     limit_time: float
     trip_temperature: float
     trip_time: float
+    soon: Temperatures
     masses: Masses
 
 
@@ -152,15 +156,20 @@ def heating(heat: float, mean_winding: float, masses: Masses, trip_temperature: 
     slope = COPPER_COEFFICIENT * cold * per_watt
     first = cold * per_watt * float(winding_resistance(masses.ambient, 1.0))
     rise = math.inf if slope >= 1.0 else first / (1.0 - slope)
-    winding_time, housing_time = _passing(cold, masses, WIRE_LIMIT, trip_temperature)
+    winding_time, housing_time, soon = _passing(cold, masses, WIRE_LIMIT, trip_temperature)
     return Heating(
         heat=heat, winding=masses.ambient + rise, housing=masses.ambient + rise * masses.housing_to_ambient / per_watt,
-        limit_time=winding_time, trip_temperature=trip_temperature, trip_time=housing_time, masses=masses)
+        limit_time=winding_time, trip_temperature=trip_temperature, trip_time=housing_time, soon=soon,
+        masses=masses)
 
 
-def _passing(cold: float, masses: Masses, winding: float, housing: float) -> tuple[float, float]:
-    """Return when winding and housing pass temperatures [K], of a heat [W] made at the reference temperature."""
+def _passing(cold: float, masses: Masses, winding: float, housing: float) -> tuple[float, float, Temperatures]:
+    """Return when winding and housing pass temperatures [K], of a heat [W] made at the reference temperature.
+
+    And the temperatures after ten minutes.
+    """
     now, step, found = Temperatures(masses.ambient, masses.ambient), _LONGEST / _STEPS, [math.nan, math.nan]
+    soon = now
     for k in range(_STEPS):
         if now.winding > _MELTED:
             break
@@ -169,7 +178,8 @@ def _passing(cold: float, masses: Masses, winding: float, housing: float) -> tup
             if math.isnan(found[at]) and new > limit:
                 found[at] = step * (k + float((limit - old) / (new - old)))
         now = Temperatures(float(after.winding), float(after.housing))
-    return found[0], found[1]
+        soon = now if (k + 1) * step <= _SOON else soon
+    return found[0], found[1], soon
 
 
 def lasting_torque(model: Model, masses: Masses) -> float:

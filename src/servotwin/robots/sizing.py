@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.datasheet.conditions import at_voltage, changed
+from servotwin.datasheet.conditions import at_voltage, changed, supply_values
 from servotwin.datasheet.curve import SpeedCurve, speed_curve
 from servotwin.datasheet.warming import WIRE_LIMIT, thermal_masses
 from servotwin.errors import InputError
@@ -201,10 +201,7 @@ def supplied(model: Model, supply: Supply | None) -> Model:
         model = BoundedServo(model.servo)
     if supply is None:
         return model
-    if supply.open_circuit_voltage is None:
-        raise InputError("open_circuit_voltage of a shared supply", allowed="a positive number [V]")
-    values = {f"supply.{name}": getattr(supply, name) for name in ("internal_resistance", "current_limit")}
-    return changed(at_voltage(model, supply.open_circuit_voltage), values)
+    return changed(model, supply_values(model.servo, supply))
 
 
 def shaft_demand(speed: Array, torque: Array, gain: float) -> Demand:
