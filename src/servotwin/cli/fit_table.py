@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from servotwin.parameters import Quantity
 
 
-def calibrate_from(path: Path, servo: str | None, out: Path | None, *, change: Sequence[str] = (), supply: str | None = None,
-                   arm: str | None = None, columns: Sequence[str] = (), force: bool = False,
+def calibrate_from(path: Path, servo: str | None, out: Path | None, *, change: Sequence[str] = (),
+                   supply: str | None = None, arm: str | None = None, columns: Sequence[str] = (), force: bool = False,
                    as_json: bool = False) -> None:
     """Calibrate from a table, show what was found, and write the servo.
 
