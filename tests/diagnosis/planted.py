@@ -13,10 +13,11 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
+
 import servotwin as st
 from servotwin.datasheet import thermal_masses
 from servotwin.loads import Constant, Inertia, Load
-from servotwin.models import DigitalServo, Model, default_model, mid_travel
+from servotwin.models import Model, default_model, mid_travel
 from servotwin.simulation.arrival import resolution
 
 ANALOG = ("hitec-hs-422", "hitec-hs-755hb", "hitec-hs-485hb", "futaba-s3003", "towerpro-sg90", "hitec-hs-645mg",
@@ -33,6 +34,8 @@ SYMPTOMS: dict[str, tuple[str, ...]] = {
 }
 STEP, SMALL, AT, LATER = math.radians(60.0), math.radians(3.0), 0.1, 2.0
 _CLEAR = 1.1  # times its threshold that a planted symptom is
+_HEALTHY = 0.8
+_NEAR = 0.25  # of an overshoot that a cause can make large before the shaft swings for ever
 _LEVELS = 12
 
 
@@ -188,7 +191,7 @@ def warmth(model: Model, heat: float) -> float:
 
 def healthy(made: Base) -> bool:
     """Tell whether a servo shows no symptom, with some distance."""
-    return max(shown(made.servo, made.load).values()) < 0.8
+    return max(shown(made.servo, made.load).values()) < _HEALTHY
 
 
 def drawn(rng: random.Random, symptom: str, cause: str) -> Planted:
@@ -196,7 +199,10 @@ def drawn(rng: random.Random, symptom: str, cause: str) -> Planted:
     kinds = (BUS,) if symptom == "trips" else (ANALOG, DIGITAL, BUS)
     while True:
         made = base(rng, rng.choice(kinds))
-        if grown(made, symptom, cause, 1) is None or not healthy(made):
+        if grown(made, symptom, cause, 1) is None:
+            continue
+        begins = shown(made.servo, made.load)
+        if max(begins.values()) >= _HEALTHY or (symptom == "overshoots" and begins[symptom] < _NEAR):
             continue
         for n in range(1, _LEVELS):
             more = grown(made, symptom, cause, n)
