@@ -136,9 +136,9 @@ def grown(made: Base, symptom: str, cause: str, n: int) -> tuple[Any, Load, str]
         return None if torque > 1.2 * stall else (servo, heavy, f"{torque / stall:.0%} of the stall torque")
 
     def register() -> Any:
-        if servo.firmware.overload_duty is None:
+        if servo.firmware.trip_current is None:
             return None
-        return changed("firmware.overload_duty", servo.firmware.overload_duty * 0.75**n, "register")
+        return changed("firmware.trip_current", servo.firmware.trip_current * 0.75**n, "register")
 
     return {"deadband": deadband, "gain": gain, "play": play, "frame": frame, "friction": friction, "supply": supply,
             "load": heavier, "register": register}[cause]()

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 _HALVINGS = 5
 _SPEAKS = 0.05  # of a symptom: what takes less away is no cause
+_SEARCHED = 3  # causes whose least change is looked for where a number is unusual
 _PAIRED = 0.5  # of a symptom, that two take away together and neither alone
 
 
@@ -65,7 +66,7 @@ class Cause(NamedTuple):
     def cure(self) -> str:
         """What to do, with its number."""
         number = self.number
-        value = number.factor * (self.needed if self.cures else self.end)
+        value = number.factor * (self.end if math.isnan(self.needed) else self.needed)
         return number.cure.format(f"{rounded(value, up=number.rises)} {number.unit}".strip())
 
 
@@ -161,7 +162,9 @@ def ranked(trials: Trials) -> tuple[list[Cause], tuple[Cause, Cause] | None]:
     for each in found:
         if each.cause not in best or _rank(each) < _rank(best[each.cause]):
             best[each.cause] = each
-    curing = [trials.with_need(each) for each in best.values() if each.cures]
+    curing = sorted((each for each in best.values() if each.cures), key=_rank)
+    looked_at = len(curing) if not (curing and curing[0].odd > 1.0) else _SEARCHED  # the rest is not told apart by it
+    curing = [trials.with_need(each) if k < looked_at else each for k, each in enumerate(curing)]
     others = [each for each in best.values() if not each.cures]
     causes = sorted([*curing, *(each for each in others if each.share >= _SPEAKS)], key=_rank)
     return causes, None if curing else trials.pair(list(best.values()))
