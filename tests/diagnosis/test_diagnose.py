@@ -35,7 +35,7 @@ def test_nothing_is_found_in_healthy_servos():
 
 def test_a_cure_cures():
     servo = st.load_servo("hitec-hs-422").replace({"supply.internal_resistance": 8.0})
-    load = st.loads.Constant(0.15)
+    load = st.loads.Constant(0.08)
     found = {each.symptom.name: each for each in st.diagnose(servo, load=load).findings}["sags"]
     first = found.causes[0]
     assert (first.cause, first.cures) == ("supply", True)

@@ -54,7 +54,7 @@ def doctor(
     seed: Annotated[int, typer.Option(
         metavar="NUMBER", help="Seed for the noise of the potentiometer.", rich_help_panel=shared.PLANT)] = 0,
     duration: Annotated[float | None, typer.Option(
-        metavar="SECONDS", help="Time to simulate (default 4 to 6, and what protections wait).",
+        metavar="SECONDS", help="Time to simulate (default 6, or more where a protection waits longer).",
         rich_help_panel=shared.OUTPUT)] = None,
     file_format: log_reading.FormatOption = "auto",
     columns: log_reading.ColumnsOption = None,

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 _WIDE, _SMALL = math.radians(60.0), math.radians(3.0)
 _AT, _LATER = 0.1, 2.0  # s
 _OTHERS = (math.radians(-7.3), math.radians(4.1))  # targets beside the middle, where a buzz has to be gone too
-_DURATION, _SHORTEST = 6.0, 4.0  # s of pulse servos, of digital ones
+_DURATION = 6.0  # s
 _TRIPS_BY = 2.0  # s longer than the protection waits
 _LONGEST = 20.0  # s of a log that are run
 
@@ -114,7 +114,7 @@ def diagnose(servo: Model | Servo, command: Signal | None = None, *, load: Load 
     load : Load, optional
         Nothing unless given; of a log its own.
     duration : float, optional
-        Of the run; unless given 6 s, or 4 s and as long as protections wait of a digital servo [s].
+        Of the run; unless given 6 s, or more where a protection waits longer [s].
     log : Log, optional
         Symptoms are looked for in it too; the run then has its command, of the first 20 s.
     seed : int
@@ -145,7 +145,7 @@ def _lasts(model: Model) -> float:
     if not isinstance(model, DigitalServo):
         return _DURATION
     firmware = model.servo.firmware
-    return max(_SHORTEST, _TRIPS_BY + max(firmware.overload_time or 0.0, firmware.trip_time or 0.0))
+    return max(_DURATION, _TRIPS_BY + max(firmware.overload_time or 0.0, firmware.trip_time or 0.0))
 
 
 def _check(model: Model, command: Signal | None, duration: float, log: Log | None) -> None:
@@ -166,30 +166,35 @@ def _diagnosed(model: Model, command: Signal | None, load: Load, duration: float
         command, duration = log.signal(), log.duration
         angle = angle_of(log, model)
         initial = {"output_angle": float(angle[np.isfinite(angle)][0])}
-    own = command is None or (command.edges is None and command.frame_period is None)
-    patient = patient_of(model, load, own_frames=own)
-    runs = _Runs(_commands(model, command), duration, seed, initial)
-    records = {name: runs.record(patient, name) for name in runs.commands if name in _SHOWN}
-    if log is not None and command is not None:
         seen = of_log(log, model, simulate(model, command, duration=duration, load=load, initial=initial,
                                            output_times=log.time - log.start)["command_angle"])
-    masses, findings, log_only, untold = thermal_masses(model.servo), [], [], []
+    own = command is None or (command.edges is None and command.frame_period is None)
+    runs = _Runs(_commands(model, command), duration, seed, initial)
+    return _judged(patient_of(model, load, own_frames=own), runs, seen)
+
+
+def _judged(patient: Patient, runs: _Runs, seen: Record | None) -> Diagnosis:
+    """Return which symptoms the runs of a patient show, each with its causes, beside those of a log."""
+    records = {name: runs.record(patient, name) for name in runs.commands if name in _SHOWN}
+    masses = thermal_masses(patient.model.servo)
+    findings, log_only, untold = [], [], []
     hidden: set[tuple[str, str]] = set()
     for symptom in SYMPTOMS:
         judged = {name: symptom.judge(record, masses) for name, record in records.items()
                   if name != "small" or symptom.name == "does not move"}
         name = max(judged, key=lambda each: -math.inf if math.isnan(judged[each].value) else judged[each].value)
         in_log = None if seen is None else symptom.judge(seen, masses)
-        if judged[name].found and (name, symptom.name) not in hidden:
+        told = (name, symptom.name) not in hidden
+        if judged[name].found and told:
             causes, pair = ranked(Trials(patient, runs.strength(symptom, name, records[name].finest)))
             findings.append(Finding(symptom=symptom, run=judged[name], log=in_log, command=name, record=records[name],
                                     causes=tuple(causes), pair=pair))
             hidden |= {(name, each) for each in symptom.hides}
-        elif in_log is not None and in_log.found and (name, symptom.name) not in hidden:
+        elif in_log is not None and in_log.found and told:
             log_only.append(symptom.name)
         if math.isnan(judged[name].value) and (in_log is None or math.isnan(in_log.value)):
             untold.append(symptom.name)
-    return Diagnosis(model=model, findings=tuple(findings), log_only=tuple(log_only), untold=tuple(untold))
+    return Diagnosis(model=patient.model, findings=tuple(findings), log_only=tuple(log_only), untold=tuple(untold))
 
 
 def _commands(model: Model, command: Signal | None) -> dict[str, Signal]:

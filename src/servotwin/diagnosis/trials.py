@@ -167,7 +167,8 @@ def ranked(trials: Trials) -> tuple[list[Cause], tuple[Cause, Cause] | None]:
     curing = [trials.with_need(each) if k < looked_at else each for k, each in enumerate(curing)]
     others = [each for each in best.values() if not each.cures]
     causes = sorted([*curing, *(each for each in others if each.share >= _SPEAKS)], key=_rank)
-    return causes, None if curing else trials.pair(list(best.values()))
+    return causes, None if curing else trials.pair(
+        [each for each in found if each.odd > 1.0 or each is best[each.cause]])
 
 
 def _rank(cause: Cause) -> tuple[float, ...]:
