@@ -21,13 +21,14 @@ _LAZY = {
     **dict.fromkeys(("Batch", "Fleet", "Result", "Simulator", "State", "Status", "grid", "simulate", "simulate_bus",
                      "simulate_many", "VectorSimulator"), "simulation"),
     **dict.fromkeys(("DataSheet", "curves", "servos_that_lift"), "datasheet"),
+    "Diagnosis": "diagnosis", "diagnose": "diagnosis",
     **dict.fromkeys(("Study", "distributions", "sweep"), "studies"),
     **dict.fromkeys(("Log", "read_logs"), "logs"),
     **dict.fromkeys(("Fit", "Sheet", "SheetPoint", "advise", "friction_ladder", "identify", "servo_from_sheet",
                      "validate"), "identification"),
 }
-_MODULES = ("bench", "control", "datasheet", "errors", "identification", "linear", "loads", "logs", "models",
-            "parameters", "physics", "plotting", "robots", "signals", "simulation", "studies", "units", "web")
+_MODULES = ("bench", "control", "datasheet", "diagnosis", "errors", "identification", "linear", "loads", "logs",
+            "models", "parameters", "physics", "plotting", "robots", "signals", "simulation", "studies", "units", "web")
 
 __all__ = ["__version__", *_LAZY, *_MODULES]
 

@@ -1,6 +1,7 @@
 from servotwin import bench as bench
 from servotwin import control as control
 from servotwin import datasheet as datasheet
+from servotwin import diagnosis as diagnosis
 from servotwin import errors as errors
 from servotwin import identification as identification
 from servotwin import linear as linear
@@ -18,6 +19,8 @@ from servotwin import units as units
 from servotwin.datasheet import DataSheet as DataSheet
 from servotwin.datasheet import curves as curves
 from servotwin.datasheet import servos_that_lift as servos_that_lift
+from servotwin.diagnosis import Diagnosis as Diagnosis
+from servotwin.diagnosis import diagnose as diagnose
 from servotwin.identification import Fit as Fit
 from servotwin.identification import Sheet as Sheet
 from servotwin.identification import SheetPoint as SheetPoint

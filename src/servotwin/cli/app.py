@@ -10,6 +10,7 @@ from servotwin import __version__
 from servotwin.cli.bench import bench
 from servotwin.cli.catalog import catalog
 from servotwin.cli.curves import curves
+from servotwin.cli.doctor import doctor
 from servotwin.cli.fit import fit
 from servotwin.cli.linear import linear
 from servotwin.cli.log import EPILOG as LOG_EPILOG
@@ -72,6 +73,11 @@ app.command("fit", help="Find the parameters of a servo, with intervals, from it
 app.command("validate", help="Compare a servo with logs, and say how far it is off.",
             epilog="Example: servotwin validate my-servo.toml new-runs/ --max-error 3deg --report check.html")(validate)
 app.command("log", help=LOG_HELP, epilog=LOG_EPILOG)(log)
+app.command("doctor", help="Say why a servo buzzes, sags, overshoots, gets warm, trips or does not move; alone: look "
+            "at this installation.",
+            epilog="Example: servotwin doctor hitec-hs-422 --load arm=0.3kg:10cm --set gear.backlash=1deg\n\n"
+                   "Example: servotwin doctor my-servo.toml run.csv\n\n"
+                   "Example: servotwin doctor")(doctor)
 app.command("web", help="Open the bench in a browser: turn a servo, and watch its pulses, currents and angles.",
             epilog="Example: servotwin web hitec-hs-755hb\n\n"
                    "Example: servotwin web --lesson deadband\n\n"

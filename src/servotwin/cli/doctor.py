@@ -1,0 +1,121 @@
+"""`servotwin doctor`: why a servo buzzes, sags, overshoots, gets warm, trips or does not move; or this installation."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from servotwin.cli import log_reading
+from servotwin.cli import shared_options as shared
+from servotwin.cli.terminal import emit_json, patience, show
+
+if TYPE_CHECKING:
+    from servotwin.cli.command_words import CommandWords
+    from servotwin.logs import Log
+
+_LONGEST = 60.0  # s: every cause asks for a run of as much
+_MODELS = ("digital", "pulse", "pulse-inductive", "bounded")
+
+
+def doctor(
+    servo: Annotated[str | None, typer.Argument(
+        help="Catalog id, or path of a servo file (.toml); none: look at this installation.")] = None,
+    log: Annotated[Path | None, typer.Argument(
+        metavar="LOG", help="A log of this servo: the symptoms are looked for in it too, and its command is run.")]
+    = None,
+    step: shared.StepOption = None,
+    ramp: shared.RampOption = None,
+    sine: shared.SineOption = None,
+    chirp: shared.ChirpOption = None,
+    prbs: shared.PrbsOption = None,
+    constant: shared.ConstantOption = None,
+    pulses: shared.PulsesOption = None,
+    command: shared.CommandOption = None,
+    unit: Annotated[str | None, typer.Option(
+        metavar="UNIT", help="Unit of the command: deg (default), rad, us, ms, s, V or mV.",
+        rich_help_panel=shared.COMMAND)] = None,
+    at: shared.AtOption = None,
+    over: shared.OverOption = None,
+    hold: shared.HoldOption = None,
+    column: shared.ColumnOption = None,
+    model: Annotated[str | None, typer.Option(
+        metavar="MODEL", help="digital, pulse, pulse-inductive or bounded (default: by the kind of the servo).",
+        rich_help_panel=shared.PLANT)] = None,
+    load: Annotated[list[str] | None, typer.Option(
+        metavar="PART=VALUE", help="Load on the shaft, as of simulate: torque=0.5kgf.cm, inertia=1e-4, "
+        "arm=0.5kg:10cm; repeatable or with commas.", rich_help_panel=shared.PLANT)] = None,
+    change: Annotated[list[str] | None, typer.Option(
+        "--set", metavar="GROUP.NAME=VALUE", help="Change or add a parameter, such as supply.internal_resistance=2ohm; "
+        "repeatable; with a unit, or in SI units.", rich_help_panel=shared.PLANT)] = None,
+    register: shared.RegisterOption = None,
+    seed: Annotated[int, typer.Option(
+        metavar="NUMBER", help="Seed for the noise of the potentiometer.", rich_help_panel=shared.PLANT)] = 0,
+    duration: Annotated[float | None, typer.Option(
+        metavar="SECONDS", help="Time to simulate (default 6, or more where a protection waits longer).",
+        rich_help_panel=shared.OUTPUT)] = None,
+    file_format: log_reading.FormatOption = "auto",
+    columns: log_reading.ColumnsOption = None,
+    as_json: shared.JsonOption = False,
+) -> None:
+    """Say why a servo buzzes, sags, overshoots, gets warm, trips or does not move; alone: look at this installation."""
+    from servotwin.cli.command_words import CommandWords
+
+    words = CommandWords(step=step, ramp=ramp, sine=sine, chirp=chirp, prbs=prbs, constant=constant, pulses=pulses,
+                         command=command, unit=unit, at=at, over=over, hold=hold, column=column)
+    if servo is None:
+        _look_at_installation(given=words != CommandWords() or bool(load or change or register or model or duration),
+                              as_json=as_json)
+        return
+    read = None if log is None else _log(log, file_format, columns, registers=bool(register), quiet=as_json)
+    _diagnose(servo, read, words, {"model": model, "load": load or [], "change": change or [],
+                                   "register": register or []}, duration, seed, as_json=as_json)
+
+
+def _look_at_installation(*, given: bool, as_json: bool) -> None:
+    from servotwin.cli import installation
+    from servotwin.errors import InputError
+
+    if given:
+        raise InputError("doctor", got="options of a servo, but no servo", allowed="a catalog id or a servo file first")
+    found = installation.facts()
+    if as_json:
+        emit_json(found)
+        return
+    show(*installation.parts(found))
+
+
+def _log(path: Path, file_format: str, columns: list[str] | None, *, registers: bool, quiet: bool) -> Log:
+    from servotwin.errors import InputError
+
+    logs = log_reading.read([path], file_format, columns, None, [], quiet=quiet, registers=registers)
+    if len(logs) != 1:
+        raise InputError(str(path), got=f"{len(logs)} logs", allowed="one, such as a single file")
+    return logs[0]
+
+
+def _diagnose(servo: str, log: Log | None, words: CommandWords, plant: dict[str, Any], duration: float | None,
+              seed: int, *, as_json: bool) -> None:
+    from servotwin.cli import doctor_words, load_words
+    from servotwin.cli.command_words import CommandWords
+    from servotwin.cli.model_words import model_of
+    from servotwin.diagnosis import diagnose
+    from servotwin.errors import CommandError, InputError
+
+    if duration is not None and not (math.isfinite(duration) and 0.0 < duration <= _LONGEST):
+        raise InputError("--duration", got=duration, allowed=f"a positive number of seconds up to {_LONGEST:g}")
+    if log is not None and words != CommandWords():
+        raise CommandError("a command beside a log", got=f"--{words.shape}", allowed="one of them: a log has its own")
+    made = model_of(servo, plant["model"], plant["change"], _MODELS, plant["register"])
+    signal = None if words == CommandWords() else words.signal(duration or _LONGEST)
+    with patience("taking causes away"):
+        found = diagnose(made, signal, load=load_words.load_from(plant["load"], made), duration=duration, log=log,
+                         seed=seed)
+    facts = doctor_words.facts(found, command=None if signal is None else words.described(duration or _LONGEST),
+                               load=load_words.described(plant["load"]), log=None if log is None else log.name)
+    if as_json:
+        emit_json(facts)
+        return
+    show(*doctor_words.parts(found, facts))

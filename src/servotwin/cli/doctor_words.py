@@ -1,0 +1,106 @@
+"""A diagnosis as rows of text, and as facts for JSON."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from servotwin.cli.rest_words import rest_words
+from servotwin.cli.terminal import pairs, table
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from servotwin.diagnosis import Cause, Diagnosis, Finding
+
+_COMMANDS = {"wide": "in a step of 60 deg", "small": "in a step of 3 deg", "given": "in the run"}
+
+
+def facts(found: Diagnosis, *, command: str | None, load: str, log: str | None) -> dict[str, Any]:
+    """Return a diagnosis in SI, ready for JSON."""
+    from servotwin.cli.summary import model_name
+    from servotwin.diagnosis import SYMPTOMS
+
+    return {
+        "servo": found.model.servo.name, "title": found.model.servo.title, "model": model_name(found.model),
+        "command": command or ("of the log" if log else "steps of 60 and of 3 deg"), "load": load, "log": log,
+        "findings": [_finding(each) for each in found.findings],
+        "log_only": list(found.log_only), "untold": list(found.untold),
+        "thresholds": {symptom.name: {"threshold": symptom.threshold, "source": symptom.source}
+                       for symptom in SYMPTOMS},
+    }
+
+
+def _finding(found: Finding) -> dict[str, Any]:
+    return {
+        "symptom": found.symptom.name, "words": seen_words(found), "value": found.run.value, "limit": found.run.limit,
+        "command": found.command, "log": None if found.log is None else found.log._asdict() | {
+            "found": found.log.found},
+        "causes": [_cause(each) for each in found.causes],
+        "pair": None if found.pair is None else [_cause(each) for each in found.pair],
+        "together": [each.cause for each in found.together],
+    }
+
+
+def _cause(cause: Cause) -> dict[str, Any]:
+    said = {name: value for name, value in cause._asdict().items() if name != "number"}
+    return said | {"cure": cause.cure}
+
+
+def seen_words(found: Finding) -> str:
+    """Return how a symptom shows, in the units of people."""
+    record, value, limit = found.record, found.run.value, found.run.limit
+    rest = record.rest
+    said = {
+        "trips": f"by {record.trip}",
+        "does not move": f"{100.0 * value:.0f} % of the way is missing",
+        "buzzes": "" if rest is None else rest_words(rest._replace(current=math.nan)).split(", nan A")[0],
+        "overshoots": f"by {100.0 * value:.0f} % of the step",
+        "sags": f"stands {math.degrees(value):.1f} deg off, {math.degrees(limit):.1f} allowed",
+        "gets warm": f"{value:.0f} K above the air after ten minutes, {limit:.0f} allowed",
+    }[found.symptom.name]
+    return ", ".join(filter(None, (said, _COMMANDS[found.command])))
+
+
+def parts(found: Diagnosis, said: dict[str, Any]) -> list[RenderableType]:
+    """Return a diagnosis as it is shown: symptoms, causes with their cures, and where nothing is found, thresholds."""
+    head = f"{said['title']} ({said['servo']}), model {said['model']}; {said['command']}; load {said['load']}"
+    shown: list[RenderableType] = [head]
+    for each in found.findings:
+        shown += ["", *_shown(each)]
+    if not found.findings:
+        shown += ["", "nothing found" + (" in the run" if found.log_only else "")]
+    for name in found.log_only:
+        shown += ["", f"! the log shows that it {name}, this servo does not: its file is not that servo; "
+                      "servotwin fit finds what is"]
+    if found.untold:
+        shown += ["", f"cannot be told here: {', '.join(found.untold)}"]
+    return [*shown, "", "thresholds", pairs([(name, f"{each['threshold']} ({each['source']})")
+                                             for name, each in said["thresholds"].items()])]
+
+
+def _shown(found: Finding) -> list[RenderableType]:
+    log = ""
+    if found.log is not None:
+        log = "" if math.isnan(found.log.value) else "; the log shows it too" if found.log.found else (
+            "; the log does not show it")
+    lines: list[RenderableType] = [f"{found.symptom.name}: {seen_words(found)}{log}"]
+    if found.causes:
+        lines.append(table(("cause", "cure", "goes", "usual"), [
+            (each.cause, each.cure, "all" if each.cures else f"{100.0 * each.share:.0f} %", _usual(each))
+            for each in found.causes], wraps="cure"))
+    if found.pair is not None:
+        one, other = found.pair
+        lines.append(f"only together: {one.cause} ({one.cure}) and {other.cause} ({other.cure})")
+    elif not found.causes:
+        lines.append("no cause of the table takes any of it away")
+    if found.together:
+        lines.append(f"{' and '.join(each.cause for each in found.together)} act together: either cure will do")
+    return lines
+
+
+def _usual(cause: Cause) -> str:
+    number = cause.number
+    low, high = (f"{number.factor * value:.3g}" for value in cause.usual)
+    now = f"{number.factor * cause.now:.3g}"
+    return f"{now} now, {low} to {high} {number.unit}".strip() + ("" if cause.odd == 1.0 else " *")

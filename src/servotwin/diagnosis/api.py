@@ -1,0 +1,236 @@
+"""`diagnose`: which symptoms a servo shows, and which of its numbers makes them."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from servotwin import signals
+from servotwin.datasheet import thermal_masses
+from servotwin.diagnosis.numbers import patient_of
+from servotwin.diagnosis.record import angle_of, of_log, of_run
+from servotwin.diagnosis.symptoms import SYMPTOMS
+from servotwin.diagnosis.trials import Strength, Trials, ranked
+from servotwin.errors import InputError
+from servotwin.loads import as_load
+from servotwin.models import BoundedServo, DigitalServo, PulseServo, PulseServoInductive, default_model, mid_travel
+from servotwin.parameters import Servo
+from servotwin.simulation import simulate
+from servotwin.units import is_finite
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from servotwin.diagnosis.numbers import Patient
+    from servotwin.diagnosis.record import Record
+    from servotwin.diagnosis.symptoms import Judged, Symptom
+    from servotwin.diagnosis.trials import Cause
+    from servotwin.loads import Load, Part
+    from servotwin.logs import Log
+    from servotwin.models import Model
+    from servotwin.signals import Signal
+
+_WIDE, _SMALL = math.radians(60.0), math.radians(3.0)
+_AT, _LATER = 0.1, 2.0  # s
+_OTHERS = (math.radians(-7.3), math.radians(4.1))  # targets beside the middle, where a buzz has to be gone too
+_DURATION = 6.0  # s
+_TRIPS_BY = 2.0  # s longer than the protection waits
+_LONGEST = 20.0  # s of a log that are run
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """A symptom, and what makes it.
+
+    Parameters
+    ----------
+    symptom : Symptom
+        Row of `SYMPTOMS`.
+    run, log : Judged or None
+        How strong it is in the run, and in the log; None without a log.
+    command : str
+        Of the run that shows it: "wide", "small" or "given".
+    record : Record
+        Of that run.
+    causes : tuple of Cause
+        The likeliest first.
+    pair : tuple of Cause, optional
+        Two that only act together: neither alone cures.
+    """
+
+    symptom: Symptom
+    run: Judged
+    log: Judged | None
+    command: str
+    record: Record
+    causes: tuple[Cause, ...]
+    pair: tuple[Cause, Cause] | None
+
+    @property
+    def together(self) -> tuple[Cause, ...]:
+        """The causes of which each is unusual, and without any of which the symptom is gone; empty unless several."""
+        odd = tuple(each for each in self.causes if each.cures and each.odd > 1.0)
+        return odd if len(odd) > 1 else ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Diagnosis:
+    """What a servo suffers from.
+
+    Parameters
+    ----------
+    model : Model
+    findings : tuple of Finding
+        Empty where no symptom passes its threshold.
+    log_only : tuple of str
+        Symptoms that the log shows and the servo does not.
+    untold : tuple of str
+        Symptoms that neither run nor log can show.
+    """
+
+    model: Model
+    findings: tuple[Finding, ...]
+    log_only: tuple[str, ...]
+    untold: tuple[str, ...]
+
+
+def diagnose(servo: Model | Servo, command: Signal | None = None, *, load: Load | Part | None = None,
+             duration: float | None = None, log: Log | None = None, seed: int = 0) -> Diagnosis:
+    """Return why a servo buzzes, sags, overshoots, gets warm, trips or does not move.
+
+    The symptoms are looked for in a run. Then each number of a table, `diagnosis.causes.NUMBERS`, is brought to what is
+    usual, or away altogether, alone, and the run is repeated.
+
+    Parameters
+    ----------
+    servo : Servo or Model
+        A servo that holds an angle behind a bridge.
+    command : Signal, optional
+        A step of 60° to the middle of the travel, and one of 3° from there, unless given.
+    load : Load, optional
+        Nothing unless given; of a log its own.
+    duration : float, optional
+        Of the run; unless given 6 s, or more where a protection waits longer [s].
+    log : Log, optional
+        Symptoms are looked for in it too; the run then has its command, of the first 20 s.
+    seed : int
+        Of the noise of the potentiometer.
+
+    Raises
+    ------
+    InputError
+        If the model is another, or turns without end, or there are both a command and a log.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> servo = st.load_servo("hitec-hs-422").replace({"electronics.stretcher_gain": 3000.0})
+    >>> found = diagnose(servo).findings[0]
+    >>> found.symptom.name, found.causes[0].cause
+    ('buzzes', 'gain')
+    """
+    model = default_model(servo) if isinstance(servo, Servo) else servo
+    duration = _lasts(model) if duration is None else duration
+    _check(model, command, duration, log)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        return _diagnosed(model, command, as_load(load), duration, log, seed)
+
+
+def _lasts(model: Model) -> float:
+    if not isinstance(model, DigitalServo):
+        return _DURATION
+    firmware = model.servo.firmware
+    return max(_DURATION, _TRIPS_BY + max(firmware.overload_time or 0.0, firmware.trip_time or 0.0))
+
+
+def _check(model: Model, command: Signal | None, duration: float, log: Log | None) -> None:
+    if not isinstance(model, PulseServo | PulseServoInductive | BoundedServo | DigitalServo) or model.endless:
+        raise InputError("model to diagnose", got=model, allowed="a servo that holds an angle behind a bridge")
+    if command is not None and log is not None:
+        raise InputError("command", got="a command beside a log", allowed="one of them: a log has its own")
+    if not (is_finite(duration) and duration > 0.0):
+        raise InputError("duration", got=duration, allowed="a positive number of seconds")
+
+
+def _diagnosed(model: Model, command: Signal | None, load: Load, duration: float, log: Log | None,
+               seed: int) -> Diagnosis:
+    initial, seen = None, None
+    if log is not None:
+        load, duration = (load if load != as_load(None) else log.load), min(duration, log.duration, _LONGEST)
+        log = log.part(log.start, log.start + duration)
+        command, duration = log.signal(), log.duration
+        angle = angle_of(log, model)
+        initial = {"output_angle": float(angle[np.isfinite(angle)][0])}
+        seen = of_log(log, model, simulate(model, command, duration=duration, load=load, initial=initial,
+                                           output_times=log.time - log.start)["command_angle"])
+    own = command is None or (command.edges is None and command.frame_period is None)
+    runs = _Runs(_commands(model, command), duration, seed, initial)
+    return _judged(patient_of(model, load, own_frames=own), runs, seen)
+
+
+def _judged(patient: Patient, runs: _Runs, seen: Record | None) -> Diagnosis:
+    """Return which symptoms the runs of a patient show, each with its causes, beside those of a log."""
+    records = {name: runs.record(patient, name) for name in runs.commands if name in _SHOWN}
+    masses = thermal_masses(patient.model.servo)
+    findings, log_only, untold = [], [], []
+    hidden: set[tuple[str, str]] = set()
+    for symptom in SYMPTOMS:
+        judged = {name: symptom.judge(record, masses) for name, record in records.items()
+                  if name != "small" or symptom.name == "does not move"}
+        name = max(judged, key=lambda each: -math.inf if math.isnan(judged[each].value) else judged[each].value)
+        in_log = None if seen is None else symptom.judge(seen, masses)
+        told = (name, symptom.name) not in hidden
+        if judged[name].found and told:
+            causes, pair = ranked(Trials(patient, runs.strength(symptom, name, records[name].finest)))
+            findings.append(Finding(symptom=symptom, run=judged[name], log=in_log, command=name, record=records[name],
+                                    causes=tuple(causes), pair=pair))
+            hidden |= {(name, each) for each in symptom.hides}
+        elif in_log is not None and in_log.found and told:
+            log_only.append(symptom.name)
+        if math.isnan(judged[name].value) and (in_log is None or math.isnan(in_log.value)):
+            untold.append(symptom.name)
+    return Diagnosis(model=patient.model, findings=tuple(findings), log_only=tuple(log_only), untold=tuple(untold))
+
+
+def _commands(model: Model, command: Signal | None) -> dict[str, Signal]:
+    if command is not None:
+        return {"given": command}
+    middle = mid_travel(model)
+    return {"wide": signals.step(middle - _WIDE, middle, at=_AT, unit="rad"),
+            "small": signals.step(middle, middle + _SMALL, at=_LATER, unit="rad"),
+            **{f"wide {k}": signals.step(middle + there + math.copysign(_WIDE, there), middle + there, at=_AT,
+                                         unit="rad") for k, there in enumerate(_OTHERS)}}
+
+
+_SHOWN = ("given", "wide", "small")  # commands whose runs show symptoms
+
+
+class _Runs:
+    """Runs of patients under the commands of one diagnosis."""
+
+    def __init__(self, commands: dict[str, Signal], duration: float, seed: int,
+                 initial: dict[str, float] | None) -> None:
+        self.commands, self._duration, self._seed, self._initial = commands, duration, seed, initial
+
+    def record(self, patient: Patient, name: str, finest: float | None = None) -> Record:
+        result = simulate(patient.model, self.commands[name], duration=self._duration, load=patient.load,
+                          seed=self._seed, initial=self._initial, output_times=[self._duration])
+        return of_run(result.raise_if_failed(), finest)
+
+    def strength(self, symptom: Symptom, name: str, finest: float) -> Callable[[Patient], Strength]:
+        """Return what tells how strong a symptom is; a buzz, which hangs by a hair, after other steps too."""
+        others = [each for each in self.commands if each not in _SHOWN and symptom.name == "buzzes"]
+
+        def of(patient: Patient) -> Strength:
+            masses, worst = thermal_masses(patient.model.servo), Strength(-math.inf, 0.0)
+            for each in (name, *others):
+                worst = max(worst, Strength(*symptom.judge(self.record(patient, each, finest), masses)))
+                if worst.value > worst.limit:
+                    break
+            return worst
+        return of

@@ -1,0 +1,42 @@
+"""`servotwin doctor`."""
+
+import json
+
+import pytest
+
+from servotwin.cli import main
+
+
+def test_doctor_names_cause_and_cure(capsys):
+    words = ["doctor", "hitec-hs-422", "--set", "electronics.stretcher_gain=2500", "--load", "inertia=1e-3"]
+    assert main(words) == 0
+    told = capsys.readouterr().out
+    assert "buzzes: swings" in told
+    assert "lower it to" in told
+    assert main([*words, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["findings"][0]["causes"][0]["cause"] == "gain"
+    assert "threshold" in found["thresholds"]["sags"]
+
+
+def test_doctor_finds_nothing_in_a_healthy_servo(capsys):
+    assert main(["doctor", "hitec-hs-755hb"]) == 0
+    told = capsys.readouterr().out
+    assert "nothing found" in told
+    assert "51 deg C" in told
+
+
+def test_doctor_alone_looks_at_the_installation(capsys):
+    assert main(["doctor"]) == 0
+    assert "compiler" in capsys.readouterr().out
+    assert main(["doctor", "--json"]) == 0
+    assert "robots" in json.loads(capsys.readouterr().out)["extras"]
+
+
+@pytest.mark.parametrize("words", [
+    ["no-such.toml"], ["hitec-hs-422", "no-such.csv"], ["hitec-hs-422", "--load", "torque=nan"],
+    ["hitec-hs-422", "--duration", "nan"], ["--load", "torque=1"], ["hitec-hs-422", "--model", "dc-motor"],
+])
+def test_bad_input_is_one_line(words, capsys):
+    assert main(["doctor", *words]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
