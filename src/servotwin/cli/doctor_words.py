@@ -88,7 +88,7 @@ def _shown(found: Finding) -> list[RenderableType]:
     if found.causes:
         lines.append(table(("cause", "cure", "goes", "usual"), [
             (each.cause, each.cure, "all" if each.cures else f"{100.0 * each.share:.0f} %", _usual(each))
-            for each in found.causes], wraps="cure"))
+            for each in found.causes]))
     if found.pair is not None:
         one, other = found.pair
         lines.append(f"only together: {one.cause} ({one.cure}) and {other.cause} ({other.cure})")

@@ -90,7 +90,7 @@ def parts(found: dict[str, Any]) -> list[RenderableType]:
     ]
     extras = [(name, "yes" if not lacking else "no", _FOR.get(name, ""),
                f'pip install "servotwin[{name}]"' if lacking else "") for name, lacking in found["extras"].items()]
-    return [pairs(rows), "", table(("extra", "here", "for", "to have it"), extras, wraps="for")]
+    return [pairs(rows), "", table(("extra", "here", "for", "to have it"), extras)]
 
 
 def _kernels(found: dict[str, Any]) -> str:
