@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-LOOK = 1e-3  # s between two looks at a run
+LOOK = 2e-3  # s between two looks at a run
 _MEAN = 0.1  # s over which an angle at the end of a stretch is averaged
 _TRIPS = "trips by "  # begins the events of a protection
 
