@@ -203,12 +203,13 @@ def fit_line(x: ArrayLike, y: ArrayLike, *, weights: ArrayLike | None = None, wa
     a_mean = float((w * a).sum() / w.sum())
     basis = design(a - a_mean, ways)
     inverse = np.linalg.inv((basis.T * w) @ basis)
-    slope, middle, *rest = (inverse @ (basis.T @ (w * b))).tolist()
-    residuals = b - basis @ np.array([slope, middle, *rest])
+    rise = b - b[0]  # so that equal ones have no slope at all
+    slope, middle, *rest = (inverse @ (basis.T @ (w * rise))).tolist()
+    residuals = rise - basis @ np.array([slope, middle, *rest])
     freedom = a.size - basis.shape[1]
     cov = inverse * max(float((w * residuals**2).sum()) / freedom, least_variance)
     return LineFit(
-        slope=slope, intercept=middle - slope * a_mean, slope_error=math.sqrt(cov[0, 0]),
+        slope=slope, intercept=float(b[0]) + middle - slope * a_mean, slope_error=math.sqrt(cov[0, 0]),
         intercept_error=math.sqrt(max(cov[1, 1] - 2.0 * a_mean * cov[0, 1] + a_mean**2 * cov[0, 0], 0.0)),
         covariance=float(cov[0, 1] - a_mean * cov[0, 0]), residuals=tuple(residuals.tolist()), freedom=freedom,
         hysteresis=rest[0] if rest else 0.0, hysteresis_error=math.sqrt(cov[2, 2]) if rest else 0.0)

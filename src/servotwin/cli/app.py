@@ -75,7 +75,7 @@ app.command("validate", help="Compare a servo with logs, and say how far it is o
 app.command("log", help=LOG_HELP, epilog=LOG_EPILOG)(log)
 app.command("doctor", help="Say why a servo buzzes, sags, overshoots, gets warm, trips or does not move; alone: look "
             "at this installation.",
-            epilog="Example: servotwin doctor hitec-hs-422 --load arm=0.3kg:10cm --set gear.backlash=1deg\n\n"
+            epilog="Example: servotwin doctor hitec-hs-422 --load arm=0.3kg:10cm\n\n"
                    "Example: servotwin doctor my-servo.toml run.csv\n\n"
                    "Example: servotwin doctor")(doctor)
 app.command("web", help="Open the bench in a browser: turn a servo, and watch its pulses, currents and angles.",

@@ -143,16 +143,9 @@ class Course(Stops):
     def __init__(self, within: Within, *, intervals: bool = True, beside: int = 0, trials: bool = True) -> None:
         super().__init__(within)
         self._usual = (*_USUAL[:2], _USUAL[2] * intervals, _USUAL[3] + _BESIDE * beside, _USUAL[4] * trials)
-        self._began = clock.process_time()
-        self._since = 0.0, 0.0  # a share, and when it was told first [s]
 
     def _of_all(self, share: float) -> float:
         """Return the share of all work that is done: what lies ahead is as much as usual beside what was measured."""
         stage = max(k for k in range(5) if share >= _STAGES[k])
         inner = (share - _STAGES[stage]) / (_STAGES[stage + 1] - _STAGES[stage])
-        now = clock.process_time() - self._began
-        if share > self._since[0]:
-            self._since = share, now
-        longer = now - self._since[1]  # a step that says nothing: half of the rest after as long
-        inner += (1.0 - inner) * longer / max(longer + now, 1e-9)
         return super()._of_all((sum(self._usual[:stage]) + inner * self._usual[stage]) / sum(self._usual))
