@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from numpy.typing import ArrayLike
@@ -15,7 +15,7 @@ from servotwin.bench.load_figures import LoadFigure, SheetShare, figures_of, sha
 from servotwin.bench.load_lines import SAG, LoadLine, LoadLines, load_lines
 from servotwin.bench.load_parameters import Circuit, Solved, circuit_of, estimates_of, solved
 from servotwin.bench.load_words import line_words, sheet_words, supply_words, told_words
-from servotwin.bench.table_parameters import Estimate
+from servotwin.bench.table_parameters import Estimate, with_measured
 from servotwin.parameters import Quantity, Servo
 
 _SUPPLY, _SOURCE = "supply.open_circuit_voltage", "supply.internal_resistance"
@@ -97,7 +97,7 @@ def calibrate_loads(table: str | Path | LoadTable | Mapping[str, ArrayLike], ser
     numbers, circuit = None, None
     if servo is not None:
         made, told = _supply(read, servo)
-        servo = _with(servo, made, read.source)
+        servo = with_measured(servo, {name: one.quantity(name, read.source) for name, one in made.items()})
         circuit = circuit_of(servo)
         numbers = None if circuit is None else solved(found, servo, circuit)
         notes += told
@@ -114,13 +114,7 @@ def calibrate_loads(table: str | Path | LoadTable | Mapping[str, ArrayLike], ser
     parameters = {name: one.quantity(name, read.source) for name, one in made.items()}
     return LoadCalibration(source=read.source, table=read, lines=found, figures=figures, shares=shares,
                            parameters=parameters, words=tuple(words),
-                           servo=_with(servo or Servo(name="bench-table"), made, read.source))
-
-
-def _with(servo: Servo, made: Mapping[str, Estimate], source: str) -> Servo:
-    values = servo.replace({name: one.value for name, one in made.items()})
-    return replace(values, quantities={**values.quantities,
-                                       **{name: one.quantity(name, source) for name, one in made.items()}})
+                           servo=with_measured(servo or Servo(name="bench-table"), parameters))
 
 
 def _stiffness(servo: Servo, sag: LoadLine, made: dict[str, Estimate]) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from servotwin.bench.both_ways import both_ways
 from servotwin.bench.fits import TableFit, table_fits
 from servotwin.bench.instruments import InstrumentPair, instrument_pairs
 from servotwin.bench.table_columns import BenchTable, bench_table
-from servotwin.bench.table_parameters import estimates
+from servotwin.bench.table_parameters import estimates, with_measured
 from servotwin.bench.table_rows import RowFinding, row_findings, smallest_p_value
 from servotwin.bench.table_words import plus_minus, residual_pattern
 from servotwin.parameters import Quantity, Servo
@@ -112,13 +112,8 @@ def calibrate_table(table: str | Path | Mapping[str, ArrayLike], servo: Servo | 
     instruments, rows = instrument_pairs(read), row_findings(read, lines)
     return TableCalibration(
         source=read.source, table=read, lines=lines, parameters=found, instruments=instruments, rows=rows,
-        servo=_with(servo or Servo(name="bench-table"), found),
+        servo=with_measured(servo or Servo(name="bench-table"), found),
         remarks=tuple(_remarks(read, lines, found, instruments, rows, servo)))
-
-
-def _with(servo: Servo, found: Mapping[str, Quantity]) -> Servo:
-    values = servo.replace({name: quantity.value for name, quantity in found.items()})
-    return replace(values, quantities={**values.quantities, **found})
 
 
 def _curvature(fit: TableFit, lines: int) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 from servotwin.bench.fits import LineFit, TableFit
@@ -26,6 +27,12 @@ class Estimate(NamedTuple):
         """Return it as a measured parameter."""
         return Quantity(value=self.value, unit=unit_of(name), origin="measured", std=self.error,
                         source=f"{source}, least squares: {self.how}")
+
+
+def with_measured(servo: Servo, found: Mapping[str, Quantity]) -> Servo:
+    """Return a servo with measured parameters in place, by dotted name, in SI."""
+    values = servo.replace({name: quantity.value for name, quantity in found.items()})
+    return replace(values, quantities={**values.quantities, **found})
 
 
 def estimates(lines: Mapping[str, TableFit], servo: Servo | None) -> dict[str, Estimate]:

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.diagnosis.bench import Told, TrialBench, Watched, gain
+from servotwin.identification.fitting.diagnosis.bench import TrialBench, Watched
+from servotwin.identification.fitting.diagnosis.gain import Told, gain
 from servotwin.identification.fitting.free import Space, nominal
 from servotwin.identification.fitting.point import Point, joined
 

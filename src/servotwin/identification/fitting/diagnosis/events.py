@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.diagnosis.bench import Gain, Told, TrialBench, gain, teaching
+from servotwin.identification.fitting.diagnosis.bench import TrialBench
+from servotwin.identification.fitting.diagnosis.gain import Gain, Told, gain, teaching
 from servotwin.identification.fitting.frames import has_pulses
 from servotwin.identification.fitting.point import Point
 from servotwin.logs.log import Log

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.fitting.arrow import Prior
-from servotwin.identification.fitting.diagnosis.bench import Told, TrialBench, gain
+from servotwin.identification.fitting.diagnosis.bench import TrialBench
+from servotwin.identification.fitting.diagnosis.gain import Told, gain
 from servotwin.identification.fitting.diagnosis.shapes import GAIN, own_gains
 from servotwin.identification.fitting.uncertainty import rows_of
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import ServotwinError
-from servotwin.identification.fitting.diagnosis.bench import Setting, TrialBench, teaching
+from servotwin.identification.fitting.diagnosis.bench import Setting, TrialBench
+from servotwin.identification.fitting.diagnosis.gain import teaching
 from servotwin.logs.log import Log
 from servotwin.models import DigitalServo
 

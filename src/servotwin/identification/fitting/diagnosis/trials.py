@@ -9,10 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from servotwin.errors import ServotwinError
-from servotwin.identification.fitting.diagnosis.bench import DEAR, Purse, Setting, Spent, Told, TrialBench, gain
+from servotwin.identification.fitting.diagnosis.bench import DEAR, Purse, Setting, Spent, TrialBench
 from servotwin.identification.fitting.diagnosis.candidates import TABLE, Candidate, mended_logs, possible
 from servotwin.identification.fitting.diagnosis.drifts import changing_supply, warming
 from servotwin.identification.fitting.diagnosis.events import dropped_samples, lost_pulses
+from servotwin.identification.fitting.diagnosis.gain import Told, gain
 from servotwin.identification.fitting.diagnosis.holds import moved
 from servotwin.identification.fitting.diagnosis.servos import mixed_gains, two_servos
 from servotwin.identification.fitting.findings import findings
