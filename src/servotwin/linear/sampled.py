@@ -232,7 +232,7 @@ class SampledServo:
         Examples
         --------
         >>> import servotwin as st
-        >>> servo = st.DigitalServo(st.load_servo("dynamixel-xl330-m288"))
+        >>> servo = st.DigitalServo(st.load_servo("dynamixel-xl430-w250"))
         >>> system = st.linear.sampled(servo).system()
         >>> system.dt, system.ninputs, round(float(system.dcgain()), 6)
         (0.001, 1, 1.0)
