@@ -31,6 +31,7 @@ _LEAST = 2e-3  # of the cost: what a step has to gain
 _FINER = 0.7  # of the noise: then a search goes on with less
 _NORMAL = 1.4826  # standard deviation over median magnitude of a normal law
 _FELT, _FORETOLD = 0.02, 0.02  # of the root of what is left, and of its cost: what an effect has to reach to be tried
+_SOON = 4  # steps of a search that show whether it gains
 _REACH = 0.5  # of a searched number: how far the others are moved before a trial is searched
 
 
@@ -283,6 +284,12 @@ class TrialBench:
             forecast.names_of_own(case), forecast.own_start(case), strict=True)]) for case in forecast.cases)
         return list(self.judged(forecast, Point(point.shared, own, frames)))
 
+    def counted(self, k: int) -> NDArray[np.int64]:
+        """Return which rows of a log have an angle that counts."""
+        case = self.base.forecast.cases[k]
+        times = case.times[case.places[case.log.angle_name]]
+        return np.flatnonzero(np.isin(case.log.time - case.log.time[0], times))
+
     def promise(self, setting: Setting) -> float:
         """Return the cost of what teaches at the start of a setting, the other numbers moved along to first order."""
         forecast = self.forecast(setting)
@@ -324,6 +331,14 @@ class TrialBench:
             w = loss.weight(r + A @ step)
             step = -np.linalg.solve((A * w[:, None]).T @ A + ridge, (A * w[:, None]).T @ r)
         return step[-1] > 0.0 and loss.cost(r + A @ step) < (1.0 - _FORETOLD) * loss.cost(r)
+
+    def gains_soon(self, setting: Setting) -> bool:
+        """Tell whether a few steps of its search gain enough: what acts out of proportion is not foretold."""
+        forecast, base = self.forecast(setting), self.base
+        forecast.noise = dict(base.forecast.noise)
+        start = self.start(forecast, setting, base.point)
+        reached = self.search(forecast).run(start, most=_SOON).cost
+        return reached < (1.0 - _FORETOLD) * self.search(base.forecast).costs([base.point])[0]
 
     def _slopes(self) -> tuple[Array, Array]:
         """Return residuals and derivatives of what teaches at the base."""

@@ -144,9 +144,9 @@ def _chosen(bench: TrialBench, point: Point, k: int, kind: _Kind, already: list[
     None is tried where the samples after it cost less than an event has to gain.
     """
     log = bench.setting.logs[k]
-    used, known = np.flatnonzero(log.used(log.angle_name)), [abs(one) for one in already]
+    used, known = bench.counted(k), [abs(one) for one in already]
     (here,) = bench.copies(k, [replace(kind.put(log, already), name=f"{log.name} as it is")], point)
-    if not np.isfinite(here).all():
+    if not _like(here, used):
         return already
     scale = max(bench.noise, _LEFT * _NORMAL * float(np.median(np.abs(here))))
     places = [place for place in kind.places(log) if abs(place) not in known]
@@ -160,7 +160,7 @@ def _chosen(bench: TrialBench, point: Point, k: int, kind: _Kind, already: list[
         return already
     copies = [replace(kind.put(log, places), name=f"{log.name} {i}") for i, places in enumerate(tried)]
     parts = bench.copies(k, copies, point)
-    if not all(np.isfinite(part).all() for part in parts):
+    if not all(_like(part, used) for part in parts):
         return already
     worth = [_worth(bench, scale, here, part, int(np.searchsorted(used, abs(place))))
              for part, place in zip(parts, [*every, *already], strict=True)]
@@ -170,6 +170,11 @@ def _chosen(bench: TrialBench, point: Point, k: int, kind: _Kind, already: list[
         if worth[i] > _PAYS and far and len(chosen) < _MOST + len(already):
             chosen.append(every[i])
     return sorted(chosen)
+
+
+def _like(residual: Array, used: NDArray[np.int64]) -> bool:
+    """Tell whether a copy was simulated, and has as many samples that count: a row put in can move where they begin."""
+    return len(residual) == len(used) and bool(np.isfinite(residual).all())
 
 
 def _most(bench: TrialBench, scale: float, here: Array, simulated: Array | None) -> Array:

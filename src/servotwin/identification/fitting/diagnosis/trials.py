@@ -148,9 +148,10 @@ def _of_findings(bench: TrialBench, traces: Sequence[Trace]) -> list[Candidate]:
 
 def _tried(bench: TrialBench, candidate: Candidate, settings: Sequence[Setting]) -> Told | None:
     """Return what a candidate gains, searched from the most promising of its settings; None if none promises enough."""
-    if not any(bench.may_gain(setting) for setting in settings):
+    promising = _promising(bench, settings)
+    if not any(map(bench.may_gain, settings)) and not any(map(bench.gains_soon, promising)):
         return None
-    trials = [bench.searched(setting, bench.base.point) for setting in _promising(bench, settings)]
+    trials = [bench.searched(setting, bench.base.point) for setting in promising]
     trials += [bench.afresh(setting) for setting in settings if setting.afresh]
     good = [trial for trial in trials if all(np.isfinite(r).all() for r in trial.residuals)]
     if not good:
