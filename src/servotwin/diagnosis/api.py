@@ -12,7 +12,7 @@ import numpy as np
 from servotwin import signals
 from servotwin.datasheet import thermal_masses
 from servotwin.diagnosis.numbers import patient_of
-from servotwin.diagnosis.record import angle_of, of_log, of_run
+from servotwin.diagnosis.record import SIGNALS, angle_of, looked_at, of_log, of_run
 from servotwin.diagnosis.symptoms import SYMPTOMS
 from servotwin.diagnosis.trials import Strength, Trials, ranked
 from servotwin.errors import InputError
@@ -20,6 +20,7 @@ from servotwin.loads import as_load
 from servotwin.models import BoundedServo, DigitalServo, PulseServo, PulseServoInductive, default_model, mid_travel
 from servotwin.parameters import Servo
 from servotwin.simulation import simulate
+from servotwin.simulation.watched_run import watched
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
@@ -218,9 +219,9 @@ class _Runs:
         self.commands, self._duration, self._seed, self._initial = commands, duration, seed, initial
 
     def record(self, patient: Patient, name: str, finest: float | None = None) -> Record:
-        result = simulate(patient.model, self.commands[name], duration=self._duration, load=patient.load,
-                          seed=self._seed, initial=self._initial, output_times=[self._duration])
-        return of_run(result.raise_if_failed(), finest)
+        run = watched(patient.model, self.commands[name], duration=self._duration, outputs=SIGNALS,
+                      times=looked_at(self._duration), load=patient.load, seed=self._seed, initial=self._initial)
+        return of_run(run, finest)
 
     def strength(self, symptom: Symptom, name: str, finest: float) -> Callable[[Patient], Strength]:
         """Return what tells how strong a symptom is; a buzz, which hangs by a hair, after other steps too."""

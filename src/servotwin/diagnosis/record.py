@@ -10,15 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.simulation.arrival import resolution
-from servotwin.simulation.rest import LEAST_REST, rest_of, swing_of
+from servotwin.simulation.rest import LEAST_REST, swing_of
 
 if TYPE_CHECKING:
     from servotwin.logs import Log
     from servotwin.models import Model
-    from servotwin.simulation import Rest, Result
+    from servotwin.simulation import Rest
+    from servotwin.simulation.watched_run import WatchedRun
 
 Array = NDArray[np.float64]
 
+SIGNALS = ("command_angle", "output_angle", "armature_current")
 LOOK = 2e-3  # s between two looks at a run
 _MEAN = 0.1  # s over which an angle at the end of a stretch is averaged
 _TRIPS = "trips by "  # begins the events of a protection
@@ -75,20 +77,24 @@ class Record(NamedTuple):
     trip: str = ""
 
 
-def of_run(result: Result, finest: float | None = None) -> Record:
-    """Return what a run shows; `finest` [rad] unless given is that of its own servo."""
-    model, end = result.model, result.ended
-    time = np.arange(0.0, end, LOOK)
-    target, angle = result.at("command_angle", time), result.at("output_angle", time)
-    rest = rest_of(result, with_current=False)
-    current = result.at("armature_current", time[time >= 0.5 * end])
-    first = next((event for event in result.events if event.kind.startswith(_TRIPS)), None)
+def of_run(run: WatchedRun, finest: float | None = None) -> Record:
+    """Return what a run shows that was looked at at times of `looked_at`; `finest` [rad] unless given is its own."""
+    model, end = run.model, run.ended
+    time = looked_at(end)
+    target, angle = run.at("command_angle", time), run.at("output_angle", time)
+    rest, current = run.rest, run.at("armature_current", time[time >= 0.5 * end])
+    first = next((event for event in run.events if event.kind.startswith(_TRIPS)), None)
     return Record(
         holds=holds_of(time, target, angle), finest=float(resolution(model)) if finest is None else finest, rest=rest,
         swing=math.nan if rest is None else rest.swing,
         heat=float(np.mean(current**2)) * model.value("motor.armature_resistance"),
         tripped=0.0 if first is None else (end - first.time) / end,
         trip="" if first is None else first.kind.removeprefix(_TRIPS))
+
+
+def looked_at(duration: float) -> Array:
+    """Return when a run is looked at [s]."""
+    return np.arange(0.0, duration, LOOK)
 
 
 def of_log(log: Log, model: Model, target: Array) -> Record:
