@@ -165,7 +165,7 @@ def _shown(case: Case) -> dict[str, float]:
     trips = bool(digital and (batch["trip"] != 0.0).any())
     missing = max(1.0 - (final - angle[100]) / WIDE, 1.0 - (little[late].mean() - little[1900]) / SMALL)
     swings, buzz = swinging(angle[late]), drives_on(case, model, angle[late], driven)
-    off = abs(middle - final) / max(math.radians(1.0), 0.05 * WIDE, 2.0 * width(model))
+    off = abs(middle - final) / max(math.radians(1.0), 0.05 * WIDE)
     heat = float(np.mean(batch["armature_current"][0][len(clock) // 2:]**2)) * case.servo.motor.armature_resistance
     return {
         "buzzes": 2.0 * (swings or buzz),
@@ -202,14 +202,6 @@ def drives_on(case: Case, model: Any, angle: np.ndarray, driven: np.ndarray) -> 
     starts = int(np.count_nonzero((last[1:] > 0.0) & (last[:-1] == 0.0)))
     always = not isinstance(model, PulseServo) and bool((last > 0.0).all())
     return (starts >= 5 or always) and last.mean() >= 0.95 * before.mean()
-
-
-def width(model: Any) -> float:
-    """Return the angle within which a servo does not move [rad]."""
-    if isinstance(model, DigitalServo):
-        return max(2.0 * float(model.firmware().h), float(model.firmware().quantum))
-    servo = model.servo
-    return servo.electronics.deadband * servo.electronics.one_shot_slope / servo.potentiometer.feedback_gain
 
 
 def warmth(model: Any, heat: float) -> float:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.simulation.arrival import resolution
 from servotwin.simulation.rest import LEAST_REST, swing_of
 
 if TYPE_CHECKING:
@@ -55,7 +54,8 @@ class Record(NamedTuple):
     ----------
     holds : tuple of Hold
     finest : float
-        Angle that the servo does not tell from another: its deadband of full width, or its count [rad].
+        Angle that the servo is not asked to tell from another: its deadband of full width, but none wider than usual,
+        or its count [rad].
     rest : Rest, optional
         Of a run, how the servo drives at its end; None where command or load move there.
     swing : float
@@ -77,17 +77,17 @@ class Record(NamedTuple):
     trip: str = ""
 
 
-def of_run(run: WatchedRun, finest: float | None = None) -> Record:
-    """Return what a run shows that was looked at at times of `looked_at`; `finest` [rad] unless given is its own."""
-    model, end = run.model, run.ended
+def of_run(run: WatchedRun, finest: float) -> Record:
+    """Return what a run shows that was looked at at times of `looked_at`, of a servo that tells so much apart [rad]."""
+    end = run.ended
     time = looked_at(end)
     target, angle = run.at("command_angle", time), run.at("output_angle", time)
     rest, current = run.rest, run.at("armature_current", time[time >= 0.5 * end])
     first = next((event for event in run.events if event.kind.startswith(_TRIPS)), None)
     return Record(
-        holds=holds_of(time, target, angle), finest=float(resolution(model)) if finest is None else finest, rest=rest,
+        holds=holds_of(time, target, angle), finest=finest, rest=rest,
         swing=math.nan if rest is None else rest.swing,
-        heat=float(np.mean(current**2)) * model.value("motor.armature_resistance"),
+        heat=float(np.mean(current**2)) * run.model.value("motor.armature_resistance"),
         tripped=0.0 if first is None else (end - first.time) / end,
         trip="" if first is None else first.kind.removeprefix(_TRIPS))
 
@@ -97,7 +97,7 @@ def looked_at(duration: float) -> Array:
     return np.arange(0.0, duration, LOOK)
 
 
-def of_log(log: Log, model: Model, target: Array) -> Record:
+def of_log(log: Log, model: Model, target: Array, finest: float) -> Record:
     """Return what a log shows; `target` is the angle that each of its commands asks `model` for [rad]."""
     time, angle = log.time - log.start, angle_of(log, model)
     there = np.isfinite(angle)
@@ -110,7 +110,7 @@ def of_log(log: Log, model: Model, target: Array) -> Record:
     if "armature_current" in log.measured:
         current = log.measured["armature_current"][log.time >= log.start + 0.5 * log.duration]
         heat = float(np.nanmean(current**2)) * model.value("motor.armature_resistance")
-    return Record(holds_of(time, target, angle), float(resolution(model)), None, swing, heat, math.nan)
+    return Record(holds_of(time, target, angle), finest, None, swing, heat, math.nan)
 
 
 def angle_of(log: Log, model: Model) -> Array:
