@@ -83,7 +83,7 @@ def _torques(ax: Axes, loops: Sequence[Loop], reach: float) -> None:
         ax.plot(np.degrees(errors), values, color=LINES[k][0], linestyle=LINES[k][1], label=_volts("motor", loop))
     ax.axhline(0.0, color=COLOURS["grey"], linewidth=0.6)
     ax.axvline(0.0, color=COLOURS["grey"], linewidth=0.6)
-    ax.set_xlabel("error, goal less angle (°)")
+    ax.set_xlabel("error, goal minus angle (°)")
     ax.set_xlim(-math.degrees(reach), math.degrees(reach))
     most = 1.25 * float(np.max(np.abs(motor))) + 1.5 * loops[0].friction_torque
     ax.set_ylim(-most, most)

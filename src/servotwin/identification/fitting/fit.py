@@ -43,7 +43,8 @@ class Interval(NamedTuple):
     lower, upper : float
         nan where the logs do not determine the value.
     method : str
-        "normal", "profile", "by pulses" (a delay: what commands and pulses allow), "at bound", "undetermined", or "not
+        "normal", "profile", "linearised" (of a fit that was stopped), "by pulses" (a delay: what
+        commands and pulses allow), "at bound", "undetermined", or "not
         sought".
     """
 

@@ -8,7 +8,7 @@ STAGES = (0.0, 0.42, 0.7, 0.76, 0.95, 0.96, 1.0)
 """Where rough searches, the search, priors, intervals, errors and trials begin, as they say it."""
 ROUGH, SEARCH, PRIORS, INTERVALS, ERRORS, TRIALS = range(6)
 
-# The long side of what ten fits of each kind took (benchmarks/identification/time_left.py): time that is left shall fall
+# The long side of what twenty fits took (benchmarks/identification/time_left.py): what is left shall fall
 _SEARCH = 16.0  # times the rough searches: when pulses come may have to be found first
 _INTERVALS = (5.0, 0.6)  # times the rough searches, and the search
 _PRIORS, _ERRORS, _BESIDE = 0.02, 0.04, 0.03  # of all before; the last for each simpler model
@@ -37,7 +37,7 @@ class TimeLeft:
     --------
     >>> left = TimeLeft(intervals=True, beside=2, trials=True)
     >>> [round(left.at(share, now), 1) for share, now in ((0.0, 0.0), (0.42, 2.0), (0.76, 10.0), (0.95, 13.0))]
-    [0.0, 71.6, 17.4, 13.5]
+    [0.0, 91.4, 23.4, 14.2]
     """
 
     def __init__(self, *, intervals: bool, beside: int, trials: bool) -> None:
@@ -46,7 +46,7 @@ class TimeLeft:
         self._inner_begun = math.inf  # when the last search told its first step [s]
         self._least = math.inf
         self.longer = False
-        """Whether a stage takes longer than anybody could know, which what was said last does not count in full."""
+        """Whether this stage takes longer than anybody could know, so that what was said last is too little."""
 
     def at(self, share: float, now: float) -> float:
         """Return what is left [s] at a time since the fit began [s]; stages say which share of theirs is done."""
@@ -55,10 +55,11 @@ class TimeLeft:
             self._begun[k] = min(self._begun[k], now)
         inner = (share - STAGES[stage]) / (STAGES[stage + 1] - STAGES[stage])
         left = self._ahead(stage, inner, now)
-        if now < _FROM:
-            return left
+        if now < _FROM:  # little was measured yet
+            return 2.0 * left
         said = min(left, _RISES * self._least)
-        self.longer = said < left
+        self.longer = said < left and stage > ROUGH and (
+            now - self._begun[stage] > self._usual(stage, self._begun[stage]))
         self._least = min(self._least, said)
         return said
 
