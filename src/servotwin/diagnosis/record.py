@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 SIGNALS = ("command_angle", "output_angle", "armature_current")
 LOOK = 2e-3  # s between two looks at a run
 _MEAN = 0.1  # s over which an angle at the end of a stretch is averaged
+_ALIKE = 0.3  # correlation of neighbouring samples of a shaft that swings, at least
 _TRIPS = "trips by "  # begins the events of a protection
 
 
@@ -105,12 +106,26 @@ def of_log(log: Log, model: Model, target: Array, finest: float) -> Record:
     holds, swing = stretches(time, target), math.nan
     if holds and holds[-1][1] == len(time):
         last = slice(*holds[-1])
-        swing = swing_of(time[last], angle[last]).swing
+        swing = swing_of(time[last], angle[last]).swing if not _is_noise(angle[last]) else 0.0
     heat = math.nan
     if "armature_current" in log.measured:
         current = log.measured["armature_current"][log.time >= log.start + 0.5 * log.duration]
         heat = float(np.nanmean(current**2)) * model.value("motor.armature_resistance")
     return Record(holds_of(time, target, angle), finest, None, swing, heat, math.nan)
+
+
+def _is_noise(angle: Array) -> bool:
+    """Tell whether neighbouring samples of a shaft that is held say nothing of each other, unlike those of a swing.
+
+    Examples
+    --------
+    >>> t = np.arange(0.0, 2.0, 0.02)
+    >>> _is_noise(np.sin(50.0 * t)), _is_noise(np.random.default_rng(0).normal(size=100))
+    (False, True)
+    """
+    off = angle[len(angle) // 2:] - np.median(angle[len(angle) // 2:])  # what comes before may still be on its way
+    power = float(off @ off)
+    return power > 0.0 and float(off[1:] @ off[:-1]) < _ALIKE * power
 
 
 def angle_of(log: Log, model: Model) -> Array:
