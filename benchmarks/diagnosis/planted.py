@@ -239,7 +239,8 @@ def sample(seed: int) -> tuple[list[tuple[str, str, Case]], list[Case]]:
     rng = random.Random(f"planted causes {seed}")
     rows: list[tuple[str, str, Any]] = []
     for symptom, causes in CAUSES.items():
-        drawn = ((symptom, cause, ill(rng, symptom, cause)) for cause in rng.sample(causes, len(causes)))
+        order = rng.sample(causes, len(causes))  # one that is given up has another servo of the next
+        drawn = ((symptom, cause, ill(rng, symptom, cause)) for cause in (*order, *order))
         rows += list(islice((row for row in drawn if row[2] is not None), 3))
     sound: list[Case] = []
     while len(sound) < 10:

@@ -116,7 +116,7 @@ def _middle(ax: Axes, loop: Loop, reach: float) -> None:
         start = math.degrees(loop.start_error)
         ax.plot([start], [0.0], marker="o", markersize=4.5, markerfacecolor="white",
                 markeredgecolor=COLOURS["black"], zorder=5)
-        said.append(f"○ free shaft moves from {start:.2g}° on")
+        said += ["○ free shaft moves", f"from {start:.2g}° on"]  # beside the dead zone
     if loop.minimum_duty > 0.0:
         said.append(f"startup force: {loop.motor_torque(loop.minimum_duty):.2g} N m")
     if loop.dead_zone > 0.0:
