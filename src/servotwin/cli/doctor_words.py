@@ -73,9 +73,10 @@ def parts(found: Diagnosis, said: dict[str, Any]) -> list[RenderableType]:
     if not found.findings:
         where = " in the run" if found.log_only else ", in run and log" if said["log"] else ""
         shown += ["", f"nothing found{where}"]
-    for name in found.log_only:
-        shown += ["", f"! the log shows that it {name}, this servo does not: this is not the file of that servo "
-                      "(servotwin fit finds it), or the log is at fault (servotwin log says so)"]
+    if found.log_only:
+        shown += ["", f"! the log shows that it {' and '.join(found.log_only)}, this servo as given does not: say what "
+                      "hangs on it and what feeds it (--load, --set), fit its file (servotwin fit), or see "
+                      "whether the log is at fault (servotwin log)"]
     if found.untold:
         shown += ["", f"cannot be told here: {', '.join(found.untold)}"]
     return [*shown, "", "thresholds", pairs([(name, f"{each['threshold']} ({each['source']})")

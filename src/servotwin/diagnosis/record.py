@@ -123,7 +123,9 @@ def _is_noise(angle: Array) -> bool:
     >>> _is_noise(np.sin(50.0 * t)), _is_noise(np.random.default_rng(0).normal(size=100))
     (False, True)
     """
-    off = angle[len(angle) // 2:] - np.median(angle[len(angle) // 2:])  # what comes before may still be on its way
+    late = angle[len(angle) // 2:]  # what comes before may still be on its way, and the rest creep
+    place = np.arange(len(late))
+    off = late - np.polyval(np.polyfit(place, late, 2), place)
     power = float(off @ off)
     return power > 0.0 and float(off[1:] @ off[:-1]) < _ALIKE * power
 
