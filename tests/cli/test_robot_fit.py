@@ -31,7 +31,7 @@ def arm(tmp_path, monkeypatch):
     return tmp_path
 
 
-WORDS = ("robot", "fit", "arm.xml", "arm.csv", "--servo", "*=feetech-sts3215-12v", "--no-intervals", "--no-diagnose")
+WORDS = ("robot", "fit", "arm.xml", "arm.csv", "--servo", "*=feetech-sts3215-12v", "--no-intervals", "--no-trials")
 
 
 def test_servo_files_a_page_and_numbers(cli, arm):

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 import servotwin as st
@@ -86,3 +87,20 @@ def test_bad_input_is_refused():
 def test_tables_have_the_causes_and_symptoms():
     assert CAUSES == ("deadband", "gain", "frame rate", "play", "friction", "supply", "register", "load")
     assert len(SYMPTOMS) == 6
+
+
+def test_noise_of_a_log_is_no_swing():
+    model = st.PulseServo(st.load_servo("hitec-hs-422"))
+    run = st.simulate(model, st.signals.step(-0.5, 0.2, at=0.5, unit="rad"), duration=3.0, output_step=0.01)
+    noise = np.random.default_rng(0).normal(0.0, math.radians(0.3), len(run.time))
+    log = st.Log(name="run", time=run.time, command=run["command_angle"], command_kind="angle",
+                 measured={"output_angle": run["output_angle"] + noise})
+    found = st.diagnose(model, log=log)
+    assert found.log_only == ()
+    assert found.findings == ()
+
+
+def test_what_only_a_wide_deadband_makes_is_a_sag():
+    servo = st.load_servo("hitec-hs-422").replace({"electronics.deadband": 70e-6})
+    found = names(st.diagnose(servo, load=st.loads.Constant(0.05)))
+    assert found["sags"][0] == "deadband"

@@ -42,11 +42,11 @@ class Shares(NamedTuple):
     Parameters
     ----------
     total : float
-        Measured angle less the line q(V_i).
+        Measured angle minus the line q(V_i).
     quantum : float
-        The generator's 16 µs steps: what t_a less the line t_a(V_i) turns.
+        The generator's 16 µs steps: what t_a minus the line t_a(V_i) turns.
     curvature : float
-        Measured angle less the line q(t_a).
+        Measured angle minus the line q(t_a).
     rest : float
         The line q(t_a) of the line t_a(V_i) is not quite the line q(V_i).
     """

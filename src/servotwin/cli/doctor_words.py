@@ -68,11 +68,15 @@ def parts(found: Diagnosis, said: dict[str, Any]) -> list[RenderableType]:
     shown: list[RenderableType] = [head]
     for each in found.findings:
         shown += ["", *_shown(each)]
+    if any(each.causes for each in found.findings):
+        shown += ["", "cured: which part of it goes with this change alone; *: not usual"]
     if not found.findings:
-        shown += ["", "nothing found" + (" in the run" if found.log_only else "")]
-    for name in found.log_only:
-        shown += ["", f"! the log shows that it {name}, this servo does not: its file is not that servo; "
-                      "servotwin fit finds what is"]
+        where = " in the run" if found.log_only else ", in run and log" if said["log"] else ""
+        shown += ["", f"nothing found{where}"]
+    if found.log_only:
+        shown += ["", f"! the log shows that it {' and '.join(found.log_only)}, this servo as given does not: say what "
+                      "hangs on it and what feeds it (--load, --set), fit its file (servotwin fit), or see "
+                      "whether the log is at fault (servotwin log)"]
     if found.untold:
         shown += ["", f"cannot be told here: {', '.join(found.untold)}"]
     return [*shown, "", "thresholds", pairs([(name, f"{each['threshold']} ({each['source']})")
@@ -86,7 +90,7 @@ def _shown(found: Finding) -> list[RenderableType]:
             "; the log does not show it")
     lines: list[RenderableType] = [f"{found.symptom.name}: {seen_words(found)}{log}"]
     if found.causes:
-        lines.append(table(("cause", "cure", "goes", "usual"), [
+        lines.append(table(("cause", "cure", "cured", "now, and what is usual"), [
             (each.cause, each.cure, "all" if each.cures else f"{100.0 * each.share:.0f} %", _usual(each))
             for each in found.causes]))
     if found.pair is not None:
@@ -99,8 +103,19 @@ def _shown(found: Finding) -> list[RenderableType]:
     return lines
 
 
+def figure(value: float) -> str:
+    """Return a number of three digits as people write it.
+
+    Examples
+    --------
+    >>> figure(2500.0), figure(0.12345), figure(1e-7)
+    ('2500', '0.123', '1e-07')
+    """
+    return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
+
+
 def _usual(cause: Cause) -> str:
     number = cause.number
-    low, high = (f"{number.factor * value:.3g}" for value in cause.usual)
-    now = f"{number.factor * cause.now:.3g}"
-    return f"{now} now, {low} to {high} {number.unit}".strip() + ("" if cause.odd == 1.0 else " *")
+    low, high = (figure(number.factor * value) for value in cause.usual)
+    now = figure(number.factor * cause.now)
+    return f"{now}, {low} to {high} {number.unit}".strip() + ("" if cause.odd == 1.0 else " *")

@@ -94,7 +94,7 @@ def fit(
         "--compare/--no-compare", help="Also fit simpler models to the same logs.",
         rich_help_panel=_SEARCH)] = True,
     diagnose: Annotated[bool, typer.Option(
-        "--diagnose/--no-diagnose", help="Where what is left is not noise, try what may be the matter; takes up to "
+        "--trials/--no-trials", help="Where what is left is not noise, try what may be the matter; takes up to "
         "four times as long as the fit itself.", rich_help_panel=_SEARCH)] = True,
     ladder: Annotated[bool, typer.Option(
         "--ladder", help="Fit friction laws M1 to M6 and choose one by the held-out logs.",

@@ -167,7 +167,7 @@ def columns(found: Overview) -> dict[str, Any]:
 
     def add(name: str, response: Any) -> None:
         if response is not None:
-            table[f"{name}_gain"], table[f"{name}_phase_deg"] = np.abs(response), np.degrees(np.angle(response))
+            table[f"{name}_gain"], table[f"{name}_phase_deg"] = np.abs(response), np.degrees(_unwrapped(response))
 
     add("mean", found.mean)
     for period, loop in found.loops.items():
@@ -182,12 +182,20 @@ def columns(found: Overview) -> dict[str, Any]:
     return table
 
 
+def _unwrapped(response: Any) -> Any:
+    """Return the phase of a response over frequency, without jumps of a whole turn [rad]; nan where it is none."""
+    phase = np.angle(response)
+    there = np.isfinite(phase)
+    phase[there] = np.unwrap(phase[there])
+    return phase
+
+
 def _gain(response: Any) -> list[float] | None:
     return None if response is None else np.abs(response).tolist()
 
 
 def _phase(response: Any) -> list[float] | None:
-    return None if response is None else np.angle(response).tolist()
+    return None if response is None else _unwrapped(response).tolist()
 
 
 def tuning_pairs(found: Tuning) -> list[tuple[str, str]]:

@@ -36,7 +36,7 @@ def fit(
                                                 rich_help_panel=_FIT)] = None,
     intervals: Annotated[bool, typer.Option("--intervals/--no-intervals", help="Without them it is a first result in a "
                                             "third of the time.", rich_help_panel=_FIT)] = True,
-    diagnose: Annotated[bool, typer.Option("--diagnose/--no-diagnose", help="Whether causes are sought where a belief "
+    diagnose: Annotated[bool, typer.Option("--trials/--no-trials", help="Whether causes are sought where a belief "
                                            "is pushed far.", rich_help_panel=_FIT)] = True,
     within: Annotated[str | None, typer.Option(metavar="DURATION", help="Stop after this time, such as 90s or 5min, "
                                                "and keep the best so far, as Ctrl-C does.",

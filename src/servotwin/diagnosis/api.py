@@ -11,8 +11,9 @@ import numpy as np
 
 from servotwin import signals
 from servotwin.datasheet import thermal_masses
+from servotwin.diagnosis.causes import finest_of
 from servotwin.diagnosis.numbers import patient_of
-from servotwin.diagnosis.record import angle_of, of_log, of_run
+from servotwin.diagnosis.record import SIGNALS, angle_of, looked_at, of_log, of_run
 from servotwin.diagnosis.symptoms import SYMPTOMS
 from servotwin.diagnosis.trials import Strength, Trials, ranked
 from servotwin.errors import InputError
@@ -20,6 +21,7 @@ from servotwin.loads import as_load
 from servotwin.models import BoundedServo, DigitalServo, PulseServo, PulseServoInductive, default_model, mid_travel
 from servotwin.parameters import Servo
 from servotwin.simulation import simulate
+from servotwin.simulation.watched_run import watched
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
@@ -166,8 +168,9 @@ def _diagnosed(model: Model, command: Signal | None, load: Load, duration: float
         command, duration = log.signal(), log.duration
         angle = angle_of(log, model)
         initial = {"output_angle": float(angle[np.isfinite(angle)][0])}
-        seen = of_log(log, model, simulate(model, command, duration=duration, load=load, initial=initial,
-                                           output_times=log.time - log.start)["command_angle"])
+        target = simulate(model, command, duration=duration, load=load, initial=initial,
+                          output_times=log.time - log.start)["command_angle"]
+        seen = of_log(log, model, target, finest_of(patient_of(model, load)))
     own = command is None or (command.edges is None and command.frame_period is None)
     runs = _Runs(_commands(model, command), duration, seed, initial)
     return _judged(patient_of(model, load, own_frames=own), runs, seen)
@@ -175,7 +178,8 @@ def _diagnosed(model: Model, command: Signal | None, load: Load, duration: float
 
 def _judged(patient: Patient, runs: _Runs, seen: Record | None) -> Diagnosis:
     """Return which symptoms the runs of a patient show, each with its causes, beside those of a log."""
-    records = {name: runs.record(patient, name) for name in runs.commands if name in _SHOWN}
+    finest = finest_of(patient)
+    records = {name: runs.record(patient, name, finest) for name in runs.commands if name in _SHOWN}
     masses = thermal_masses(patient.model.servo)
     findings, log_only, untold = [], [], []
     hidden: set[tuple[str, str]] = set()
@@ -186,7 +190,7 @@ def _judged(patient: Patient, runs: _Runs, seen: Record | None) -> Diagnosis:
         in_log = None if seen is None else symptom.judge(seen, masses)
         told = (name, symptom.name) not in hidden
         if judged[name].found and told:
-            causes, pair = ranked(Trials(patient, runs.strength(symptom, name, records[name].finest)))
+            causes, pair = ranked(Trials(patient, runs.strength(symptom, name, finest)))
             findings.append(Finding(symptom=symptom, run=judged[name], log=in_log, command=name, record=records[name],
                                     causes=tuple(causes), pair=pair))
             hidden |= {(name, each) for each in symptom.hides}
@@ -217,10 +221,10 @@ class _Runs:
                  initial: dict[str, float] | None) -> None:
         self.commands, self._duration, self._seed, self._initial = commands, duration, seed, initial
 
-    def record(self, patient: Patient, name: str, finest: float | None = None) -> Record:
-        result = simulate(patient.model, self.commands[name], duration=self._duration, load=patient.load,
-                          seed=self._seed, initial=self._initial, output_times=[self._duration])
-        return of_run(result.raise_if_failed(), finest)
+    def record(self, patient: Patient, name: str, finest: float) -> Record:
+        run = watched(patient.model, self.commands[name], duration=self._duration, outputs=SIGNALS,
+                      times=looked_at(self._duration), load=patient.load, seed=self._seed, initial=self._initial)
+        return of_run(run, finest)
 
     def strength(self, symptom: Symptom, name: str, finest: float) -> Callable[[Patient], Strength]:
         """Return what tells how strong a symptom is; a buzz, which hangs by a hair, after other steps too."""

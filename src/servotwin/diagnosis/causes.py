@@ -20,6 +20,7 @@ from servotwin.diagnosis.numbers import (
 )
 from servotwin.models import BoundedServo, DigitalServo
 from servotwin.parameters import printed_fact
+from servotwin.simulation.arrival import resolution
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -60,6 +61,17 @@ def _zone_now(patient: Patient) -> float | None:
     if isinstance(model, DigitalServo):
         return float(model.firmware().h)
     return float(model.value_or(zone_name(model), 0.0))
+
+
+def finest_of(patient: Patient) -> float:
+    """Return what a servo need not tell apart: its count, or its deadband, that of none wider than usual [rad].
+
+    What only a wide deadband makes is a symptom.
+    """
+    own, usual = float(resolution(patient.model)), _zone_usual(patient).high
+    if (_zone_now(patient) or 0.0) <= usual:
+        return own
+    return min(own, float(resolution(_put_zone(patient, usual).model)))
 
 
 def _put_zone(patient: Patient, value: float) -> Patient:

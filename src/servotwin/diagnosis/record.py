@@ -9,18 +9,20 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.simulation.arrival import resolution
-from servotwin.simulation.rest import LEAST_REST, rest_of, swing_of
+from servotwin.simulation.rest import LEAST_REST, swing_of
 
 if TYPE_CHECKING:
     from servotwin.logs import Log
     from servotwin.models import Model
-    from servotwin.simulation import Rest, Result
+    from servotwin.simulation import Rest
+    from servotwin.simulation.watched_run import WatchedRun
 
 Array = NDArray[np.float64]
 
+SIGNALS = ("command_angle", "output_angle", "armature_current")
 LOOK = 2e-3  # s between two looks at a run
 _MEAN = 0.1  # s over which an angle at the end of a stretch is averaged
+_ALIKE = 0.3  # correlation of neighbouring samples of a shaft that swings, at least
 _TRIPS = "trips by "  # begins the events of a protection
 
 
@@ -53,7 +55,8 @@ class Record(NamedTuple):
     ----------
     holds : tuple of Hold
     finest : float
-        Angle that the servo does not tell from another: its deadband of full width, or its count [rad].
+        Angle that the servo is not asked to tell from another: its deadband of full width, but none wider than usual,
+        or its count [rad].
     rest : Rest, optional
         Of a run, how the servo drives at its end; None where command or load move there.
     swing : float
@@ -75,23 +78,27 @@ class Record(NamedTuple):
     trip: str = ""
 
 
-def of_run(result: Result, finest: float | None = None) -> Record:
-    """Return what a run shows; `finest` [rad] unless given is that of its own servo."""
-    model, end = result.model, result.ended
-    time = np.arange(0.0, end, LOOK)
-    target, angle = result.at("command_angle", time), result.at("output_angle", time)
-    rest = rest_of(result, with_current=False)
-    current = result.at("armature_current", time[time >= 0.5 * end])
-    first = next((event for event in result.events if event.kind.startswith(_TRIPS)), None)
+def of_run(run: WatchedRun, finest: float) -> Record:
+    """Return what a run shows that was looked at at times of `looked_at`, of a servo that tells so much apart [rad]."""
+    end = run.ended
+    time = looked_at(end)
+    target, angle = run.at("command_angle", time), run.at("output_angle", time)
+    rest, current = run.rest, run.at("armature_current", time[time >= 0.5 * end])
+    first = next((event for event in run.events if event.kind.startswith(_TRIPS)), None)
     return Record(
-        holds=holds_of(time, target, angle), finest=float(resolution(model)) if finest is None else finest, rest=rest,
+        holds=holds_of(time, target, angle), finest=finest, rest=rest,
         swing=math.nan if rest is None else rest.swing,
-        heat=float(np.mean(current**2)) * model.value("motor.armature_resistance"),
+        heat=float(np.mean(current**2)) * run.model.value("motor.armature_resistance"),
         tripped=0.0 if first is None else (end - first.time) / end,
         trip="" if first is None else first.kind.removeprefix(_TRIPS))
 
 
-def of_log(log: Log, model: Model, target: Array) -> Record:
+def looked_at(duration: float) -> Array:
+    """Return when a run is looked at [s]."""
+    return np.arange(0.0, duration, LOOK)
+
+
+def of_log(log: Log, model: Model, target: Array, finest: float) -> Record:
     """Return what a log shows; `target` is the angle that each of its commands asks `model` for [rad]."""
     time, angle = log.time - log.start, angle_of(log, model)
     there = np.isfinite(angle)
@@ -99,12 +106,28 @@ def of_log(log: Log, model: Model, target: Array) -> Record:
     holds, swing = stretches(time, target), math.nan
     if holds and holds[-1][1] == len(time):
         last = slice(*holds[-1])
-        swing = swing_of(time[last], angle[last]).swing
+        swing = swing_of(time[last], angle[last]).swing if not _is_noise(angle[last]) else 0.0
     heat = math.nan
     if "armature_current" in log.measured:
         current = log.measured["armature_current"][log.time >= log.start + 0.5 * log.duration]
         heat = float(np.nanmean(current**2)) * model.value("motor.armature_resistance")
-    return Record(holds_of(time, target, angle), float(resolution(model)), None, swing, heat, math.nan)
+    return Record(holds_of(time, target, angle), finest, None, swing, heat, math.nan)
+
+
+def _is_noise(angle: Array) -> bool:
+    """Tell whether neighbouring samples of a shaft that is held say nothing of each other, unlike those of a swing.
+
+    Examples
+    --------
+    >>> t = np.arange(0.0, 2.0, 0.02)
+    >>> _is_noise(np.sin(50.0 * t)), _is_noise(np.random.default_rng(0).normal(size=100))
+    (False, True)
+    """
+    late = angle[len(angle) // 2:]  # what comes before may still be on its way, and the rest creep
+    place = np.arange(len(late))
+    off = late - np.polyval(np.polyfit(place, late, 2), place)
+    power = float(off @ off)
+    return power > 0.0 and float(off[1:] @ off[:-1]) < _ALIKE * power
 
 
 def angle_of(log: Log, model: Model) -> Array:

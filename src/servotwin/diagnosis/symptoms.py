@@ -116,11 +116,13 @@ SYMPTOMS: tuple[Symptom, ...] = (
             ("does not move", "sags", "overshoots"), "% of the time", 100.0),
     Symptom("does not move", "it goes less than half of the way that it is sent, of 1 deg or more",
             "as the smallest move of `curves`", _stuck, ("sags",), "% of the way missing", 100.0),
-    Symptom("buzzes", "it swings by 0.1 deg or more where nothing changes, or drives on and on where friction holds it",
+    Symptom("buzzes", "it swings by 0.1 deg or more where nothing changes, or its bridge switches on and on "
+            "where friction holds it",
             "as the remarks of a run; 0.1 deg is about one count of an encoder of 12 bit", _buzzes, ("overshoots",),
             "% of duty or rad", 100.0),
     Symptom("overshoots", "by more than 10 % of a step of 3 deg or more", "assumed", _overshoots, (), "%", 100.0),
-    Symptom("sags", "it stands off its command by more than 1 deg, 5 % of the way, and two deadbands",
+    Symptom("sags", "it stands off its command by more than 1 deg, 5 % of the way, and two deadbands no wider "
+            "than usual",
             "as `curves` and `simulate` say that a servo has arrived", _sags, (), "deg", math.degrees(1.0)),
     Symptom("gets warm", "ten minutes of this bring its housing above 51 deg C, or its winding above 100 deg C",
             "ISO 13732-1: skin burns after a minute at 51 deg C; a hot winding as in `curves`", _warms, (), "K"),

@@ -75,13 +75,14 @@ def rounded(value: float, *, up: bool) -> str:
 
     Examples
     --------
-    >>> rounded(7.31, up=True), rounded(0.0468, up=False), rounded(0.0, up=False)
-    ('7.4', '0.046', '0')
+    >>> rounded(7.31, up=True), rounded(0.0468, up=False), rounded(0.0, up=False), rounded(1119.0, up=False)
+    ('7.4', '0.046', '0', '1100')
     """
     if value == 0.0 or not math.isfinite(value):
         return f"{value:g}"
     step = 10.0**(math.floor(math.log10(abs(value))) - 1)
-    return f"{(math.ceil(value / step - 1e-9) if up else math.floor(value / step + 1e-9)) * step:.3g}"
+    found = (math.ceil(value / step - 1e-9) if up else math.floor(value / step + 1e-9)) * step
+    return f"{found:.0f}" if 1e3 <= abs(found) < 1e6 else f"{found:.3g}"
 
 
 class Trials:

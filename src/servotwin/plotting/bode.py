@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 _MARKERS = ("o", "s", "^", "D", "v")
 _FLOOR = 1e-3  # a smaller gain is not drawn
+_TICK = 45.0  # ° between labels of the phase
 _GAINS = np.geomspace(0.02, 30.0, 240)  # times the loop's own
 
 
@@ -68,6 +69,8 @@ def bode(drawn: Sequence[Response], *, title: str = "", height: float = 4.2) -> 
     """
     if not drawn:
         raise InputError("responses in a picture", got="none", allowed="at least one")
+    from matplotlib.ticker import MultipleLocator
+
     figure, axes = axes_grid(2, height=height)
     with context():
         for place, each in enumerate(drawn):
@@ -77,7 +80,8 @@ def bode(drawn: Sequence[Response], *, title: str = "", height: float = 4.2) -> 
         axes[0].axhline(-3.0, color=COLOURS["grey"], linestyle=(0, (2, 2)), linewidth=1.0)
         axes[1].set_xlabel("frequency (Hz)")
         axes[1].set_xscale("log")
-        axes[0].legend(loc="lower left", handlelength=3.2)
+        axes[1].yaxis.set_major_locator(MultipleLocator(_TICK))
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, handlelength=3.2)
         if title:
             axes[0].set_title(title)
         figure.align_ylabels(axes)

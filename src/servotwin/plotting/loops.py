@@ -83,7 +83,7 @@ def _torques(ax: Axes, loops: Sequence[Loop], reach: float) -> None:
         ax.plot(np.degrees(errors), values, color=LINES[k][0], linestyle=LINES[k][1], label=_volts("motor", loop))
     ax.axhline(0.0, color=COLOURS["grey"], linewidth=0.6)
     ax.axvline(0.0, color=COLOURS["grey"], linewidth=0.6)
-    ax.set_xlabel("error, goal less angle (°)")
+    ax.set_xlabel("error, goal minus angle (°)")
     ax.set_xlim(-math.degrees(reach), math.degrees(reach))
     most = 1.25 * float(np.max(np.abs(motor))) + 1.5 * loops[0].friction_torque
     ax.set_ylim(-most, most)
@@ -116,7 +116,7 @@ def _middle(ax: Axes, loop: Loop, reach: float) -> None:
         start = math.degrees(loop.start_error)
         ax.plot([start], [0.0], marker="o", markersize=4.5, markerfacecolor="white",
                 markeredgecolor=COLOURS["black"], zorder=5)
-        said.append(f"○ free shaft moves from {start:.2g}° on")
+        said += ["○ free shaft moves", f"from {start:.2g}° on"]  # beside the dead zone
     if loop.minimum_duty > 0.0:
         said.append(f"startup force: {loop.motor_torque(loop.minimum_duty):.2g} N m")
     if loop.dead_zone > 0.0:

@@ -21,6 +21,7 @@ from servotwin.models.state.modes import Mode, Vector
 from servotwin.models.terms import duty
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
 from servotwin.simulation.engine import TRIPS, Event, Plan, Segment, event_name
+from servotwin.simulation.rest import Driven
 
 if TYPE_CHECKING:
     from servotwin.simulation.bus_run import Rows
@@ -81,6 +82,12 @@ def events_of(plans: Sequence[Plan], rows: Rows) -> list[tuple[Event, ...]]:
         name = _WORDS.get(kind) or event_name(int(kind), Mode(int(zone), int(contact), 0, 0, 0))
         found[int(unit)].append(Event(time, name, angle))
     return [tuple(events) for events in found]
+
+
+def driven_in(rows: Rows, *, digital: bool) -> Driven:
+    """Return how the bridge of a servo alone on its source was driven."""
+    origin, start, end = rows.motions[:, 2:5].T
+    return Driven(origin + start, origin + end, rows.motions[:, -4 if digital else 7])
 
 
 class _Maker:

@@ -70,6 +70,11 @@ def run(plans: Sequence[Plan], states: Sequence[State], source: Source, duration
     return taped(way, duration, tape_of(len(plans)))
 
 
+def run_alone(plan: Plan, state: State, source: Source, duration: float) -> Rows:
+    """Run one servo on its own source from t = 0 to `duration` [s], compiled: its way as rows, and what happened."""
+    return taped(_Compiled([plan], [state], source), duration, tape_of(1))
+
+
 def taped(way: _Compiled | Plainly, until: float, written: Tape,
           tell: Callable[[float], object] | None = None) -> Rows:
     """Let servos go on to a time [s], by a tape that is read whenever it is full; return what that leaves behind.

@@ -41,7 +41,7 @@ def lines(what: str, clock: Callable[[], float] = time.monotonic) -> Callable[[f
         if now - last < _BETWEEN or sys.stderr is None:
             return
         last = now
-        left = f", about {_duration((now - began) * (1.0 / share - 1.0))} left" if share > 0.0 else ""
+        left = f", about {duration_left(now - began, share)} left" if share > 0.0 else ""
         with contextlib.suppress(OSError, ValueError):
             sys.stderr.write(f"{what}: {100.0 * share:.0f} %{', ' if text else ''}{text}{left}\n")
             sys.stderr.flush()
@@ -49,7 +49,15 @@ def lines(what: str, clock: Callable[[], float] = time.monotonic) -> Callable[[f
     return tell
 
 
-def _duration(seconds: float) -> str:
+def duration_left(gone: float, share: float) -> str:
+    """Return in words what is left where a share of the time is gone, which is so much [s].
+
+    Examples
+    --------
+    >>> duration_left(10.0, 0.25), duration_left(300.0, 0.5)
+    ('30 s', '5 min')
+    """
+    seconds = gone * (1.0 / share - 1.0)
     return f"{seconds:.0f} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from servotwin.models import DigitalServo, PulseServo, PulseServoInductive
 from servotwin.models.engine.cosim.final_checks import piece_before, starts
 from servotwin.models.switched import SwitchedServo
-from servotwin.models.terms.duty import drives
 from servotwin.physics.pieces import piece_value
 from servotwin.simulation.metrics import mean_current
 
@@ -21,8 +20,8 @@ if TYPE_CHECKING:
     from servotwin.models import Model
     from servotwin.physics.pieces import Piece
     from servotwin.signals import Signal
-    from servotwin.simulation.engine import Segment
     from servotwin.simulation.result import Result
+    from servotwin.simulation.status import Status
 
 Array = NDArray[np.float64]
 
@@ -57,6 +56,41 @@ class Swing(NamedTuple):
 
 
 NONE = Swing(0.0, 0.0)
+
+
+class Driven(NamedTuple):
+    """How a bridge is driven: from when to when [s], and by which duty; of pulses −1, 0 or +1."""
+
+    start: Array
+    end: Array
+    duty: Array
+
+
+class Watched(Protocol):
+    """A run, as far as it has to be known for what a servo does at its end."""
+
+    @property
+    def model(self) -> Model:
+        """Of the servo."""
+
+    @property
+    def command(self) -> Signal:
+        """That it followed."""
+
+    @property
+    def load(self) -> Load:
+        """That hung on it."""
+
+    @property
+    def status(self) -> Status:
+        """How it ended."""
+
+    @property
+    def ended(self) -> float:
+        """When it ended [s]."""
+
+    def at(self, name: str, time: Array) -> Array:
+        """Return a signal (SI) at times of `looks_of`, and at the end [s]."""
 
 
 class Rest(NamedTuple):
@@ -195,24 +229,36 @@ def rest_of(result: Result, *, with_current: bool = True) -> Rest | None:
     A motor, a servo that turns without end, and a run that ended before its time have none. The current, which takes
     longer than all else, is nan where it is not asked for.
     """
-    model, end = result.model, result.ended
-    if not result.status.ok or model.endless or "command_angle" not in model.available:
+    found = rest_seen(result, driven_of(result))
+    if found is None or not with_current:
+        return found
+    return found._replace(current=mean_current(result, result.ended - LEAST_REST))
+
+
+def rest_seen(run: Watched, driven: Driven | None) -> Rest | None:
+    """Return what `rest_of` does, without a current, of a run whose bridge was driven so; None: of a mean voltage."""
+    end, time = run.ended, looks_of(run)
+    if time is None:
         return None
-    since = still_since(result.command, result.load, end)
-    begun = end - LEAST_REST
-    if not since <= begun:
-        return None
-    step = look_period(model, framed=result.command.edges is None)
-    time = looks_at(max(since, end - _LONGEST), end, step)
-    angle = result.at("output_angle", time)
-    swing = swing_of(time, angle)
-    middle = 0.5 * (since + end)
-    rate, duty = _drives(result, begun, end)
-    _, before = _drives(result, max(middle - 0.5 * LEAST_REST, since), min(middle + 0.5 * LEAST_REST, end))
-    current = mean_current(result, begun) if with_current else math.nan
+    since = still_since(run.command, run.load, end)
+    angle = run.at("output_angle", time)
+    swing, middle, begun = swing_of(time, angle), 0.5 * (since + end), end - LEAST_REST
+    rate, duty = _drives(driven, begun, end)
+    _, before = _drives(driven, max(middle - 0.5 * LEAST_REST, since), min(middle + 0.5 * LEAST_REST, end))
     return Rest(since=since, swing=swing.swing, frequency=swing.frequency,
-                travel=float(np.ptp(angle[time >= begun - _ROUNDING])), drive_rate=rate, duty=duty, current=current,
-                fades=duty < _STAYS * before, held=_held(result))
+                travel=float(np.ptp(angle[time >= begun - _ROUNDING])), drive_rate=rate, duty=duty, current=math.nan,
+                fades=duty < _STAYS * before, held=_held(run))
+
+
+def looks_of(run: Watched) -> Array | None:
+    """Return when a shaft is looked at to see what it does at the end [s]; None where that is not to be told."""
+    model, end = run.model, run.ended
+    if not run.status.ok or model.endless or "command_angle" not in model.available:
+        return None
+    since = still_since(run.command, run.load, end)
+    if not since <= end - LEAST_REST:
+        return None
+    return looks_at(max(since, end - _LONGEST), end, look_period(model, framed=run.command.edges is None))
 
 
 def look_period(model: Model, *, framed: bool = True) -> float:
@@ -223,11 +269,11 @@ def look_period(model: Model, *, framed: bool = True) -> float:
     return model.frame_period if framed and isinstance(model, PulseServo | PulseServoInductive) else _SAMPLE
 
 
-def _held(result: Result) -> bool:
+def _held(run: Watched) -> bool:
     """Tell whether friction holds the shaft against its load where it is, without any torque of the motor."""
-    end, load = result.ended, result.load
-    numbers, tau = result.model.plant(load), piece_value(piece_before(load.torque_pieces.rows, end, False), end)
-    angle = float(result.at("output_angle", [end])[0])
+    end, load = run.ended, run.load
+    numbers, tau = run.model.plant(load), piece_value(piece_before(load.torque_pieces.rows, end, False), end)
+    angle = float(run.at("output_angle", np.array([end]))[0])
     return not any(starts(numbers, forward, 0.0, tau, angle) for forward in (True, False))
 
 
@@ -236,20 +282,22 @@ def looks_at(since: float, end: float, step: float) -> Array:
     return np.maximum(end - step * np.arange(int((end - since) / step), -1.0, -1.0), since)
 
 
-def _drives(result: Result, start: float, end: float) -> tuple[float, float]:
-    """Return how often a bridge begins to drive or reverses [Hz], and the mean magnitude of its duty."""
+def driven_of(result: Result) -> Driven | None:
+    """Return how the bridge of a run was driven; None of a mean voltage."""
     if not isinstance(result.model, SwitchedServo):
-        return math.nan, math.nan
+        return None
     digital = isinstance(result.model, DigitalServo)
+    rows = [(each.start, each.end, each.duty if digital else each.drive) for each in result.trajectory.segments]
+    return Driven(*np.array(rows, np.float64).reshape(-1, 3).T)
 
-    def given(segment: Segment) -> float:
-        value = segment.duty if digital else segment.drive
-        return value if drives(value) else 0.0
 
-    segments = [segment for segment in result.trajectory.segments if segment.end > start and segment.start < end]
-    before, count, whole = given(segments[0]), 0, 0.0
-    for segment in segments:
-        now = given(segment)
-        count += now != 0.0 and now * before <= 0.0
-        before, whole = now, whole + abs(now) * (min(segment.end, end) - max(segment.start, start))
-    return count / (end - start), whole / (end - start)
+def _drives(driven: Driven | None, start: float, end: float) -> tuple[float, float]:
+    """Return how often a bridge begins to drive or reverses [Hz], and the mean magnitude of its duty."""
+    if driven is None:
+        return math.nan, math.nan
+    some = (driven.end > start) & (driven.start < end)
+    duty = driven.duty[some]
+    now = np.where(np.abs(duty) <= 1.0, duty, 0.0)  # beyond, torque is off
+    begins = (now[1:] != 0.0) & (now[1:] * now[:-1] <= 0.0)
+    spans = np.minimum(driven.end[some], end) - np.maximum(driven.start[some], start)
+    return np.count_nonzero(begins) / (end - start), float(np.abs(now) @ spans) / (end - start)

@@ -42,7 +42,8 @@ class Trajectory:
         if not self.segments:
             nothing = np.full(t.size, math.nan)
             return Samples.make(t, np.tile(nothing, (7, 1)), nothing, np.zeros((5, t.size)), *np.zeros((3, t.size)))
-        now = self._since_ticks(t)
+        now, end = self._since_ticks(t), self.segments[-1].end
+        now = np.where((now > end) & (now <= end * (1.0 + _LATE)), end, now)  # sums of ticks may end a rounding early
         index = np.maximum(np.searchsorted(self._starts, now, side="right") - 1, 0)
         return replace(self._states(now, index), time=t)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,7 +18,7 @@ from servotwin.logs.log import Log
 from servotwin.models import BoundedServo, DigitalServo, Model, PulseServo, PulseServoInductive, default_model
 from servotwin.parameters import Servo
 from servotwin.simulation.lanes.load_columns import LOAD_NAMES
-from servotwin.simulation.progress import lines, on_terminal
+from servotwin.simulation.progress import duration_left, lines, on_terminal
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ _PLANT = ("motor.armature_resistance", "output_torque_constant", "output_inertia
 _LOOP_GAIN = "firmware.proportional_gain"
 _FITTED = ("output_angle", "feedback_voltage", "armature_current", "supply_current")
 _TOO_FAST = 4.0  # times the speed without load
+_PATIENCE = 1.0  # s before time left is told
 _OVERFITTED = 1.6  # error of new logs over that of the fitted ones
 
 
@@ -252,10 +254,16 @@ def shown(progress: Any) -> Iterator[Callable[[float, str], None]]:
         yield lines("fit")
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    bar = Progress(TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("left"),
-                   TimeRemainingColumn(), console=Console(stderr=True), transient=True)
-    task = bar.add_task("fit", total=1.0)
+    bar = Progress(TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(),
+                   TextColumn("{task.fields[left]}"), console=Console(stderr=True), transient=True)
+    task, began = bar.add_task("fit", total=1.0, left=""), time.monotonic()
+
+    def tell(share: float, text: str) -> None:  # rich would tell the time left by the latest steps alone
+        gone = time.monotonic() - began
+        left = f"about {duration_left(gone, share)} left" if share > 0.0 and gone > _PATIENCE else ""
+        bar.update(task, completed=share, description=text, left=left)
+
     with bar:
-        yield lambda share, text: bar.update(task, completed=share, description=text)
+        yield tell

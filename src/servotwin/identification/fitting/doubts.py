@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from servotwin.identification.fitting.draws import Allowed
 from servotwin.identification.fitting.intervals import Ends
 from servotwin.identification.fitting.task import Task
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty, uncertainty
-from servotwin.identification.fitting.words import Unidentifiable
+from servotwin.identification.fitting.words import Unidentifiable, vague_directions
 
 Array = NDArray[np.float64]
 
@@ -52,6 +53,22 @@ class Doubts:
     allowed: Allowed | None = None
     spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     deeper: Outcome | None = None
+
+
+def sizes_at(task: Task, found: Outcome) -> Array:
+    """Return by how much each shared number counts as changed much: by itself, of a logarithmic one by a factor e."""
+    searched = task.forecast.space.parameters
+    sizes = np.maximum(np.abs(found.point.shared), 1.0)
+    sizes[:len(searched)][[p.logarithmic for p in searched]] = 1.0
+    return sizes
+
+
+def vague(information: Array, inflation: float, sizes: Array, asked: NDArray[np.bool_]) -> tuple[Any, Array]:
+    """Return what is not determined of the numbers that are asked about, and the directions."""
+    flags, directions = vague_directions(information[np.ix_(asked, asked)], inflation, sizes[asked])
+    all_flags, all_directions = np.zeros(len(asked), np.bool_), np.zeros((len(asked), directions.shape[1]))
+    all_flags[asked], all_directions[asked] = flags, directions
+    return all_flags, all_directions
 
 
 def prior_share(names: Sequence[str], doubt: Uncertainty, reaching: Mapping[int, Ends], flags: NDArray[np.bool_],

@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+NOT_YET = "not determined yet"
+"""How an interval is told that a fit which was stopped has left open."""
+
 LEAST_SHARE = 0.005
 """Of an interval: less prior than this is not worth a word."""
 
@@ -43,8 +46,8 @@ class Interval(NamedTuple):
     lower, upper : float
         nan where the logs do not determine the value.
     method : str
-        "normal", "profile", "by pulses" (a delay: what commands and pulses allow), "at bound", "undetermined", or "not
-        sought".
+        "normal", "profile", "linearised" (of a fit that was stopped), "by pulses" (a delay: what
+        commands and pulses allow), "at bound", "undetermined", "not determined yet" (at a stop), or "not sought".
     """
 
     lower: float
@@ -256,7 +259,7 @@ class Fit:
         if name in self.at_bound:
             return Interval(nowhere, nowhere, "at bound")
         if self.doubt is None or k not in self.ends:
-            return Interval(nowhere, nowhere, "not sought")
+            return Interval(nowhere, nowhere, "not sought" if self.doubt is None or not self.interrupted else NOT_YET)
         ends, std = self.ends[k], float(self.doubt.std[k])
         factor = self.doubt.quantile(level, k) / self.doubt.quantile(self.level, k)
         values = [self._value(k, self.best[k] + factor * end * std) for end in (ends.lower, ends.upper)]

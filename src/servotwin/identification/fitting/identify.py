@@ -21,7 +21,7 @@ from servotwin.identification.fitting.common_cause import common_cause
 from servotwin.identification.fitting.comparison import BESIDE, ErrorTables, compare
 from servotwin.identification.fitting.counts import counts_of
 from servotwin.identification.fitting.delay_range import delay_range, phase_errors, unsure_commands
-from servotwin.identification.fitting.doubts import Doubts, allowed, prior_share
+from servotwin.identification.fitting.doubts import Doubts, allowed, prior_share, sizes_at, vague
 from servotwin.identification.fitting.findings import explained, first_looks
 from servotwin.identification.fitting.fit import Fit, Start, Trace
 from servotwin.identification.fitting.forecast import Forecast
@@ -31,6 +31,7 @@ from servotwin.identification.fitting.held_out import trace_of, with_pulses_of
 from servotwin.identification.fitting.holdout import split
 from servotwin.identification.fitting.intervals import ends
 from servotwin.identification.fitting.judging import with_verdict
+from servotwin.identification.fitting.linearised import LINEARISED, hurried
 from servotwin.identification.fitting.phases import credible
 from servotwin.identification.fitting.point import FINE, NUISANCES, SHARED, STEP, LogPart, Point
 from servotwin.identification.fitting.record import identified_servo, stopped, with_record, with_what_logs_say
@@ -39,7 +40,7 @@ from servotwin.identification.fitting.robot_registers import as_logs_say
 from servotwin.identification.fitting.stopping import Course, Within
 from servotwin.identification.fitting.task import HUBER, Task
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty, rows_of, uncertainty
-from servotwin.identification.fitting.words import explain, simplest, vague_directions
+from servotwin.identification.fitting.words import explain, simplest
 from servotwin.identification.fitting.yielding import Dropped, Widened, Yielded, settle, widened, yielded
 from servotwin.logs.log import Log
 from servotwin.models import DigitalServo, Model
@@ -196,6 +197,7 @@ def identify(
     with running.crew, course.watching(), checks.shown(progress) as show, explained(noticed):
         course.show = show
         fit = _run(task, held_out, beside, level, course, intervals=intervals, trials=trials)
+        course.ended()
     fit = replace(fit, warnings=(*assumed, *noticed, *fit.warnings), seconds=clock.monotonic() - began)
     return with_record(fit, read, fitted, mend)
 
@@ -252,6 +254,9 @@ def _doubted(task: Task, found: Outcome, level: float, course: Course, missing: 
             found, doubts = _with_doubts(task, found, level, course)
         except KeyboardInterrupt:
             missing.append("intervals")
+    if "intervals" in missing:
+        found, doubts = hurried(task, found, level)
+        missing[missing.index("intervals")] = "intervals" if doubts.doubt is None else LINEARISED
     return found, left, doubts
 
 
@@ -298,25 +303,23 @@ def _doubts(task: Task, found: Outcome, level: float, show: Callable[[float, str
     rows: list[Rows] = [rows_of(part, task.loss, own, found.point.own[k], counts_of(forecast, k))
                         for k, part, own in zip(task.fitted, parts, beliefs, strict=True)]
     stuck = task.at_bound(found) | task.held
-    x, searched = found.point.shared, forecast.space.parameters
-    sizes = np.maximum(np.abs(x), 1.0)
-    sizes[:len(searched)][[p.logarithmic for p in searched]] = 1.0
+    sizes = sizes_at(task, found)
     doubt = uncertainty(rows, task.prior, stuck)
     information = _information(task, found, parts, beliefs)
-    flags, directions = _vague(information, doubt.inflation, sizes, ~task.held)
+    flags, directions = vague(information, doubt.inflation, sizes, ~task.held)
     directions = simplest(directions)
     if flags.any():
         doubt = uncertainty(rows, task.prior, stuck, directions)
     names = (*forecast.space.names, *forecast.extra)
     shares = [*forecast.space.shares(found.point.shared), *([math.nan] * len(forecast.extra))]
-    vague = explain(names, shares, flags, directions)
+    open_ = explain(names, shares, flags, directions)
     which = [k for k in range(len(names)) if not flags[k] and not stuck[k]]
     search = Search(forecast, task.loss, task.prior, task.lower, task.upper, task.fitted, held=stuck)
     count = max(len(which), 1)
     seen: list[Outcome] = []
     reaching = ends(search, found, doubt, which, level, rows=rows, deeper=seen.append,
                     tell=lambda done: show(0.76 + 0.18 * done / count, "intervals"))
-    return Doubts(doubt, reaching, with_remedies(forecast, found.point, vague, names),
+    return Doubts(doubt, reaching, with_remedies(forecast, found.point, open_, names),
                   prior_share(names, doubt, reaching, flags, directions, task.prior.weight),
                   allowed(task, found, rows, directions, information, flags, doubt, reaching, level),
                   _spans(task, found, parts, rows, doubt, level),
@@ -335,14 +338,6 @@ def _spans(task: Task, found: Outcome, parts: Sequence[LogPart], rows: Sequence[
     task.unsure = unsure_commands(scan, pulses)
     return {"delay": delay_range(scan, pulses, [
         reach * error + task.stamps_off.get(k, 0.0) for k, error in zip(task.fitted, errors, strict=True)])}
-
-
-def _vague(information: Array, inflation: float, sizes: Array, asked: NDArray[np.bool_]) -> tuple[Any, Array]:
-    """Return what is not determined of the numbers that are asked about, and the directions."""
-    flags, directions = vague_directions(information[np.ix_(asked, asked)], inflation, sizes[asked])
-    all_flags, all_directions = np.zeros(len(asked), np.bool_), np.zeros((len(asked), directions.shape[1]))
-    all_flags[asked], all_directions[asked] = flags, directions
-    return all_flags, all_directions
 
 
 def _information(task: Task, found: Outcome, central: Sequence[LogPart], beliefs: Sequence[Prior]) -> Array:

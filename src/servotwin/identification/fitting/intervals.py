@@ -42,7 +42,7 @@ class Ends:
     lower, upper : float
         In standard errors of the normal approximation, from the best value (lower is negative).
     method : str
-        "normal" or "profile".
+        "normal", "profile" or "linearised".
     prior : float
         Of a profile: which part of the rise of the cost at its ends is that of the priors; else nan.
     """

@@ -166,7 +166,7 @@ def _white(series: Sequence[SensorSeries]) -> float:
 
 
 def bends(one: SensorSeries) -> Array:
-    """Return each sample less the line between its neighbours, as large as one sample's noise."""
+    """Return each sample minus the line between its neighbours, as large as one sample's noise."""
     t, y = one.time, one.residual
     first = (t[2:] - t[1:-1]) / (t[2:] - t[:-2])
     bend = y[1:-1] - first * y[:-2] - (1.0 - first) * y[2:]

@@ -75,6 +75,8 @@ def _unsure(doubts: Doubts, left_open: bool) -> str:
     """Return why a value that a fit found has no range."""
     if left_open:
         return "the logs alone do not determine it, and contradict what the file said of it"
+    if any(each.method == "linearised" for each in doubts.ends.values()):
+        return "the fit was stopped before it was determined"
     return "no interval was sought" if doubts.doubt is None else "ended at a bound of the search"
 
 

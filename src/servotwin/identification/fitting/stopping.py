@@ -7,18 +7,17 @@ import signal
 import threading
 import time as clock
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any
 
 from servotwin.errors import InputError
+from servotwin.identification.fitting.time_left import TimeLeft
 from servotwin.units import is_finite
 
 Show = Callable[[float, str], None]
 
-_STAGES = (0.0, 0.7, 0.76, 0.95, 0.96, 1.0)  # where search, priors, intervals, errors and trials begin, as they say it
-_USUAL = (1.0, 0.05, 0.3, 0.05, 0.6)  # what these take, in that of the search
-_BESIDE = 0.1  # more of the last for each simpler model
+LONGER = ", longer than usual"
 _OFTEN = 0.2  # s, between two times that the same is told
 
 
@@ -68,7 +67,7 @@ class Stops:
         self.show: Show = lambda share, text: None  # told that share; may raise KeyboardInterrupt, which stops the fit
         self.stopped = False
         self._noted = False
-        self._told, self._begun = (0.0, ""), False
+        self._told, self._share, self._begun = (0.0, ""), 0.0, False
         self._looked = -math.inf
 
     def __call__(self, share: float, text: str) -> None:
@@ -78,13 +77,14 @@ class Stops:
         ------
         KeyboardInterrupt
         """
-        self._told, self._begun = (self._of_all(share), text), True
+        self._share, self._begun = share, True
+        self._told = self._of_all(share, text)
         self._looked = -math.inf
         self.look()
 
-    def _of_all(self, share: float) -> float:
-        """Return the share of all work that is done."""
-        return max(share, self._told[0])
+    def _of_all(self, share: float, text: str) -> tuple[float, str]:
+        """Return the share of all work that is done, and what goes on."""
+        return max(share, self._told[0]), text
 
     def look(self) -> None:
         """Stop if it is time to; else say again how far it is, if that was long ago.
@@ -101,6 +101,7 @@ class Stops:
                 raise KeyboardInterrupt
             if self._begun and now - self._looked >= _OFTEN:
                 self._looked = now
+                self._told = self._of_all(self._share, self._told[1].removesuffix(LONGER))
                 self.show(*self._told)
         except KeyboardInterrupt:
             self.stopped = True
@@ -127,7 +128,7 @@ class Stops:
 
 
 class Course(Stops):
-    """The way of a fit: stages say which share of theirs is done, and it is told which share of all work.
+    """The way of a fit: stages say which share of theirs is done, and it is told which share of its time is gone.
 
     Parameters
     ----------
@@ -140,12 +141,20 @@ class Course(Stops):
         Whether causes may be tried: what is left counts them until the fit ends without.
     """
 
+    clock: Callable[[], float] = staticmethod(clock.monotonic)
+
     def __init__(self, within: Within, *, intervals: bool = True, beside: int = 0, trials: bool = True) -> None:
         super().__init__(within)
-        self._usual = (*_USUAL[:2], _USUAL[2] * intervals, _USUAL[3] + _BESIDE * beside, _USUAL[4] * trials)
+        self._left, self._since = TimeLeft(intervals=intervals, beside=beside, trials=trials), self.clock()
 
-    def _of_all(self, share: float) -> float:
-        """Return the share of all work that is done: what lies ahead is as much as usual beside what was measured."""
-        stage = max(k for k in range(5) if share >= _STAGES[k])
-        inner = (share - _STAGES[stage]) / (_STAGES[stage + 1] - _STAGES[stage])
-        return super()._of_all((sum(self._usual[:stage]) + inner * self._usual[stage]) / sum(self._usual))
+    def _of_all(self, share: float, text: str) -> tuple[float, str]:
+        """Return the share of its time that is gone; of a stage that takes longer than was said, the text says so."""
+        gone = self.clock() - self._since
+        left = self._left.at(share, gone)
+        done = gone / (gone + left) if gone + left > 0.0 else 0.0
+        return max(done, self._told[0]), text + LONGER * self._left.longer
+
+    def ended(self) -> None:
+        """Tell that nothing is left."""
+        with suppress(KeyboardInterrupt):
+            self.show(1.0, "")

@@ -196,7 +196,8 @@ def _reading(fit: Fit) -> str:
     return f"""<ul>
 <li><b>Interval.</b> If the model is right, {level} of such intervals hold the true value. “Normal law”: the cost is a
 parabola near its minimum. “Profile”: it is not, so the ends were found by fixing the number and fitting all
-others.</li>
+others. “Linearised”: the fit was stopped; the ends are those of the problem made straight at the best so far, twice as
+far off and beyond where a whole step would lead.</li>
 <li><b>Held out.</b> These logs took no part in the fit. Their error is what to expect of the next log of that kind. An
 error that is much smaller on fitted logs means that the others show what these do not, or that these are too few.</li>
 <li><b>Verdict.</b> Residuals beside noise that needs no model: of a shaft that stands, of neighbouring samples, of

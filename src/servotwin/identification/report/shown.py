@@ -39,7 +39,8 @@ class Line:
     unit : str
         As it is printed.
     method : str
-        How the interval was found: "normal", "profile", "at bound", "undetermined" or "not sought".
+        How the interval was found: "normal", "profile", "linearised", "at bound", "undetermined"
+        or "not sought".
     nuisance : bool
         Whether it belongs to the rig and not to the servo.
     prior : str
