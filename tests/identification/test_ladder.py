@@ -10,7 +10,7 @@ import servotwin as st
 from identification.synthetic_logs import TRUTH, noisy, run
 from servotwin.errors import InputError
 from servotwin.identification import RUNGS, friction_ladder
-from servotwin.identification.fitting.ladder import Rung, _choice, _told
+from servotwin.identification.fitting.choosing import Rung, choice_of, told_of
 
 FREE = ["motor.armature_resistance", "output_inertia", "electronics.stretcher_gain"]
 PLAIN = {"starts": 1, "priors": None, "nuisance": ("delay", "angle_offset", "initial_state")}
@@ -152,31 +152,31 @@ def test_the_simplest_within_one_standard_error_of_the_best_is_chosen():
     """M3 is better by far, M4 a little and not on every log: M3."""
     rungs = [rung("M1", [0.03, 0.04, 0.05, 0.03]), rung("M3", [0.010, 0.012, 0.011, 0.013]),
              rung("M4", [0.0101, 0.0119, 0.0112, 0.0126])]
-    assert _choice(rungs, "holdout")[0] == "M3"
-    assert "M4" in _choice(rungs, "holdout")[1]
+    assert choice_of(rungs, "holdout")[0] == "M3"
+    assert "M4" in choice_of(rungs, "holdout")[1]
 
 
 def test_a_small_gain_on_every_log_is_one():
     rungs = [rung("M1", [0.0120, 0.0221, 0.0319, 0.0420]), rung("M2", [0.0110, 0.0211, 0.0310, 0.0411])]
-    assert _choice(rungs, "holdout") == ("M2", "smallest error on logs that were held out")
+    assert choice_of(rungs, "holdout") == ("M2", "smallest error on logs that were held out")
 
 
 def test_two_logs_do_not_say_how_logs_scatter():
     """A law that is wrong on one of two logs does not pass as one standard error of a scatter of two."""
     rungs = [rung("M2", [0.0011, 0.0051]), rung("M3", [0.00111, 0.00117]), rung("M4", [0.00111, 0.00116])]
-    assert _choice(rungs, "holdout")[0] == "M3"
+    assert choice_of(rungs, "holdout")[0] == "M3"
 
 
 def test_overfitting_is_shown_and_not_chosen():
     """M6 is best on what it was fitted to, and worse on others."""
     rungs = [rung("M1", [0.011, 0.012, 0.010], training=0.010), rung("M6", [0.030, 0.020, 0.025], training=0.002)]
     assert [r.overfits for r in rungs] == [False, True]
-    assert _choice(rungs, "holdout")[0] == "M1"
+    assert choice_of(rungs, "holdout")[0] == "M1"
 
 
 def test_without_logs_held_out_the_criterion_decides():
     rungs = [rung("M1", [], criterion=-10.0), rung("M2", [], criterion=-12.0)]
-    assert _choice(rungs, "holdout") == ("M2", "smallest information criterion")
+    assert choice_of(rungs, "holdout") == ("M2", "smallest information criterion")
 
 
 def test_the_error_is_told_by_logs_that_did_not_choose():
@@ -185,20 +185,20 @@ def test_the_error_is_told_by_logs_that_did_not_choose():
     seen, told = [], []
     for _ in range(200):
         rungs = [rung(f"M{k}", np.sqrt(rng.chisquare(3, 8) / 3.0).tolist()) for k in range(1, 13)]
-        chosen = _choice(rungs, "holdout")[0]
+        chosen = choice_of(rungs, "holdout")[0]
         seen.append(next(r.holdout for r in rungs if r.name == chosen) ** 2)
-        told.append(_told(rungs, "holdout").error ** 2)
+        told.append(told_of(rungs, "holdout").error ** 2)
     assert np.mean(told) == pytest.approx(1.0, abs=0.06)  # what every rung is worth
     assert np.mean(seen) < 0.85
 
 
 def test_halves_that_choose_differently_are_named():
     rungs = [rung("M1", [0.01, 0.03, 0.01, 0.03]), rung("M3", [0.03, 0.01, 0.03, 0.01])]
-    found = _told(rungs, "holdout")
+    found = told_of(rungs, "holdout")
     assert found.choices == ("M1", "M3")
     assert found.error == pytest.approx(0.03)
-    assert math.isnan(_told([rung("M1", [0.01])], "holdout").error)
-    assert _told(rungs, "criterion") == (rungs[0].holdout, ())
+    assert math.isnan(told_of([rung("M1", [0.01])], "holdout").error)
+    assert told_of(rungs, "criterion") == (rungs[0].holdout, ())
 
 
 @pytest.mark.parametrize(("more", "words"), [({"rungs": ("M7",)}, "rungs"), ({"rungs": ()}, "at least one rung"),
