@@ -162,7 +162,8 @@ class _Climb(NamedTuple):
     def fitted(self, name: str, tell: Any, *, exactly: bool = False) -> bool:
         """Fit a rung as closely as a choice asks for, or to its end, and tell whether that came to its end."""
         fitted = []
-        for base in _bases(name, self.found) or [None]:
+        bases: Sequence[Rung | None] = _bases(name, self.found) or [None]
+        for base in bases:
             begin = Begin(self.options.get("starts", _STARTS)) if base is None else Begin.after(base.fit)
             servo = _start(self.servo if base is None else base.fit.servo, name, self.servo)
             fit = self._fit(name, servo, begin._replace(exactly=exactly), tell, intervals=exactly)
