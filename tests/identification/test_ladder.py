@@ -10,7 +10,7 @@ import servotwin as st
 from identification.synthetic_logs import TRUTH, noisy, run
 from servotwin.errors import InputError
 from servotwin.identification import RUNGS, friction_ladder
-from servotwin.identification.fitting.choosing import Rung, choice_of, told_of
+from servotwin.identification.fitting.choosing import Rung, choice_of, told_of, with_criterion
 
 FREE = ["motor.armature_resistance", "output_inertia", "electronics.stretcher_gain"]
 PLAIN = {"starts": 1, "priors": None, "nuisance": ("delay", "angle_offset", "initial_state")}
@@ -115,6 +115,49 @@ def test_errors_are_those_of_the_fits(plain):
     assert plain["M1"].fit.holdout.logs == plain["M3"].fit.holdout.logs
 
 
+def test_only_the_chosen_rung_is_searched_to_its_end(loaded):
+    """The others are there to be compared."""
+    chosen, other = loaded["M3"].fit, loaded["M1"].fit
+    assert chosen.verdict is not None
+    assert chosen.ends
+    assert other.verdict is None
+    assert not other.ends
+    assert not other.interrupted
+
+
+PENDULUMS = st.load_servo("dynamixel-xl330-m288").replace({
+    "supply.bridge_drop_resistance": None, "friction.load_friction": 0.2})
+
+
+def swung(servo, count=5, duration=2.0):
+    """Return logs of a bus servo that swings pendulums, of two gains of its loop."""
+    some = []
+    for k in range(count):
+        time, gain = np.arange(0.0, duration, 0.01), 2.8774e-3 * (100, 400)[k % 2]
+        command = (1.2, 0.8, 0.5, 1.0)[k % 4] * np.sin(2.0 * np.pi * (0.5, 0.8, 1.2, 0.6)[k % 4] * time)
+        command += 0.3 * (np.floor(time / 0.7) % 2)
+        log = st.Log(name=f"{k}", time=time, command=command, command_kind="angle", motion=f"{k}",
+                     load=st.loads.Pendulum(mass=0.25 + 0.1 * (k % 3), length=0.12, inertia=0.0),
+                     parameters={"firmware.proportional_gain": gain}, measured={"output_angle": np.zeros(len(time))})
+        seen = st.simulate(st.DigitalServo(servo.replace(log.parameters)), log.signal(None), load=log.load,
+                           duration=float(time[-1]), output_times=time, initial={"output_angle": float(command[0])})
+        some.append(noisy(replace(log, measured={"output_angle": seen["output_angle"]}), 2e-3, seed=(0, k)))
+    return some
+
+
+@pytest.mark.parametrize(("truth", "expected"), [
+    (PENDULUMS, "M3"), (PENDULUMS.replace({"supply.bridge_drop_resistance": 2.0}), "M3, soft bridge")],
+    ids=["hard", "soft"])
+def test_the_law_and_the_bridge_of_a_bus_servo_are_named(truth, expected):
+    """From a winding 20 % off, where lanes go nearly."""
+    far = PENDULUMS.replace({"motor.armature_resistance": 1.2 * PENDULUMS.motor.armature_resistance})
+    found = friction_ladder(swung(truth), far, free=["motor.armature_resistance", "output_torque_constant",
+                            "output_inertia"], rungs=("M1", "M3"), gives_way=True, select="criterion", holdout=0,
+                            priors=None, starts=1, intervals=False)
+    assert found.chosen == expected
+    assert found.fit.estimates["friction.load_friction"] == pytest.approx(0.2, abs=0.01)
+
+
 @pytest.mark.slow
 def test_all_rungs_on_few_logs():
     """Six laws on four short logs: each begins where a simpler one ended, and the noise is all that is left to fit."""
@@ -177,6 +220,27 @@ def test_overfitting_is_shown_and_not_chosen():
 def test_without_logs_held_out_the_criterion_decides():
     rungs = [rung("M1", [], criterion=-10.0), rung("M2", [], criterion=-12.0)]
     assert choice_of(rungs, "holdout") == ("M2", "smallest information criterion")
+
+
+class _Seen:
+    """A fit as a criterion reads it: errors that remember the one before, and so many numbers."""
+
+    def __init__(self, size, memory, names):
+        rng, error = np.random.default_rng(int(100 * memory)), np.zeros(4000)
+        for k in range(1, len(error)):
+            error[k] = memory * error[k - 1] + rng.normal()
+        error *= size / np.sqrt(np.mean(error**2))
+        self.names = ("x",) * names
+        self.traces = (type("T", (), {"time": np.arange(4000.0), "residual": error, "held_out": False})(),)
+
+
+def test_a_criterion_counts_all_rungs_by_the_same_residuals():
+    """One whose errors remember longer would seem to explain more of them, each counted by its own."""
+    rungs = with_criterion([Rung("M1", _Seen(0.012, 0.9, 3), 0.012, math.nan, math.nan),
+                            Rung("M3", _Seen(0.010, 0.5, 5), 0.010, math.nan, math.nan)])
+    samples = 4000 / 3.0  # (1 + rho)/(1 - rho) of the better one
+    gap = samples * 2.0 * math.log(1.2) - 2.0 * math.log(samples)
+    assert rungs[0].criterion - rungs[1].criterion == pytest.approx(gap, rel=0.1)
 
 
 def test_the_error_is_told_by_logs_that_did_not_choose():

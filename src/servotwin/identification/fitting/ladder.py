@@ -64,6 +64,7 @@ _ON_THE_BUS = "soft supply"
 _SOFT_SHARE = 0.2  # of the armature's resistance, where that of what gives way begins: nearer to 0 it may stay there
 _STIFFER = 0.9  # of the armature's resistance, that then begins lower
 _STARTS = 3  # searches of the first law, unless `starts` says
+_NEARLY_AS_GOOD = 15.0  # of the criterion
 _BASES = 2  # simpler laws at which one begins
 _STRIBECK_SPEED = 0.2  # rad/s at the output, where Stribeck friction begins to fade
 
@@ -175,6 +176,7 @@ class _Climb(NamedTuple):
 
     def end(self, tell: Any) -> None:
         """Search what is chosen to its end, until what is chosen was."""
+        self._back(tell)
         ended: set[str] = set()
         while (name := self.best()) not in ended:
             ended.add(name)
@@ -184,6 +186,22 @@ class _Climb(NamedTuple):
             self.found[place] = rung_of(name, fit)
             if fit.interrupted:
                 break
+
+    def _back(self, tell: Any) -> None:
+        """Search laws within the chosen one that are nearly as good from its end: kinks may have held them."""
+        several = self.ordered()
+        chosen = next(rung for rung in several if rung.name == self.best())
+        for rung in several:
+            if not _contains(chosen.name, rung.name) or rung.criterion > chosen.criterion + _NEARLY_AS_GOOD:
+                continue
+            extra = _parts(chosen.name)[1]
+            given = {EXTRAS[extra]: self.servo.get(EXTRAS[extra])} if extra and not _parts(rung.name)[1] else {}
+            servo = _start(chosen.fit.servo.replace(given), rung.name, self.servo)
+            fit = self._fit(rung.name, servo, Begin.after(chosen.fit, exactly=False), tell, intervals=False)
+            if fit.interrupted:
+                break
+            place = next(k for k, one in enumerate(self.found) if one.name == rung.name)
+            self.found[place] = min(self.found[place], rung_of(rung.name, fit), key=lambda one: one.training)
 
     def _fit(self, name: str, servo: Servo, begin: Begin, tell: Any, *, intervals: bool) -> Fit:
         law, extra = _parts(name)

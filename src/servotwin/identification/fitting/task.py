@@ -48,7 +48,7 @@ _MOST_SAG = 3.0  # rad/V
 _STARTS = 0.6  # of the way: rough searches from several starts
 _MOST = {"rough": 12, "all": 25, "few": 10}  # steps
 _FEW_ROUNDS = 2  # of search and noise among kinks, where a search wanders on for ever
-_BLOCKS, _BLOCK_PAYS = 6, 0.01  # of steps, after the first ones, and the share of the cost that each has to gain
+_BLOCKS, _BLOCK_PAYS = 6, 1.0  # of steps, after the first ones; independent residuals whose share each has to gain
 _MANY_LOGS = 16  # from which on half as many lead near
 _ABOUT = 0.3  # of a searched number: how far off a servo file may be, while clocks are sought
 _NOTHING = 0.35  # of what a search began with
@@ -286,14 +286,16 @@ class Task:
         return replace(best, cost=search.costs([best.point])[0])
 
     def _as_long_as_it_pays(self, found: Outcome, tell: Told) -> Outcome:
-        """Return where a search ends that goes on in some steps at a time, until these gain little.
+        """Return where a search ends that goes on in some steps at a time, until these gain no more than chance does.
 
         Among kinks no step tells whether the next one gains.
         """
         for _ in range(_BLOCKS):
-            before = found.cost
+            parts = self.forecast.at(found.point, derivatives=False, cases=self.fitted)
+            count = sum(len(part.residual) for part in parts) / widening(parts, self.loss)
+            before = found
             found = self._refined(found.point, self.fitted, rounds=_FEW_ROUNDS, tell=tell, began=0.0)
-            if not found.cost < (1.0 - _BLOCK_PAYS) * before:
+            if not found.cost < (1.0 - _BLOCK_PAYS / max(count, 1.0)) * self.cost(before.point):
                 break
         return found
 
