@@ -26,6 +26,7 @@ MIDDLE = 2048.0  # counts
 REGISTERS = {  # of the file "single": P, zone and start as its loads at rest show them, the rest as its author says
     "P_Coefficient": 32, "D_Coefficient": 32, "I_Coefficient": 0, "CW_Dead_Zone": 1, "CCW_Dead_Zone": 1,
     "Minimum_Startup_Force": 0, "Goal_Velocity": 1000, "Acceleration": 20, "Phase": 12}
+TURNS = 250.0  # counts/s, from which on it surely turns
 LEVER = 2e-4  # kg m2, with horn: a guess
 
 
@@ -37,6 +38,16 @@ class Rows(NamedTuple):
     position: Array
     load: Array
     pull: Array  # in +q
+    current: Array  # A, as its register says
+
+
+class Duties(NamedTuple):
+    """Mean duty, in the sense of the motion or of the pull, as measured and as predicted."""
+
+    turning: tuple[float, float]  # faster than 250 counts/s
+    speed: float  # rad/s, the mean of these
+    resting: tuple[float, float]  # after a move
+    pulled: tuple[float, float]
 
 
 class Told(NamedTuple):
@@ -47,6 +58,7 @@ class Told(NamedTuple):
     measured: dict[str, float]
     predicted: dict[str, float]
     late: tuple[float, ...]  # s, of each goal behind its row
+    duties: Duties
 
     def play(self, of: dict[str, float], pulled: bool = True) -> float:
         """Return how far two pulls the other way move it [counts], while they pull or after."""
@@ -68,7 +80,8 @@ def read(path: Path, tested: int = 5, pullers: tuple[int, int] = (3, 4)) -> Rows
     load = np.where(word >= 1024.0, word - 1024.0, -word) / 1000.0  # its word counts a drive towards lower counts
     one, other = (column("pos", who) for who in pullers)
     pull = PULL * ((other.max() - other) / np.ptp(other) - (one - one.min()) / np.ptp(one))
-    return Rows(time, column("target pos", tested), column("pos", tested), load, pull)
+    return Rows(time, column("target pos", tested), column("pos", tested), load, pull,
+                6.5e-3 * column("current", tested))
 
 
 def servo(**registers: int) -> st.Servo:
@@ -76,8 +89,8 @@ def servo(**registers: int) -> st.Servo:
     return st.feetech_sts({**REGISTERS, **registers}, servo="feetech-sts3215-12v")
 
 
-def predicted(rows: Rows, late: float, twin: st.Servo) -> Array:
-    """Return positions [counts] at the rows' times, goals coming so late behind their rows."""
+def predicted(rows: Rows, late: float, twin: st.Servo) -> tuple[Array, Array]:
+    """Return positions [counts] and duties at the rows' times, goals coming so late behind their rows."""
     goals = COUNT * (rows.goal - MIDDLE)
     first = COUNT * (rows.position[0] - MIDDLE)
     end = float(rows.time[-1])
@@ -85,23 +98,43 @@ def predicted(rows: Rows, late: float, twin: st.Servo) -> Array:
     load = st.loads.Inertia(LEVER) + st.loads.Recorded(rows.time, -rows.pull)
     run = st.simulate(st.DigitalServo(twin), command, duration=end, load=load, output_times=rows.time,
                       initial={"output_angle": first})
-    return np.floor(run["output_angle"] / COUNT + 0.5) + MIDDLE
+    return np.floor(run["output_angle"] / COUNT + 0.5) + MIDDLE, np.asarray(run["duty"])
 
 
 def told(rows: Rows, twin: st.Servo) -> Told:
     """Return what the registers predict beside what was measured, each goal as late as its move fits best."""
     begins = np.flatnonzero(np.diff(rows.goal)) + 1
     windows = [np.arange(k, min(k + 8, len(rows.time))) for k in begins]
-    tries = {float(late): predicted(rows, float(late), twin) - rows.position for late in np.arange(0.03, 0.121, 0.01)}
+    runs = {float(late): predicted(rows, float(late), twin) for late in np.arange(0.03, 0.121, 0.01)}
+    tries = {x: counts - rows.position for x, (counts, _) in runs.items()}
     late = tuple(min(tries, key=lambda x: float(np.sum(tries[x][window] ** 2))) for window in windows)
     moving = np.concatenate([tries[x][window] for x, window in zip(late, windows, strict=True)])
     rests = np.arange(len(rows.time)) > begins[0]
     rests[np.concatenate(windows)] = False
     rests &= np.abs(np.gradient(rows.pull)) < 0.02 * PULL
-    off = tries[float(np.median(late))] if float(np.median(late)) in tries else next(iter(tries.values()))
-    counts = off + rows.position
+    usual = float(np.median(late)) if float(np.median(late)) in tries else next(iter(tries))
+    off, (counts, duty) = tries[usual], runs[usual]
     return Told(float(np.sqrt(np.mean(moving**2))), float(np.sqrt(np.mean(off[rests] ** 2))),
-                _droops(rows, rows.position, begins), _droops(rows, counts, begins), late)
+                _droops(rows, rows.position, begins), _droops(rows, counts, begins), late,
+                _duties(rows, counts, duty, begins[0]))
+
+
+def _duties(rows: Rows, counts: Array, duty: Array, first: int) -> Duties:
+    """Return duties of a prediction beside those measured, each where its own shaft turns, rests or is pulled."""
+    def of(position: Array, drive: Array) -> tuple[float, float, float, float]:
+        speed = np.gradient(position, rows.time)
+        later = np.arange(len(position)) > first
+        turns = later & (np.abs(speed) > TURNS)
+        stays = later & (np.abs(np.gradient(position)) == 0.0) & (np.abs(np.gradient(rows.pull)) < 0.02 * PULL)
+        pulled = stays & (np.abs(rows.pull) > 0.98 * PULL)
+        moved = np.maximum.accumulate(np.where(turns, np.arange(len(position)), -1))
+        pulls = np.maximum.accumulate(np.where(np.abs(rows.pull) > 0.1 * PULL, np.arange(len(position)), -1))
+        alone = stays & (np.abs(rows.pull) < 0.02 * PULL) & (moved > pulls)
+        return (float(np.mean((drive * np.sign(speed))[turns])), float(np.mean(np.abs(speed[turns]))) * COUNT,
+                float(np.mean(np.abs(drive[alone]))), float(np.mean(-(drive * np.sign(rows.pull))[pulled])))
+
+    measured, ours = of(rows.position, rows.load), of(counts, duty)
+    return Duties((measured[0], ours[0]), measured[1], (measured[2], ours[2]), (measured[3], ours[3]))
 
 
 def _droops(rows: Rows, counts: Array, begins: NDArray[np.intp]) -> dict[str, float]:

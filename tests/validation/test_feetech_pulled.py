@@ -27,8 +27,17 @@ def test_play_shows_where_the_pull_changes_sides(told):
     assert told.play(told.predicted, pulled=False) == pytest.approx(7.0, abs=2.0)
 
 
+def test_duties_are_not_those_of_a_bridge_that_brakes(told):
+    """Turning it takes less duty than back EMF alone would, 0.077; a bridge that brakes between its pulses cannot."""
+    twin = feetech_pulled.servo()
+    emf = twin.get("gear.gear_reduction") * twin.get("motor.back_emf_constant") * told.duties.speed
+    measured, predicted = told.duties.turning
+    assert measured < 0.9 * emf / twin.get("supply.open_circuit_voltage") < 0.6 * predicted
+    assert told.duties.pulled[0] > 1.2 * told.duties.pulled[1]
+
+
 def test_droop_under_a_pull_is_underestimated(told):
-    """14.8 counts apart, predicted 7.8: friction of the catalogue holds the pull alone, that of this servo does not."""
+    """14.8 counts apart, predicted 7.8: small duties of a bridge that brakes are worth twice what this servo's are."""
     assert told.play(told.measured) == pytest.approx(14.8, abs=0.1)
     assert 6.0 < told.play(told.predicted) < told.play(told.measured)
     for word in ("pulled up", "pulled down", "after up", "after down"):

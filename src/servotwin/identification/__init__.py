@@ -2,13 +2,14 @@
 
 from servotwin.identification.arms import ArmFit, identify_arm
 from servotwin.identification.fitting.advise import Advice, Experiment, advise
+from servotwin.identification.fitting.choosing import Ladder, Rung
 from servotwin.identification.fitting.findings import Finding, findings
 from servotwin.identification.fitting.fit import Fit, Interval, Start, Trace
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import LUMPED, FreeParameter, Space
 from servotwin.identification.fitting.holdout import ErrorTable, LogError
 from servotwin.identification.fitting.identify import identify
-from servotwin.identification.fitting.ladder import RUNGS, Ladder, Rung, friction_ladder
+from servotwin.identification.fitting.ladder import RUNGS, friction_ladder
 from servotwin.identification.fitting.point import LogPart, Point
 from servotwin.identification.fitting.structures import Structure, as_structure, compare_structures
 from servotwin.identification.fitting.uncertainty import Uncertainty

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.identification.fitting.baselines import fit_slew_lag
+from servotwin.identification.fitting.begin import Begin
 from servotwin.identification.fitting.fit import Trace
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import LUMPED, Space
@@ -118,7 +119,7 @@ def _of_m1(whole: Task, held_out: Sequence[int], traces: Sequence[Trace], model:
     forecast = Forecast(logs, plain, simple, whole.forecast.nuisance, whole.forecast.sensors,
                         whole.forecast.running)
     forecast.goes_on_from(whole.forecast)
-    task = Task(forecast, whole.loss, whole.fitted, whole.seed, 1, whole.noise)
+    task = Task(forecast, whole.loss, whole.fitted, whole.seed, Begin(), whole.noise)
     # When pulses come, and what else is of the rig, is so whatever the law of friction
     begin = point._replace(shared=np.concatenate([simple.start, point.shared[len(space):]]))
     found = task.nearby(begin, lambda share, text: (tell(), None)[1])

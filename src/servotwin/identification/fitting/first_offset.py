@@ -1,17 +1,23 @@
-"""How far measured angles lie from commanded ones: where the search for their offset begins."""
+"""Where the searches for an offset and a delay begin: how far measured angles lie from commanded ones, and how late."""
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Sequence
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from servotwin.identification.fitting.case import Case
 from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.point import DELAY_SCALE, Point
 from servotwin.models import Model
 
+if TYPE_CHECKING:
+    from servotwin.identification.fitting.task import Task
+
+DELAYS = (0.02, 0.0, 0.04, 0.06, 0.09)  # s, where the search for it begins, and some others
 _NEAR = 0.3  # rad, an offset that the search finds by itself
 _LOOKS = 25  # of each log
 
@@ -30,6 +36,21 @@ def first_offset(forecast: Forecast, fitted: Sequence[int]) -> float:
         gaps += (case.values["output_angle"][some] - asked).tolist() if len(some) else []
     middle = float(np.median(gaps)) if gaps else 0.0
     return middle if abs(middle) > _NEAR else 0.0
+
+
+def at_likely_delay(task: Task, point: Point) -> Point:
+    """Return the point with the delay of which the residuals are smallest, of some usual ones, if none is known."""
+    forecast = task.forecast
+    if "delay" not in forecast.extra or "delay" in task.begin.shared:
+        return point
+    place, tried = len(forecast.space) + forecast.extra.index("delay"), []
+    for delay in DELAYS:
+        shared = point.shared.copy()
+        shared[place] = delay / DELAY_SCALE
+        tried.append(point._replace(shared=shared))
+    found = forecast.at_all(tried, cases=task.few())
+    sizes = [sum(float(np.abs(part.residual).sum()) for part in parts) for parts in found]
+    return tried[int(np.argmin([size if math.isfinite(size) else math.inf for size in sizes]))]
 
 
 def _model_of(forecast: Forecast, case: Case) -> Model:

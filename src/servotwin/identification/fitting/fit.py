@@ -21,9 +21,9 @@ from servotwin.models import Model
 from servotwin.parameters import Servo
 
 if TYPE_CHECKING:
+    from servotwin.identification.fitting.choosing import Ladder
     from servotwin.identification.fitting.draws import Allowed
     from servotwin.identification.fitting.intervals import Ends
-    from servotwin.identification.fitting.ladder import Ladder
     from servotwin.identification.fitting.uncertainty import Uncertainty
     from servotwin.identification.fitting.verdict import Verdict
     from servotwin.identification.fitting.yielding import Widened, Yielded
@@ -180,6 +180,8 @@ class Fit:
         alone would leave; nan of a number at a bound. Empty without intervals.
     allowed : Allowed
         The law that `draw` draws from.
+    own : tuple of ndarray
+        Each log's own numbers at the end of the search (scaled): its start, its delay or phases.
     interrupted : bool
         Whether it was stopped before its end: then this is the best so far.
     unknown : tuple of str
@@ -220,6 +222,7 @@ class Fit:
     widened: tuple[Widened, ...] = ()
     prior_share: Mapping[str, float] = field(default_factory=dict)
     allowed: Allowed | None = field(default=None, repr=False)
+    own: tuple[Array, ...] = field(default=(), repr=False)
 
     def intervals(self, level: float | None = None) -> dict[str, Interval]:
         """Return the interval of every name (SI).

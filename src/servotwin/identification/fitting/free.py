@@ -132,10 +132,10 @@ class Space:
             for name in names:
                 if name not in free:
                     raise InputError(f"{what}: {name}", got="a name that is not free", allowed=", ".join(free))
-        stated = {name: _stated(model.servo, name) for name in beliefs if name not in LOAD_NAMES}
+        said = stated(model.servo, [*beliefs])
         self.parameters = tuple(
             replace(_parameter(model.servo, name, limits.get(name), beliefs.get(name), load or {}),
-                    of_file=name in beliefs and beliefs[name] == stated.get(name)) for name in free)
+                    of_file=name in beliefs and beliefs[name] == said.get(name)) for name in free)
         self.names = tuple(free)
         self.start = np.array([p.scaled(p.start) for p in self.parameters])
         self.lower = np.array([p.scaled(p.lower) if p.lower > 0.0 or not p.logarithmic else -math.inf
@@ -343,13 +343,8 @@ def _limits(name: str, limits: Any, floor: float, ceiling: float, *, positive: b
 
 
 def _beliefs(servo: Servo, free: Sequence[str], priors: Priors | str | None) -> dict[str, tuple[float, float]]:
-    if priors is None:
-        return {}
-    if isinstance(priors, str):
-        if priors != "servo":
-            raise InputError("priors", got=priors, allowed='"servo", None or a mapping of names to (mean, std)')
-        found = {name: _stated(servo, name) for name in free if name not in LOAD_NAMES}
-        return {name: belief for name, belief in found.items() if belief is not None}
+    if priors is None or priors == "servo":
+        return {} if priors is None else stated(servo, free)
     if not isinstance(priors, Mapping):
         raise InputError("priors", got=priors, allowed='"servo", None or a mapping of names to (mean, std)')
     for name, belief in priors.items():
@@ -358,6 +353,12 @@ def _beliefs(servo: Servo, free: Sequence[str], priors: Priors | str | None) -> 
             raise InputError(f"prior of {name}", got=belief, allowed="mean and standard deviation (SI), the latter "
                              "positive")
     return {name: (float(mean), float(std)) for name, (mean, std) in priors.items()}
+
+
+def stated(servo: Servo, names: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Return mean and standard deviation of those names of which the servo's file states them (SI)."""
+    found = {name: _stated(servo, name) for name in names if name not in LOAD_NAMES}
+    return {name: belief for name, belief in found.items() if belief is not None}
 
 
 def _stated(servo: Servo, name: str) -> tuple[float, float] | None:

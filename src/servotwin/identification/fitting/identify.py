@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -14,14 +13,14 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.identification.fitting import checks
-from servotwin.identification.fitting.arrow import Loss, Outcome, Prior, Search
+from servotwin.identification.fitting.arrow import Loss, Outcome
 from servotwin.identification.fitting.batches import FIT_ACCURACY, Running
+from servotwin.identification.fitting.begin import Begin
 from servotwin.identification.fitting.clocks import ticking
 from servotwin.identification.fitting.common_cause import common_cause
 from servotwin.identification.fitting.comparison import BESIDE, ErrorTables, compare
-from servotwin.identification.fitting.counts import counts_of
-from servotwin.identification.fitting.delay_range import delay_range, phase_errors, unsure_commands
-from servotwin.identification.fitting.doubts import Doubts, allowed, prior_share, sizes_at, vague
+from servotwin.identification.fitting.doubting import doubts_of
+from servotwin.identification.fitting.doubts import Doubts
 from servotwin.identification.fitting.findings import explained, first_looks
 from servotwin.identification.fitting.fit import Fit, Start, Trace
 from servotwin.identification.fitting.forecast import Forecast
@@ -29,18 +28,13 @@ from servotwin.identification.fitting.frames import has_pulses
 from servotwin.identification.fitting.free import Bounds, Priors, Space
 from servotwin.identification.fitting.held_out import trace_of, with_pulses_of
 from servotwin.identification.fitting.holdout import split
-from servotwin.identification.fitting.intervals import ends
 from servotwin.identification.fitting.judging import with_verdict
 from servotwin.identification.fitting.linearised import LINEARISED, hurried
-from servotwin.identification.fitting.phases import credible
-from servotwin.identification.fitting.point import FINE, NUISANCES, SHARED, STEP, LogPart, Point
+from servotwin.identification.fitting.point import NUISANCES, SHARED, Point
 from servotwin.identification.fitting.record import identified_servo, stopped, with_record, with_what_logs_say
-from servotwin.identification.fitting.remedies import with_remedies
 from servotwin.identification.fitting.robot_registers import as_logs_say
 from servotwin.identification.fitting.stopping import Course, Within
 from servotwin.identification.fitting.task import HUBER, Task
-from servotwin.identification.fitting.uncertainty import Rows, Uncertainty, rows_of, uncertainty
-from servotwin.identification.fitting.words import explain, simplest
 from servotwin.identification.fitting.yielding import Dropped, Widened, Yielded, settle, widened, yielded
 from servotwin.logs.log import Log
 from servotwin.models import DigitalServo, Model
@@ -67,7 +61,7 @@ def identify(
     free: Sequence[str] | None = None, nuisance: Sequence[str] | None = None, priors: Priors | str | None = "servo",
     *, mend: Sequence[str] = (), bounds: Bounds | None = None, holdout: float | Sequence[str] | None = None,
     sensors: Sequence[str] | None = None,
-    starts: int = 3, loss: str = "huber", noise: Mapping[str, float] | None = None, level: float = 0.95,
+    starts: int | Begin = 3, loss: str = "huber", noise: Mapping[str, float] | None = None, level: float = 0.95,
     intervals: bool = True, compare_with: Sequence[str] = ("slew", "M1"), seed: int = 0, progress: Progress = False,
     diagnose: bool = True, executor: Any = None, accuracy: float = FIT_ACCURACY, within: float | Within | None = None,
     robot: Any = None, **of_robot: Any,
@@ -108,8 +102,8 @@ def identify(
         four logs or more unless given; 0: none.
     sensors : sequence of str, optional
         Measured signals that are fitted; the angle and all currents unless given.
-    starts : int
-        How many searches: one from the servo's values, the others from random ones.
+    starts : int or Begin
+        How many searches: one from the servo's values, the others from random ones. Or where another fit ended.
     loss : {"huber", "squares"}
         Huber: residuals of more than 1.345 times the noise count in proportion, not squared.
     noise : mapping, optional
@@ -179,7 +173,7 @@ def identify(
     plain = checks.checked_servo(servo, model)
     usual = checks.usual_free(plain, read) if free is None else ()
     plain, assumed = as_logs_say(plain, read)
-    given, noticed = first_looks(read, plain, mend)
+    given, noticed = (tuple(read), ()) if _seen_before(starts, mend) else first_looks(read, plain, mend)
     names = usual if free is None else checks.checked_list("free", free)
     beside = checks.checked_words("compare_with", compare_with, BESIDE)
     level, seed = checks.checked_level(level), checks.checked_count("seed", seed, least=0)
@@ -192,14 +186,20 @@ def identify(
     rig = usual_nuisance(plain) if nuisance is None else checks.checked_words("nuisance", nuisance, NUISANCES)
     forecast = Forecast(given, plain, space, rig, seen, running)
     checks.check_fitted(given, fitted, seen, len(names) + len(rig))
-    task = Task(forecast, Loss(checks.checked_loss(loss, HUBER)), fitted, seed,
-                checks.checked_count("starts", starts, least=1), checks.checked_noise(noise, seen))
+    begin = starts if isinstance(starts, Begin) else Begin(checks.checked_count("starts", starts, least=1))
+    task = Task(forecast, Loss(checks.checked_loss(loss, HUBER)), fitted, seed, begin,
+                checks.checked_noise(noise, seen))
     with running.crew, course.watching(), checks.shown(progress) as show, explained(noticed):
         course.show = show
         fit = _run(task, held_out, beside, level, course, intervals=intervals, trials=trials)
         course.ended()
     fit = replace(fit, warnings=(*assumed, *noticed, *fit.warnings), seconds=clock.monotonic() - began)
     return with_record(fit, read, fitted, mend)
+
+
+def _seen_before(starts: int | Begin, mend: Sequence[str]) -> bool:
+    """Tell whether another fit looked at the logs before, which goes on, and again at its end."""
+    return isinstance(starts, Begin) and bool(starts.own) and not starts.exactly and not mend
 
 
 def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: float, course: Course, *,
@@ -225,7 +225,7 @@ def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: fl
     middles = {name: 0.5 * (low + high) for name, (low, high) in doubts.spans.items()}
     fit = replace(fit, level=level, phased=forecast.phased, ticked=forecast.ticked,
                   estimates={**fit.estimates, **middles})
-    if "what is left" in missing:
+    if "what is left" in missing or not task.begin.exactly:
         return stopped(fit, missing)
     try:
         return stopped(with_verdict(task, found.point, fit, course, trials=trials and not missing), missing)
@@ -281,7 +281,7 @@ def _with_doubts(task: Task, found: Outcome, level: float,
 
     One at whose bottom more numbers stand at a bound is none of a servo: logs that no servo can follow have such.
     """
-    doubts = _doubts(task, found, level, show)
+    doubts = doubts_of(task, found, level, show)
     for _ in range(_VALLEYS):
         if doubts.deeper is None:
             break
@@ -291,62 +291,8 @@ def _with_doubts(task: Task, found: Outcome, level: float,
         if np.count_nonzero(task.at_bound(other)) > np.count_nonzero(bounds):
             task.forecast.noise = noise
             break
-        found, doubts = other, _doubts(task, other, level, show)
+        found, doubts = other, doubts_of(task, other, level, show)
     return found, doubts
-
-
-def _doubts(task: Task, found: Outcome, level: float, show: Callable[[float, str], None]) -> Doubts:
-    """Return covariance, ends of the intervals, what is not determined, and what is prior."""
-    forecast = task.forecast
-    parts = forecast.at(found.point, central=True, cases=task.fitted)
-    beliefs = [Prior(*forecast.own_belief(forecast.cases[k])) for k in task.fitted]
-    rows: list[Rows] = [rows_of(part, task.loss, own, found.point.own[k], counts_of(forecast, k))
-                        for k, part, own in zip(task.fitted, parts, beliefs, strict=True)]
-    stuck = task.at_bound(found) | task.held
-    sizes = sizes_at(task, found)
-    doubt = uncertainty(rows, task.prior, stuck)
-    information = _information(task, found, parts, beliefs)
-    flags, directions = vague(information, doubt.inflation, sizes, ~task.held)
-    directions = simplest(directions)
-    if flags.any():
-        doubt = uncertainty(rows, task.prior, stuck, directions)
-    names = (*forecast.space.names, *forecast.extra)
-    shares = [*forecast.space.shares(found.point.shared), *([math.nan] * len(forecast.extra))]
-    open_ = explain(names, shares, flags, directions)
-    which = [k for k in range(len(names)) if not flags[k] and not stuck[k]]
-    search = Search(forecast, task.loss, task.prior, task.lower, task.upper, task.fitted, held=stuck)
-    count = max(len(which), 1)
-    seen: list[Outcome] = []
-    reaching = ends(search, found, doubt, which, level, rows=rows, deeper=seen.append,
-                    tell=lambda done: show(0.76 + 0.18 * done / count, "intervals"))
-    return Doubts(doubt, reaching, with_remedies(forecast, found.point, open_, names),
-                  prior_share(names, doubt, reaching, flags, directions, task.prior.weight),
-                  allowed(task, found, rows, directions, information, flags, doubt, reaching, level),
-                  _spans(task, found, parts, rows, doubt, level),
-                  min(seen, key=lambda there: there.cost, default=None))
-
-
-def _spans(task: Task, found: Outcome, parts: Sequence[LogPart], rows: Sequence[Rows], doubt: Uncertainty,
-           level: float) -> dict[str, tuple[float, float]]:
-    """Return the range of the delay (SI) where each log's pulses say when they take effect."""
-    if not task.held.any():
-        return {}
-    reach = doubt.quantile(1.0 - (1.0 - level) / len(task.fitted))  # all of the logs have to hold
-    errors = phase_errors(task.forecast, task.fitted, parts, rows, task.loss, doubt)
-    scan = task.scan(found.point)
-    pulses = credible(scan, task.fitted)
-    task.unsure = unsure_commands(scan, pulses)
-    return {"delay": delay_range(scan, pulses, [
-        reach * error + task.stamps_off.get(k, 0.0) for k, error in zip(task.fitted, errors, strict=True)])}
-
-
-def _information(task: Task, found: Outcome, central: Sequence[LogPart], beliefs: Sequence[Prior]) -> Array:
-    """Return what the logs say of the shared numbers, from differences so fine that what has no effect has none."""
-    jagged = task.forecast.step > STEP  # then fine differences are those of steps, not of what moves the shaft
-    parts = central if jagged else task.forecast.at(found.point, step=FINE, cases=task.fitted)
-    rows = [rows_of(part, task.loss, own, found.point.own[k])
-            for k, part, own in zip(task.fitted, parts, beliefs, strict=True)]
-    return np.asarray(np.sum([(r.slope * r.inside[:, None]).T @ r.slope for r in rows], axis=0))
 
 
 def _traces(forecast: Forecast, point: Point, held_out: Sequence[int]) -> tuple[Trace, ...]:
@@ -391,4 +337,4 @@ def _fit(task: Task, found: Outcome, doubts: Doubts, dropped: tuple[Yielded, ...
         warnings=(*task.remarks, *task.unsure, *checks.warnings_of((*dropped, *wide), tables),
                   *_explained(task, dropped)),
         doubt=doubt, ends=dict(reaching), scales={n: scales[n] for n in forecast.extra}, yielded=dropped, widened=wide,
-        prior_share=doubts.prior_share, allowed=doubts.allowed, spans=doubts.spans)
+        prior_share=doubts.prior_share, allowed=doubts.allowed, spans=doubts.spans, own=found.point.own)

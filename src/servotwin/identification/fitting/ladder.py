@@ -1,25 +1,31 @@
 """The friction laws M1 to M6 one after the other on the same logs, and which of them the data pay for.
 
-Each rung begins where a simpler one ended. More terms always fit the logs that are fitted at least as well; whether
-they predict others better is what decides. A supply or a bridge that gives way bends speeds and torques as friction
-does, so the law that was chosen is fitted once more with each; where one is chosen, so are the richer laws with it.
+Each rung begins where simpler ones ended, the best two that no other one contains. It is searched as closely as a
+choice asks for, by lanes that go nearly where there are any; only the one that is chosen is searched to its end, with
+intervals. More terms always fit the logs that are fitted at least as well; whether they predict others better is what
+decides. A supply or a bridge that gives way bends speeds and torques as friction does, so all laws up to the one that
+was chosen are fitted once more with each; where one is chosen, so are the richer laws with it.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from servotwin.errors import InputError
 from servotwin.identification.fitting import checks
+from servotwin.identification.fitting.begin import Begin
+from servotwin.identification.fitting.choosing import (
+    Ladder,
+    Rung,
+    choice_of,
+    ladder_of,
+    rung_of,
+    with_criterion,
+)
 from servotwin.identification.fitting.fit import Fit
-from servotwin.identification.fitting.free import nominal
-from servotwin.identification.fitting.gains import gained
-from servotwin.identification.fitting.holdout import LogError, pooled
+from servotwin.identification.fitting.free import nominal, stated
 from servotwin.identification.fitting.identify import identify
 from servotwin.identification.fitting.stopping import Within
 from servotwin.logs.log import Log
@@ -57,71 +63,10 @@ EXTRAS: dict[str, str] = {
 _ON_THE_BUS = "soft supply"
 _SOFT_SHARE = 0.2  # of the armature's resistance, where that of what gives way begins: nearer to 0 it may stay there
 _STIFFER = 0.9  # of the armature's resistance, that then begins lower
-_FEWEST = 3  # held out logs, whose scatter is believed
+_STARTS = 3  # searches of the first law, unless `starts` says
+_NEARLY_AS_GOOD = 15.0  # of the criterion
+_BASES = 2  # simpler laws at which one begins
 _STRIBECK_SPEED = 0.2  # rad/s at the output, where Stribeck friction begins to fade
-
-
-@dataclass(frozen=True)
-class Rung:
-    """One friction law, or one structure.
-
-    Parameters
-    ----------
-    name : str
-        "M1" to "M6", or such as "digital, diode, M1".
-    fit : Fit
-    training, holdout : float
-        Rms error over all samples [rad]; nan without logs that were held out.
-    criterion : float
-        Bayesian information criterion of the fitted logs, with their residuals counted as often as they are
-        independent; smaller is better.
-    """
-
-    name: str
-    fit: Fit
-    training: float
-    holdout: float
-    criterion: float
-
-    @property
-    def overfits(self) -> bool:
-        """Whether it is much better on the logs that it was fitted to than on others."""
-        return self.holdout > 1.3 * self.training
-
-
-@dataclass(frozen=True)
-class Ladder:
-    """All rungs, and the one that is chosen.
-
-    Parameters
-    ----------
-    rungs : tuple of Rung
-    chosen : str
-    reason : str
-    error : float
-        Rms error on logs that had no say in the choice [rad], smaller ones being luck: the logs that were held out are
-        halved, each half chooses a rung, and the other half tells its error. Where the criterion chose, that of all
-        logs that were held out; nan with fewer than two.
-    choices : tuple of str
-        The rungs that the halves chose: two that differ are a close call.
-    """
-
-    rungs: tuple[Rung, ...]
-    chosen: str
-    reason: str
-    error: float = math.nan
-    choices: tuple[str, ...] = ()
-
-    @property
-    def fit(self) -> Fit:
-        """That of the chosen rung."""
-        return self[self.chosen].fit
-
-    def __getitem__(self, name: str) -> Rung:
-        for rung in self.rungs:
-            if rung.name == name:
-                return rung
-        raise InputError("rung", got=name, allowed=", ".join(rung.name for rung in self.rungs))
 
 
 def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] | None = None,
@@ -145,10 +90,10 @@ def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] | None
         "holdout": the simplest law whose error on the logs that were held out is within one standard error of the
         smallest; "criterion": the smallest information criterion. Without held out logs it is the latter.
     gives_way : bool, optional
-        Whether the law that is chosen is fitted once more with an internal resistance of the supply and once with one
-        of the bridge, and where one of these is chosen the richer laws with it too: "M4, soft supply". Unless given,
-        where all laws are tried. What logs or `free` say already, or the model does not read, is not tried; nor is a
-        supply whose bus was measured.
+        Whether the laws up to the one that is chosen are fitted once more with an internal resistance of the supply
+        and once with one of the bridge, and where one of these is chosen the richer laws with it too: "M4, soft
+        supply". Unless given, where all laws are tried. What logs or `free` say already, or the model does not read,
+        is not tried; nor is a supply whose bus was measured.
     progress : bool or callable
         As of `identify`, over all rungs.
     **options
@@ -171,21 +116,24 @@ def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] | None
               if name not in _TERMS and name not in _BASE and not name.startswith("friction.")]
     options = {"compare_with": (), **options, "diagnose": False}  # the ladder is the trial
     options["within"] = Within(options.get("within"))
-    climb = _Climb(given, servo, type(plain), others, options, [])
+    climb = _Climb(given, servo, type(plain), others, options, select, [])
     ordered = [name for name in RUNGS if name in rungs]
     wanted = len(ordered) == len(RUNGS) if gives_way is None else gives_way
     extras = may_give_way(plain, given, others) if wanted else ()
     with checks.shown(progress) as show:
-        count = len(ordered) + len(extras)
-        ended = all(climb.fitted(name, _share(show, k, count, name)) for k, name in enumerate(ordered))
+        count, several = len(ordered) + len(extras) + 1, len(ordered) + len(extras) > 1
+        ended = all(climb.fitted(name, _share(show, k, count, name), exactly=not several)
+                    for k, name in enumerate(ordered))
         if ended and extras:
-            law = _choice(climb.ordered(), select)[0]
-            ended = all(climb.fitted(name, _share(show, k, count, name))
-                        for k, name in enumerate((f"{law}, {extra}" for extra in extras), len(ordered)))
-            extra = _parts(_choice(climb.ordered(), select)[0])[1]
+            upto = ordered.index(climb.best()) + 1
+            ended = all(climb.fitted(f"{law}, {extra}", _share(show, k, count, f"{law}, {extra}"))
+                        for k, extra in enumerate(extras, len(ordered)) for law in ordered[:upto])
+            extra = _parts(climb.best())[1]
             if ended and extra:
-                all(climb.fitted(name, _share(show, count - 1, count, name))
-                    for name in (f"{richer}, {extra}" for richer in ordered[ordered.index(law) + 1:]))
+                ended = all(climb.fitted(f"{law}, {extra}", _share(show, count - 2, count, f"{law}, {extra}"))
+                            for law in ordered[upto:])
+        if ended and several:
+            climb.end(_share(show, count - 1, count, climb.best()))
     return ladder_of(climb.ordered(), select)
 
 
@@ -209,20 +157,67 @@ class _Climb(NamedTuple):
     kind: type[Model]
     others: Sequence[str]
     options: dict[str, Any]
+    select: str
     found: list[Rung]
 
-    def fitted(self, name: str, tell: Any) -> bool:
-        """Fit a rung, and tell whether that came to its end."""
+    def fitted(self, name: str, tell: Any, *, exactly: bool = False) -> bool:
+        """Fit a rung as closely as a choice asks for, or to its end, and tell whether that came to its end."""
+        fitted = []
+        bases: Sequence[Rung | None] = _bases(name, self.found) or [None]
+        for base in bases:
+            begin = Begin(self.options.get("starts", _STARTS)) if base is None else Begin.after(base.fit)
+            servo = _start(self.servo if base is None else base.fit.servo, name, self.servo)
+            fit = self._fit(name, servo, begin._replace(exactly=exactly), tell, intervals=exactly)
+            fitted.append(rung_of(name, fit))
+            if fit.interrupted:
+                break
+        self.found.append(min(fitted, key=lambda rung: rung.training))
+        return not fitted[-1].fit.interrupted
+
+    def end(self, tell: Any) -> None:
+        """Search what is chosen to its end, until what is chosen was."""
+        self._back(tell)
+        ended: set[str] = set()
+        while (name := self.best()) not in ended:
+            ended.add(name)
+            place = next(k for k, rung in enumerate(self.found) if rung.name == name)
+            rough = self.found[place].fit
+            fit = self._fit(name, rough.servo, Begin.after(rough), tell, intervals=True)
+            self.found[place] = rung_of(name, fit)
+            if fit.interrupted:
+                break
+
+    def _back(self, tell: Any) -> None:
+        """Search laws within the chosen one that are nearly as good from its end: kinks may have held them."""
+        several = self.ordered()
+        chosen = next(rung for rung in several if rung.name == self.best())
+        for rung in several:
+            if not _contains(chosen.name, rung.name) or rung.criterion > chosen.criterion + _NEARLY_AS_GOOD:
+                continue
+            extra = _parts(chosen.name)[1]
+            given = {EXTRAS[extra]: self.servo.get(EXTRAS[extra])} if extra and not _parts(rung.name)[1] else {}
+            servo = _start(chosen.fit.servo.replace(given), rung.name, self.servo)
+            fit = self._fit(rung.name, servo, Begin.after(chosen.fit, exactly=False), tell, intervals=False)
+            if fit.interrupted:
+                break
+            place = next(k for k, one in enumerate(self.found) if one.name == rung.name)
+            self.found[place] = min(self.found[place], rung_of(rung.name, fit), key=lambda one: one.training)
+
+    def _fit(self, name: str, servo: Servo, begin: Begin, tell: Any, *, intervals: bool) -> Fit:
         law, extra = _parts(name)
-        more = {**self.options, **({"starts": 1} if self.found else {})}  # it begins at what a simpler law found
         names = [*self.others, *RUNGS[law], *([EXTRAS[extra]] if extra else [])]
-        fit = identify(self.logs, _start(self.servo, name, self.found), self.kind, names, progress=tell, **more)
-        self.found.append(rung_of(name, fit))
-        return not fit.interrupted
+        more = {**self.options, "starts": begin, "intervals": intervals and self.options.get("intervals", True)}
+        if more.get("priors", "servo") == "servo":  # of the file: what a simpler law found is no belief of its own
+            more["priors"] = stated(self.servo, names)
+        return identify(self.logs, servo, self.kind, names, progress=tell, **more)
 
     def ordered(self) -> list[Rung]:
         """Return the rungs, the simplest first."""
-        return sorted(self.found, key=_place)
+        return with_criterion(sorted(self.found, key=_place))
+
+    def best(self) -> str:
+        """Return the name of the rung that is chosen as it stands."""
+        return choice_of(self.ordered(), self.select)[0]
 
 
 def may_give_way(model: Model, logs: Sequence[Log], free: Sequence[str]) -> tuple[str, ...]:
@@ -241,50 +236,30 @@ def may_give_way(model: Model, logs: Sequence[Log], free: Sequence[str]) -> tupl
                  and not (extra == _ON_THE_BUS and any("bus_voltage" in log.measured for log in logs)))
 
 
-def ladder_of(rungs: Sequence[Rung], select: str) -> Ladder:
-    """Return fits to the same logs, the simplest first, with the one that is chosen.
-
-    Parameters
-    ----------
-    rungs : sequence of Rung
-    select : {"holdout", "criterion"}
-        As of `friction_ladder`.
-    """
-    chosen, reason = _choice(rungs, select)
-    told = _told(rungs, select)
-    before = _simpler(rungs, chosen)
-    if before is not None:
-        words = gained(before.fit, next(rung for rung in rungs if rung.name == chosen).fit, before.name)
-        reason += f"; {words}" if words else ""
-    return Ladder(tuple(rungs), chosen, reason, told.error, told.choices)
-
-
-def _simpler(rungs: Sequence[Rung], chosen: str) -> Rung | None:
-    """Return the best of the rungs with fewer parameters than the one that is chosen; None where there is none."""
-    own = len(next(rung for rung in rungs if rung.name == chosen).fit.names)
-    fewer = [rung for rung in rungs if len(rung.fit.names) < own]
-    return min(fewer, key=lambda rung: rung.training if math.isnan(rung.holdout) else rung.holdout, default=None)
-
-
 def _share(show: Any, k: int, count: int, name: str) -> Any:
     return lambda share, text: show((k + share) / count, f"{name}: {text}")
 
 
-def _start(servo: Servo, name: str, before: Sequence[Rung]) -> Servo:
-    """Return where a rung begins: at the best simpler one that it contains, its further terms small.
+def _bases(name: str, before: Sequence[Rung]) -> list[Rung]:
+    """Return the simpler rungs at which one begins: the best two that no other one contains which it contains."""
+    inner = [rung for rung in before if _contains(name, rung.name) and math.isfinite(rung.fit.cost)]
+    largest = [rung for rung in inner if not any(_contains(other.name, rung.name) for other in inner)]
+    return sorted(largest, key=lambda rung: rung.training)[:_BASES]
+
+
+def _contains(name: str, other: str) -> bool:
+    """Tell whether a rung is another one with more terms.
 
     M5 and M6 contain M3 and M4 too: there motor and load outside count alike.
     """
+    (law, extra), (inner, given) = _parts(name), _parts(other)
+    alike = {"M5": ("M3", "M4"), "M6": ("M3", "M4")}.get(law, ())
+    return name != other and given in ("", extra) and (inner in alike or set(RUNGS[inner]) <= set(RUNGS[law]))
+
+
+def _start(base: Servo, name: str, servo: Servo) -> Servo:
+    """Return where a rung begins that goes on from another one, or from the servo itself: its further terms small."""
     law, extra = _parts(name)
-    alike = {"M5": ("M1", "M2", "M3", "M4", "M5"), "M6": tuple(RUNGS)}.get(law, ())
-
-    def within(rung: Rung) -> bool:
-        other, given = _parts(rung.name)
-        inside = other in alike or set(RUNGS[other]) <= set(RUNGS[law])
-        return inside and math.isfinite(rung.fit.cost) and given in ("", extra)
-
-    inner = [rung for rung in before if within(rung)]
-    base = min(inner, key=lambda rung: rung.training).fit.servo if inner else servo
     values: dict[str, Any] = {}
     for share, both in _ALIKE.items():
         if base.get(share) is not None and share not in RUNGS[law]:
@@ -302,70 +277,3 @@ def _start(servo: Servo, name: str, before: Sequence[Rung]) -> Servo:
     return base.replace(values, source="where a rung of the friction ladder begins")
 
 
-def rung_of(name: str, fit: Fit) -> Rung:
-    """Return a fit as one of several, under a name."""
-    own = type(fit.model).__name__
-    training = fit.training.total()[own]
-    holdout = fit.holdout.total()[own] if fit.holdout else math.nan
-    inflation = fit.doubt.inflation if fit.doubt is not None else 1.0
-    samples = sum(e.samples for e in fit.training.errors[own]) / max(inflation, 1.0)**2
-    criterion = samples * math.log(max(training, 1e-300) ** 2) + len(fit.names) * math.log(max(samples, 1.0))
-    return Rung(name, fit, training, holdout, criterion)
-
-
-class _Told(NamedTuple):
-    """An error that the choice did not see, and which rungs were chosen without it."""
-
-    error: float
-    choices: tuple[str, ...]
-
-
-def _told(rungs: Sequence[Rung], select: str) -> _Told:
-    """Return the error on logs that did not choose: those held out in two halves, each told by the other's choice."""
-    if _by_criterion(rungs, select):
-        chosen, _ = _choice(rungs, select)
-        return _Told(next(rung.holdout for rung in rungs if rung.name == chosen), ())
-    count = len(_errors(rungs[0]))
-    if count < 2:
-        return _Told(math.nan, ())
-    halves = [range(k, count, 2) for k in range(2)]  # logs of one kind of motion lie side by side
-    named = {rung.name: rung for rung in rungs}
-    choices = tuple(_choice(rungs, select, half)[0] for half in halves)
-    told = [_errors(named[name])[k] for name, other in zip(choices, reversed(halves), strict=True) for k in other]
-    return _Told(pooled(told), choices)
-
-
-def _by_criterion(rungs: Sequence[Rung], select: str) -> bool:
-    return select == "criterion" or any(math.isnan(rung.holdout) for rung in rungs)
-
-
-def _choice(rungs: Sequence[Rung], select: str, some: Sequence[int] | None = None) -> tuple[str, str]:
-    """Return the rung that some of the held out logs choose, or all, and why."""
-    if _by_criterion(rungs, select):
-        best = min(rungs, key=lambda rung: rung.criterion)
-        return best.name, "smallest information criterion"
-    best = min(rungs, key=lambda rung: pooled(_errors(rung, some)))
-    for rung in rungs:  # from the simplest on
-        worse, doubt = _difference(rung, best, some)
-        if worse <= doubt:
-            reason = "smallest error on logs that were held out" if rung is best else (
-                f"simplest within one standard error of {best.name}, the smallest error on logs that were held out")
-            return rung.name, reason
-    return best.name, "smallest error on logs that were held out"
-
-
-def _difference(rung: Rung, best: Rung, some: Sequence[int] | None) -> tuple[float, float]:
-    """Return by how much a rung's mean square error of held out logs is above the best, and its standard error.
-
-    Two logs do not say how logs scatter; with so few it is the standard error of a mean square of their samples.
-    """
-    theirs = _errors(best, some)
-    gaps = np.array([a.rms**2 - b.rms**2 for a, b in zip(_errors(rung, some), theirs, strict=True)])
-    if len(gaps) < _FEWEST:
-        return float(gaps.mean()), pooled(theirs) ** 2 * math.sqrt(2.0 / sum(e.samples for e in theirs))
-    return float(gaps.mean()), float(gaps.std(ddof=1) / math.sqrt(len(gaps)))
-
-
-def _errors(rung: Rung, some: Sequence[int] | None = None) -> tuple[LogError, ...]:
-    errors = rung.fit.holdout.errors[type(rung.fit.model).__name__]
-    return errors if some is None else tuple(errors[k] for k in some)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.fitting.arrow import Loss, Prior
+from servotwin.identification.fitting.begin import Begin
 from servotwin.identification.fitting.first_offset import first_offset
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.frames import changes, gaps, has_pulses
@@ -92,7 +93,7 @@ def fitted_rig(forecast: Forecast, start: Point, asked: Sequence[str], show: Cal
 
 
 def _task(forecast: Forecast) -> RigTask:
-    task = RigTask(forecast, Loss(HUBER), list(range(len(forecast.cases))), 0, 1, None)
+    task = RigTask(forecast, Loss(HUBER), list(range(len(forecast.cases))), 0, Begin(), None)
     task.prior = Prior(np.zeros(forecast.size), np.zeros(forecast.size))
     return task
 

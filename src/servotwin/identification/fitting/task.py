@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.identification.fitting.arrow import Loss, Outcome, Prior, Search, together
+from servotwin.identification.fitting.begin import Begin
 from servotwin.identification.fitting.clocks import ticking, with_clocks
-from servotwin.identification.fitting.first_offset import first_offset
+from servotwin.identification.fitting.first_offset import DELAYS, at_likely_delay, first_offset
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.phases import Scan, widening
 from servotwin.identification.fitting.point import (
@@ -23,6 +24,7 @@ from servotwin.identification.fitting.point import (
     OFFSET_SCALE,
     PERIOD_SCALE,
     SAG_SCALE,
+    SHARED,
     STEP,
     LogPart,
     Point,
@@ -43,11 +45,10 @@ _ROUGH = 0.003  # of the cost: what a step of a rough search has to gain
 _BLIND = 1e3  # times the noise: a sensor that does not count yet
 _MOST_OFFSET = 12.0  # rad, nearly two turns: an encoder's zero may be anywhere
 _MOST_SAG = 3.0  # rad/V
-_DELAY = 0.02  # s, where the search for it begins, or at the best of some others
-_DELAYS = (_DELAY, 0.0, 0.04, 0.06, 0.09)
 _STARTS = 0.6  # of the way: rough searches from several starts
 _MOST = {"rough": 12, "all": 25, "few": 10}  # steps
 _FEW_ROUNDS = 2  # of search and noise among kinks, where a search wanders on for ever
+_BLOCKS, _BLOCK_PAYS = 6, 1.0  # of steps, after the first ones; independent residuals whose share each has to gain
 _MANY_LOGS = 16  # from which on half as many lead near
 _ABOUT = 0.3  # of a searched number: how far off a servo file may be, while clocks are sought
 _NOTHING = 0.35  # of what a search began with
@@ -64,7 +65,7 @@ class Task:
     loss: Loss
     fitted: list[int]
     seed: int
-    starts: int
+    begin: Begin
     noise: Mapping[str, float] | None
 
     def __post_init__(self) -> None:
@@ -98,34 +99,22 @@ class Task:
     def nominal(self) -> Point:
         """Return where the servo's values stand."""
         offset = first_offset(self.forecast, self.fitted) / OFFSET_SCALE
-        first = {"delay": _DELAY / DELAY_SCALE, "angle_offset": offset, "angle_sag": 0.0,
-                 "frame_period": self.period / PERIOD_SCALE}
+        first = {"delay": DELAYS[0] / DELAY_SCALE, "angle_offset": offset, "angle_sag": 0.0,
+                 "frame_period": self.period / PERIOD_SCALE,
+                 **{name: value / SHARED[name][0] for name, value in self.begin.shared.items()}}
         shared = np.concatenate([self.forecast.space.start, [first[name] for name in self.forecast.extra]])
         return Point(np.clip(shared, self.lower, self.upper),
-                     tuple(self.forecast.own_start(case) for case in self.forecast.cases))
-
-    def _at_likely_delay(self, point: Point) -> Point:
-        """Return the point with the delay of which the residuals are smallest, of some usual ones."""
-        if "delay" not in self.forecast.extra:
-            return point
-        place, tried = len(self.forecast.space) + self.forecast.extra.index("delay"), []
-        for delay in _DELAYS:
-            shared = point.shared.copy()
-            shared[place] = delay / DELAY_SCALE
-            tried.append(point._replace(shared=shared))
-        found = self.forecast.at_all(tried, cases=self.few())
-        sizes = [sum(float(np.abs(part.residual).sum()) for part in parts) for parts in found]
-        return tried[int(np.argmin([size if math.isfinite(size) else math.inf for size in sizes]))]
+                     self.begin.own or tuple(self.forecast.own_start(case) for case in self.forecast.cases))
 
     def search(self, tell: Told) -> tuple[Outcome, list[Outcome]]:
         """Return the best point, and where the search from each start ended; the way is told after each step."""
         self.forecast.nearly = self.forecast.bent
-        nominal = self._at_likely_delay(self.nominal())
+        nominal = at_likely_delay(self, self.nominal())
         self._set_noise(self.forecast.at(nominal, derivatives=False, cases=self.fitted), self.fitted)
         self.forecast.strict = False  # from here on, what no servo is counts as failed
         ended: list[Outcome] = []
-        began = _STARTS if self.starts > 1 else 0.0
-        if self.starts > 1:
+        began = _STARTS if self.begin.searches > 1 else 0.0
+        if self.begin.searches > 1:
             ended = self._rough(nominal, tell)
             nominal = ended[0].point
         tell(began, "all logs")
@@ -138,7 +127,12 @@ class Task:
             nominal = with_clocks(self, [nominal, *self._elsewhere(ended)], tell, began)
         nominal = self._out_of_nothing(nominal, tell, began)
         if self.forecast.nearly:
-            nominal = self._refined(nominal, self.fitted, rounds=3, tell=tell, began=began).point
+            near = self._refined(nominal, self.fitted, rounds=3, tell=tell, began=began)
+            if not self.begin.exactly:
+                near = self._as_long_as_it_pays(near, tell)
+                self.forecast.nearly = False
+                return near, ended or [near]
+            nominal = near.point
             self.exactly(nominal)
         best = self._refined(nominal, self.fitted, rounds=6, tell=tell, began=began)
         return best, ended or [best]
@@ -224,7 +218,7 @@ class Task:
         """Return the same search over another forecast in the same noise, perhaps with another prior or fewer logs."""
         forecast.goes_on_from(self.forecast)
         fitted = self.fitted if cases is None else list(cases)
-        made = Task(forecast, self.loss, fitted, self.seed, self.starts, self.noise)
+        made = Task(forecast, self.loss, fitted, self.seed, self.begin, self.noise)
         made.prior = self.prior if prior is None and len(self.prior.mean) == forecast.size else prior or made.prior
         return made
 
@@ -291,6 +285,20 @@ class Task:
         search = self._search(cases)
         return replace(best, cost=search.costs([best.point])[0])
 
+    def _as_long_as_it_pays(self, found: Outcome, tell: Told) -> Outcome:
+        """Return where a search ends that goes on in some steps at a time, until these gain no more than chance does.
+
+        Among kinks no step tells whether the next one gains.
+        """
+        for _ in range(_BLOCKS):
+            parts = self.forecast.at(found.point, derivatives=False, cases=self.fitted)
+            count = sum(len(part.residual) for part in parts) / widening(parts, self.loss)
+            before = found
+            found = self._refined(found.point, self.fitted, rounds=_FEW_ROUNDS, tell=tell, began=0.0)
+            if not found.cost < (1.0 - _BLOCK_PAYS / max(count, 1.0)) * self.cost(before.point):
+                break
+        return found
+
     def nearby(self, start: Point, tell: Told) -> Point:
         """Return where a search on all logs ends that begins near, with clocks that are known; to be compared, no more.
 
@@ -338,14 +346,14 @@ class Task:
         """Return the nominal point, and the best of many random ones."""
         rng = np.random.default_rng(self.seed)
         tried, offset = [], first_offset(self.forecast, self.fitted) / OFFSET_SCALE
-        for _ in range(_TRIED * (self.starts - 1)):
-            extra = {"delay": rng.choice(_DELAYS) / DELAY_SCALE, "angle_offset": offset, "angle_sag": 0.0,
+        for _ in range(_TRIED * (self.begin.searches - 1)):
+            extra = {"delay": rng.choice(DELAYS) / DELAY_SCALE, "angle_offset": offset, "angle_sag": 0.0,
                      "frame_period": self.period / PERIOD_SCALE}
             shared = np.concatenate([self.forecast.space.random(rng), [extra[n] for n in self.forecast.extra]])
             tried.append(Point(np.clip(shared, self.lower, self.upper), nominal.own))
         costs = self._search(few).costs(tried)
         order = np.argsort(costs, kind="stable")
-        return [nominal, *(tried[k] for k in order[:self.starts - 1] if math.isfinite(costs[k]))]
+        return [nominal, *(tried[k] for k in order[:self.begin.searches - 1] if math.isfinite(costs[k]))]
 
     def _on_one_scale(self, ended: list[Outcome], few: Sequence[int]) -> list[Outcome]:
         """Return the outcomes with their costs in the noise of the best of them, the best first."""

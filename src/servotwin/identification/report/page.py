@@ -15,8 +15,8 @@ from servotwin.look import document, escape, number
 from servotwin.parameters import write_file
 
 if TYPE_CHECKING:
+    from servotwin.identification.fitting.choosing import Ladder
     from servotwin.identification.fitting.fit import Fit
-    from servotwin.identification.fitting.ladder import Ladder
 
 def write_report(fit: Fit, path: Path, *, ladder: Ladder | None = None, overwrite: bool = False) -> Path:
     """Write the report of a fit.

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.fitting.arrow import Search
+from servotwin.identification.fitting.begin import Begin
 from servotwin.identification.fitting.diagnosis.gain import teaching
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Space
@@ -193,7 +194,7 @@ class TrialBench:
         return Point(shared, tuple(own), frames)
 
     def _task(self, forecast: Watched) -> Task:
-        return Task(forecast, self.task.loss, list(range(len(forecast.cases))), 0, 1, dict(forecast.noise))
+        return Task(forecast, self.task.loss, list(range(len(forecast.cases))), 0, Begin(), dict(forecast.noise))
 
     def search(self, forecast: Watched, cases: Sequence[int] | None = None) -> Search:
         """Return the search over a forecast, with the bounds and priors of the fit."""
