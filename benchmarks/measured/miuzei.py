@@ -40,7 +40,7 @@ MODELS = {  # label -> terms beyond Coulomb friction
 }
 FOLDS = 4
 NOISE = {"output_angle": 0.02}  # rad, what of a residual counts in full: what the models leave open, not the encoder
-JITTER = {"output_angle": 0.05}  # rad: half of what a frame is at a full-speed reversal, of which no log tells
+JITTER = {**NOISE, "time": 0.01}  # s, twice half a frame, of which no log tells: a reversal adds twice the speed
 
 
 def drops(servo: Servo, logs: list[Log]) -> None:

@@ -17,7 +17,7 @@ from servotwin.identification.fitting.arrow import (
     block,
     together,
 )
-from servotwin.identification.fitting.point import LogPart, Point
+from servotwin.identification.fitting.point import STEP, LogPart, Point
 
 T = np.linspace(0.0, 4.0, 31)
 WAVE = np.cos(7.0 * T)
@@ -282,3 +282,21 @@ def test_searches_side_by_side_take_the_steps_that_they_take_alone():
     for one, other in zip(found, alone, strict=True):
         assert one.cost == other.cost
         assert (one.point.shared == other.point.shared).all()
+
+
+def test_among_kinks_no_step_is_tried_that_promises_less_than_one_of_them():
+    """A cost that rises all around, by kinks that no derivative knows, would be tried with ever smaller steps."""
+    smooth, here = decays(), [1.31, 1.49, 0.4]
+
+    def kinked(x, own, f):
+        return f(x, own) + 30.0 * (np.abs(np.real(x) - np.array(here)).sum() > 0.0)
+
+    toy = Toy([lambda x, own, f=f: kinked(x, own, f) for f in smooth], 3, 2)
+    calls = {}
+    for step in (STEP, 300.0 * STEP):
+        toy.step, toy.calls = step, 0
+        none = Prior(np.zeros(3), np.zeros(3))
+        found = Search(toy, Loss(), none, np.full(3, -np.inf), np.full(3, np.inf)).run(start(here))
+        assert found.point.shared == pytest.approx(here)
+        calls[step] = toy.calls
+    assert calls[300.0 * STEP] < calls[STEP] - 3

@@ -118,3 +118,17 @@ def test_what_no_servo_is_fails_alone(logs):
     f.strict = True
     with pytest.raises(InputError):
         f.at_all([good, bad])
+
+
+def test_what_logs_said_last_is_said_again(logs):
+    """A search begins where another one ended: nothing is simulated anew there, but its work counts."""
+    f = forecast(logs)
+    point = points(f)[0]
+    first, cost = f.at(point), f.work
+    f._simulate = None
+    for part, again in zip(first, f.at(point), strict=True):
+        assert part is again
+    assert f.work == 2.0 * cost
+    f.noise = {name: 2.0 * value for name, value in f.noise.items()}
+    with pytest.raises(TypeError):
+        f.at(point)

@@ -164,6 +164,26 @@ def test_commands_that_the_shaft_did_not_follow(logs):
     assert any(1.0 < start < 1.6 and 2.1 < stop < 2.5 for start, stop in out)
 
 
+def test_what_follows_is_left_out_until_the_shaft_is_back_where_it_would_be():
+    """Pulses are lost for 0.2 s. Under commands that keep the drive full, the shaft stays as far off as it was then."""
+    time = np.arange(0.0, 4.0, 0.02)
+    width = 1.5e-3 + 4e-4 * np.where(np.random.default_rng(3).random(40).repeat(5) < 0.5, -1.0, 1.0)
+    width[150:] = 1.5e-3  # it comes to rest
+    here, lost = (st.signals.samples(time, w, unit="s") for w in (width, np.where((time >= 1.4) & (time < 1.6), np.nan,
+                                                                                   width)))
+    followed, other = (st.simulate(MODEL, signal, duration=float(time[-1]), output_times=time)["output_angle"]
+                       for signal in (here, lost))
+    apart = np.abs(other - followed)
+    assert apart[(time > 1.7) & (time < 2.9)].max() > 0.3
+    log = noisy(st.Log(name="lost", time=time, command=width, command_kind="pulse_width",
+                       measured={"output_angle": other}), 1e-3)
+    found, = findings([log], MODEL)
+    assert found.kind == "not followed"
+    used = found.mended.used("output_angle")
+    assert apart[used].max() < 0.05
+    assert used[time > 3.5].any()
+
+
 def test_pulses_that_the_chip_refuses(logs):
     model = st.PulseServo(TRUTH.replace({"electronics.pulse_width_max": 1.9e-3}))
     found = [one for one in findings([logs[0]], model) if one.kind == "pulses"]

@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 
+import servotwin as st
 from identification.fits import FREE, fitted, near, some
+from servotwin.errors import InputError
+from servotwin.identification import Space
+from servotwin.identification.fitting.case import make_case
 from servotwin.identification.fitting.scatter import moving, scatter
 
 COUNT = 2000
@@ -57,3 +61,26 @@ def test_a_fit_of_logs_with_outliers():
     assert fit.noise["output_angle"] == pytest.approx(1e-3, rel=0.25)
     assert fit.warnings == ()
     near(fit, widths=4.0)
+
+
+def test_noise_of_times_counts_as_far_as_the_signal_moves_about_a_sample():
+    """At 5 rad/s, 10 ms are 0.05 rad; 0.1 s after the shaft has come to rest, what came late counts no more."""
+    time = np.arange(0.0, 1.0, 0.02)
+    angle = np.clip(5.0 * (time - 0.3), 0.0, 1.0)
+    log = st.Log(name="a", time=time, command=np.where(time < 0.3, 0.0, 1.0), command_kind="angle",
+                 measured={"output_angle": angle})
+    model = st.PulseServo(st.load_servo("hitec-hs-755hb"))
+    case = make_case(log, model, Space(model, ["output_inertia"]), ("output_angle",))
+    assert case.sigma("output_angle", {"output_angle": 0.02}) == 0.02
+    sigma = case.sigma("output_angle", {"output_angle": 0.02, "time": 0.01})
+    assert sigma[(time > 0.3) & (time < 0.6)] == pytest.approx(np.hypot(0.02, 0.05))
+    assert sigma[(time < 0.15) | (time > 0.65)] == pytest.approx(0.02)
+
+
+def test_a_fit_with_noise_of_times_is_that_of_its_residuals_in_rad():
+    fit = fitted(some(), free=FREE, noise={"output_angle": 1e-3, "time": 1e-4})
+    assert fit.noise == {"output_angle": 1e-3}
+    assert np.std(np.concatenate([trace.residual for trace in fit.traces])) == pytest.approx(1e-3, rel=0.1)
+    near(fit, widths=4.0)
+    with pytest.raises(InputError, match="time"):
+        fitted(some(), free=FREE, noise={"stamps": 1e-4})

@@ -7,8 +7,11 @@ import servotwin as st
 from identification.digital_servos import PULSED, digital_log
 from identification.fits import near
 from servotwin.identification import Space, identify
+from servotwin.identification.fitting.arrow import Loss
+from servotwin.identification.fitting.diagnosis.bench import Purse, Watched
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.identify import NUISANCE, usual_nuisance
+from servotwin.identification.fitting.phases import Scan
 from servotwin.identification.fitting.point import DELAY_SCALE, Frames, Point
 from servotwin.identification.fitting.ticks import Ticks, ticks_of
 from validation.test_digital_coverage import MOTIONS, OFF, bench
@@ -102,6 +105,28 @@ def test_friction_that_went_to_nothing_comes_back():
                    intervals=False)
     assert fit.noise["output_angle"] == pytest.approx(1e-3, rel=0.3)
     assert fit.estimates["output_coulomb_torque"] == pytest.approx(truth["output_coulomb_torque"], rel=0.1)
+
+
+@pytest.mark.parametrize("watched", [False, True])
+def test_trials_of_several_logs_say_what_each_says_alone(watched):
+    """Logs have as many trials as they have gaps: one runs on where another has none left, to the same bits."""
+    logs = [digital_log(PULSED, motion, seed=k, duration=duration, delay=0.05)
+            for k, (motion, duration) in enumerate((("prbs", 1.2), ("step", 1.0)))]
+    model = st.DigitalServo(PULSED)
+    what = (logs, model, Space(model, ["output_inertia"]), ("delay", "frame_phase", "control_phase"),
+            ("output_angle",))
+    forecast = Watched(Purse(1e9), 1.0, *what) if watched else Forecast(*what)
+    forecast.seen = tuple(np.arange(case.count) % 2 == 0 for case in forecast.cases)
+    shared = np.append(forecast.space.start, 0.05 / DELAY_SCALE)
+    scan = Scan(forecast, Loss(), Point(shared, tuple(np.zeros(1) for _ in logs), forecast.frames))
+    choices = {k: scan.later(k, 2)[:5 - 2 * k] for k in (0, 1)}
+    assert [len(some) for some in choices.values()] == [5, 3]
+    both = scan.parts(choices, rates=True)
+    for k, some in choices.items():
+        for one, part in zip(some, both[k], strict=True):
+            alone, = scan.parts({k: [one]}, rates=True)[k]
+            assert part.residual.tobytes() == alone.residual.tobytes()
+            assert part.later.tobytes() == alone.later.tobytes()
 
 
 def test_ticks_have_a_phase_unless_one_says_where_pulses_command_a_program():

@@ -221,11 +221,20 @@ def pulse_train(edges: ArrayLike, widths: ArrayLike, *, unit: str = "us") -> Sig
     return Signal(pieces=held.pieces, unit=unit, initial=held.initial, edges=tuple(t.tolist()))
 
 
+def held_pulses(t: NDArray[np.float64], y: NDArray[np.float64], edges: NDArray[np.float64], *, unit: str,
+                initial: float) -> Signal:
+    """Return values in SI, each held until the next, that pulses carry from their edges on; all checked before."""
+    return Signal(pieces=_steps(t, y), unit=unit, initial=initial, edges=tuple(edges.tolist()))
+
+
 def _held(t: NDArray[np.float64], y: NDArray[np.float64], unit: str, frame_period: float | None) -> Signal:
-    keep = np.append(True, np.diff(y) != 0.0)  # equal neighbours are one piece
-    rows = tuple(map(Piece, t[keep].tolist(), y[keep].tolist()))
     before = max(int(np.searchsorted(t, 0.0)) - 1, 0)  # the sample in force just before t = 0, else the first
-    return Signal(pieces=Pieces(rows), unit=unit, initial=float(y[before]), frame_period=frame_period)
+    return Signal(pieces=_steps(t, y), unit=unit, initial=float(y[before]), frame_period=frame_period)
+
+
+def _steps(t: NDArray[np.float64], y: NDArray[np.float64]) -> Pieces:
+    keep = np.append(True, np.diff(y) != 0.0)  # equal neighbours are one piece
+    return Pieces(tuple(map(Piece, t[keep].tolist(), y[keep].tolist())))
 
 
 def _smooth(rows: tuple[Piece, ...], unit: str, frame_period: float | None) -> Signal:

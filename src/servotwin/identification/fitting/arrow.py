@@ -200,6 +200,7 @@ class Search:
         self.held = np.zeros(forecast.size, np.bool_) if held is None else held
         kinked = forecast.step > STEP
         self.least_gain = _KINK if kinked else _LEAST_GAIN
+        self.least_fall = _KINK if kinked else 0.0  # of a damped step, below which another one is a matter of kinks
         self.least_step = _LEAST_STEP * forecast.step / STEP  # what differences over wider steps do not see
 
     def cost_of(self, point: Point, parts: Sequence[LogPart]) -> float:
@@ -248,7 +249,7 @@ class Search:
             scale = np.maximum(0.5 * scale, np.diag(normal.H))
             while True:
                 trial, step = self._step(best.point, normal, damping, scale)
-                if step < self.least_step:
+                if step < self.least_step or self._falls(best.point, trial, normal) < self.least_fall:
                     return Outcome(best.point, best.cost, True, k)
                 parts_there = yield Ask(trial, False)
                 cost = self.cost_of(trial, parts_there)
@@ -280,6 +281,12 @@ class Search:
             if b.g_o.size:
                 gain += 0.5 * float(b.g_o @ np.linalg.solve(safe(b.H_oo), b.g_o))
         return gain
+
+    def _falls(self, point: Point, trial: Point, normal: NormalEquations) -> float:
+        """Return by how much the cost would fall on the way to a trial at most, if it were a parabola."""
+        fall = -float(normal.g @ (trial.shared - point.shared))
+        return fall - sum(float(b.g_o @ (trial.own[k] - point.own[k]))
+                          for k, b in zip(self.cases, normal.blocks, strict=True))
 
     def _step(self, point: Point, normal: NormalEquations, damping: float, scale: Array) -> tuple[Point, float]:
         """Return the next point, and the largest change of a number."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +27,9 @@ Array = NDArray[np.float64]
 _FRAME_PERIOD = "electronics.frame_period"
 _UNKNOWN = 0.1  # s, more than the delay of a servo and its bus
 _UNSURE = 3.0  # times what five samples scatter, which is known no better
+TIME = "time"  # of the noise: how far off the times of pulses, ticks and samples are, one by one [s]
+_RATE_OVER = 0.02  # s, at least: differences of neighbours would be those of their noise
+_LASTS = 0.1  # s: what came early or late leaves an error, until the loop has taken it away
 _FROM_REST = 0.5  # of its slope over five samples: what a shaft that begins from rest has over three
 
 
@@ -71,6 +75,16 @@ class Case:
     def count(self) -> int:
         """Number of measured values that count."""
         return sum(len(place) for place in self.places.values())
+
+    def sigma(self, name: str, noise: Mapping[str, float]) -> Array | float:
+        """Return the noise of a sensor's values (SI); that of times counts as far as the signal goes meanwhile."""
+        late = noise.get(TIME, 0.0)
+        return np.hypot(noise[name], late * self._rates[name]) if late else noise[name]
+
+    @cached_property
+    def _rates(self) -> dict[str, Array]:
+        """How fast each sensor's signal changes about each of its values, at most [SI/s]."""
+        return {name: _rates(self.times[place], self.values[name]) for name, place in self.places.items()}
 
 
 def make_case(log: Log, model: Model, space: Space, sensors: Sequence[str], *, delayed: bool = False,
@@ -158,6 +172,15 @@ def _begins(time: Array, values: Array, slope: float, scatter: float) -> bool:
         return False
     way = float(time[2] - time[0]) * math.copysign(1.0, slope)
     return float(np.polyfit(time[:3], values[:3], 1)[0]) * way <= _FROM_REST * slope * way + scatter
+
+
+def _rates(time: Array, values: Array) -> Array:
+    """Return the largest rate of a signal within some time before and after each of its values [SI/s]."""
+    after = np.minimum(np.searchsorted(time, time + _RATE_OVER - 1e-9), len(time) - 1)
+    apart = time[after] - time
+    rate = np.abs(values[after] - values) / np.where(apart > 0.0, apart, np.inf)
+    near = zip(np.searchsorted(time, time - _LASTS - _RATE_OVER), np.searchsorted(time, time + _LASTS), strict=True)
+    return np.array([rate[first:max(stop, first + 1)].max() for first, stop in near])
 
 
 def _period(log: Log, model: Model) -> float:

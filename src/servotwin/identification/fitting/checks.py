@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
+from servotwin.identification.fitting.case import TIME
 from servotwin.identification.fitting.loop_gain import with_loop_gain
 from servotwin.logs.log import Log
 from servotwin.models import BoundedServo, DigitalServo, Model, PulseServo, PulseServoInductive, default_model
@@ -199,8 +200,8 @@ def checked_noise(noise: Any, sensors: Sequence[str]) -> dict[str, float] | None
     if not isinstance(noise, Mapping):
         raise InputError("noise", got=noise, allowed="a mapping of sensors to standard deviations (SI)")
     for name, value in noise.items():
-        if name not in sensors:
-            raise InputError("noise", got=name, allowed=", ".join(sensors))
+        if name not in (*sensors, TIME):
+            raise InputError("noise", got=name, allowed=", ".join((*sensors, TIME)))
         if not (is_finite(value) and value > 0.0):
             raise InputError(f"noise of {name}", got=value, allowed="a positive number (SI)")
     return {name: float(value) for name, value in noise.items()}

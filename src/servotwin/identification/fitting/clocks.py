@@ -102,7 +102,7 @@ def ticking(task: Task, point: Point, tell: Told, began: float) -> Point:
         better = giving_way(task.scan(point), task.prior, task.held, task.fitted)
         found = task.ran_all(better, tell, began, _FIRST_STEPS)
         best = min(found, key=lambda outcome: outcome.cost, default=None)
-        best = best and task.ran(best.point, tell, began)
+        best = best if best is None or best.converged else task.ran(best.point, tell, began)
         if best is None or not best.cost < cost - _TICKS_PAY:
             break
         point = best.point

@@ -49,7 +49,7 @@ def counts_of(forecast: Forecast, k: int) -> Counts | None:
         found = first + np.cumsum(~same) - 1
         first = int(found[-1]) + 1
         reading.append(found)
-        power.append(np.full(len(values), step**2 / 12.0 / forecast.noise[name] ** 2))
+        power.append(np.full(len(values), step**2 / 12.0 / case.sigma(name, forecast.noise) ** 2))
     names = forecast.names_of_own(case)
     belief = np.zeros(len(names))
     if "output_angle" in names and next(iter(case.values)) == "output_angle":

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from servotwin.identification.fitting.point import Frames
 from servotwin.logs.log import KINDS, Log
 from servotwin.models import BoundedServo, DigitalServo, Model
-from servotwin.signals.shapes import sampled
+from servotwin.signals.shapes import held_pulses, sampled
 
 if TYPE_CHECKING:
     from servotwin.signals import Signal
@@ -141,7 +141,7 @@ def signal(log: Log, frames: Frames, first: float, period: float, lead: float = 
     unit = KINDS[log.command_kind]
     if log.command_hold == "previous":
         # Half a frame early, so that an edge that moves a little carries the same
-        made = sampled(edges - 0.5 * period, log.held[latest], unit=unit, hold="previous")
-    else:
-        made = sampled(time + lead, log.held, unit=unit, hold=log.command_hold)
+        return held_pulses(edges - 0.5 * period, log.held[latest], edges[log.sent[latest]], unit=unit,
+                           initial=float(log.held[0]))
+    made = sampled(time + lead, log.held, unit=unit, hold=log.command_hold)
     return replace(made, initial=float(log.held[0]), edges=tuple(edges[log.sent[latest]].tolist()))

@@ -89,16 +89,14 @@ def giving_way(scan: Scan, prior: Prior, held: NDArray[np.bool_], cases: Sequenc
 def _parabolas(scan: Scan, choices: Mapping[int, Sequence[PulseChoice]],
                moves: NDArray[np.bool_]) -> dict[int, Parabolas]:
     """Return what each choice of each log costs, with slopes and weights of residuals as where the search stands."""
-    most = max(map(len, choices.values()))
-    points = [scan.moved({k: some[min(i, len(some) - 1)] for k, some in choices.items()}) for i in range(most)]
-    now = scan.forecast.at(points[0], cases=list(choices))
-    parts = scan.forecast.at_all(points, cases=list(choices))
+    now = scan.forecast.at(scan.point, cases=list(choices))
+    parts = scan.parts(choices)
     found = {}
     for j, (k, some) in enumerate(choices.items()):
         own = Prior(*scan.forecast.own_belief(scan.forecast.cases[k]))
         weight = scan.loss.weight(now[j].residual)
-        each = [_parabola(now[j]._replace(residual=parts[i][j].residual), weight, own, points[i].own[k], moves)
-                for i in range(len(some))]
+        each = [_parabola(now[j]._replace(residual=part.residual), weight, own, scan.moved({k: one}).own[k], moves)
+                for one, part in zip(some, parts[k], strict=True)]
         found[k] = Parabolas(*map(np.stack, zip(*each, strict=True)))
     return found
 

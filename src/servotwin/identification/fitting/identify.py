@@ -46,7 +46,6 @@ Array = NDArray[np.float64]
 _VALLEYS = 3  # that a fit goes on to, at most
 _VOLTAGE = "supply.open_circuit_voltage"
 Progress = bool | Callable[[float, str], object]
-
 NUISANCE = ("delay", "frame_phase", "angle_offset", "initial_state")
 
 
@@ -107,7 +106,8 @@ def identify(
     loss : {"huber", "squares"}
         Huber: residuals of more than 1.345 times the noise count in proportion, not squared.
     noise : mapping, optional
-        Standard deviation of what each sensor's residuals scatter (SI); estimated unless given.
+        Standard deviation of what each sensor's residuals scatter (SI); estimated unless given. "time": that of the
+        times of single pulses, ticks and samples [s]; what moves counts as less sure, by how far it goes meanwhile.
     level : float
         Of the intervals.
     intervals : bool
@@ -332,8 +332,8 @@ def _fit(task: Task, found: Outcome, doubts: Doubts, dropped: tuple[Yielded, ...
         units={name: units[name] for name in names}, covariance=covariance, unidentifiable=doubts.unidentifiable,
         at_bound=tuple(name for name, at in zip(names, stuck, strict=True) if at),
         holdout=tables.holdout, training=tables.training, traces=traces,
-        starts=tuple(Start(outcome.cost, outcome.converged) for outcome in ended), noise=dict(forecast.noise),
-        cost=found.cost, space=space, best=x,
+        starts=tuple(Start(outcome.cost, outcome.converged) for outcome in ended),
+        noise={name: forecast.noise[name] for name in forecast.sensors}, cost=found.cost, space=space, best=x,
         warnings=(*task.remarks, *task.unsure, *checks.warnings_of((*dropped, *wide), tables),
                   *_explained(task, dropped)),
         doubt=doubt, ends=dict(reaching), scales={n: scales[n] for n in forecast.extra}, yielded=dropped, widened=wide,

@@ -166,7 +166,7 @@ class LogLanes:
                     values = values + self.sag * signals["sag"][:, :k]
             elif self.later:
                 rate = (signals[name][0, k:] - values[0]) / self.later
-            sigma = self.noise[name]
+            sigma = case.sigma(name, self.noise)
             y = values[:, place] / sigma
             residuals.append(y[0] - case.values[name] / sigma)
             of_delay = -rate[place] * DELAY_SCALE / sigma

@@ -30,6 +30,7 @@ _FIRST_PULSES = 600  # after which no further log is taken
 _LIKELY = 5  # periods, that are searched from
 _MOST_PERIODS = 160
 _MOST_PHASES = 8  # for each period
+_ASKED = 0.25  # of the periods: those that further logs are asked about
 _REACH = 0.06  # of a period, either way: more than a PCA9685's clock is off by its data sheet
 _FINE = (1e-5, 3e-5, 1e-4, 2e-4, 4e-4, 8e-4)  # of a period: quartz clocks
 _WINDOWS = 6  # of a log, that are compared
@@ -126,11 +127,19 @@ class Scan:
 
         `moves=False` leaves them where they are.
         """
-        most = max(map(len, choices.values()))
-        points = [self.moved({k: some[min(i, len(some) - 1)] for k, some in choices.items()}) for i in range(most)]
-        parts = self.forecast.at_all(points, cases=list(choices), rates=True)
-        return {k: [self._corrected(k, choice, parts[i][j], 6 * moves) for i, choice in enumerate(some)]
-                for j, (k, some) in enumerate(choices.items())}
+        return {k: [self._corrected(k, choice, part, 6 * moves) for choice, part in zip(some, parts, strict=True)]
+                for (k, some), parts in zip(choices.items(), self.parts(choices, rates=True).values(), strict=True)}
+
+    def parts(self, choices: Mapping[int, Sequence[PulseChoice]], *, rates: bool = False) -> dict[int, list[LogPart]]:
+        """Run all trials of some logs in one batch; return what each says."""
+        which = [[k for k, some in choices.items() if i < len(some)] for i in range(max(map(len, choices.values())))]
+        points = [self.moved({k: choices[k][i] for k in some}) for i, some in enumerate(which)]
+        found: dict[int, list[LogPart]] = {k: [] for k in choices}
+        told = self.forecast.at_all(points, cases=list(choices), each=which, rates=rates)
+        for some, parts in zip(which, told, strict=True):
+            for k, part in zip(some, parts, strict=True):
+                found[k].append(part)
+        return found
 
     def best(self, choices: Mapping[int, Sequence[PulseChoice]], rounds: int = 2) -> dict[int, list[PulseTrial]]:
         """Run all trials, and the best of them again where they then fit best; return the latter, the best first."""
@@ -241,25 +250,34 @@ def likely_periods(scan: Scan, cases: Sequence[int]) -> list[float]:
     pulses = np.cumsum([forecast.cases[k].log.duration / nominal for k in order])
     rich = [k for k, before in zip(order, [0.0, *pulses], strict=False) if before < _FIRST_PULSES][:_FIRST_LOGS]
     longest = max(forecast.cases[k].log.duration for k in rich)
-    choices: dict[int, list[PulseChoice]] = {k: [] for k in rich}
-    of_period: dict[int, list[float]] = {k: [] for k in rich}
-    for period in _periods(nominal, longest):
-        for k in rich:
-            there = _spread(gaps(forecast.cases[k].log, period), _MOST_PHASES)
-            choices[k] += [scan.like(k, gap, period) for gap in there]
-            of_period[k] += [period] * len(there)
-    costs: dict[float, float] = {}
-    for k, trials in scan.tried(choices).items():
-        least: dict[float, float] = {}
-        for period, trial in zip(of_period[k], trials, strict=True):
-            least[period] = min(trial.cost, least.get(period, math.inf))
-        for period, cost in least.items():
-            costs[period] = costs.get(period, 0.0) + cost
+    costs = _costs(scan, rich[:1], _periods(nominal, longest))  # the richest log says which the others are asked about
+    some = sorted(costs, key=lambda period: costs[period])[:math.ceil(_ASKED * len(costs))]
+    more = _costs(scan, rich[1:], some) if len(rich) > 1 else {}
+    costs = {period: costs[period] + more.get(period, 0.0) for period in some}
     found: list[float] = []
     for period in sorted(costs, key=lambda period: costs[period]):
         if all(abs(period - other) > 2.0 * _step(nominal, longest) for other in found):
             found.append(period)
     return found[:_LIKELY]
+
+
+def _costs(scan: Scan, cases: Sequence[int], periods: Sequence[float]) -> dict[float, float]:
+    """Return what each period costs in some logs, at the best of its phases."""
+    choices: dict[int, list[PulseChoice]] = {k: [] for k in cases}
+    of_period: dict[int, list[float]] = {k: [] for k in cases}
+    for period in periods:
+        for k in cases:
+            there = _spread(gaps(scan.forecast.cases[k].log, period), _MOST_PHASES)
+            choices[k] += [scan.like(k, gap, period) for gap in there]
+            of_period[k] += [period] * len(there)
+    costs = dict.fromkeys(periods, 0.0)
+    for k, trials in scan.tried(choices).items():
+        least = dict.fromkeys(periods, math.inf)
+        for period, trial in zip(of_period[k], trials, strict=True):
+            least[period] = min(trial.cost, least[period])
+        for period, cost in least.items():
+            costs[period] += cost
+    return costs
 
 
 def with_period(scan: Scan, cases: Sequence[int], period: float) -> Point:

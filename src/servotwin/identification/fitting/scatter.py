@@ -84,6 +84,6 @@ def by_sensor(forecast: Forecast, k: int, part: LogPart) -> dict[str, Array]:
     """Return the residuals of a log by sensor (SI)."""
     found, first = {}, 0
     for name, place in forecast.cases[k].places.items():
-        found[name] = part.residual[first:first + len(place)] * forecast.noise[name]
+        found[name] = part.residual[first:first + len(place)] * forecast.cases[k].sigma(name, forecast.noise)
         first += len(place)
     return found

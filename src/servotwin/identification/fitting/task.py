@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError
 from servotwin.identification.fitting.arrow import Loss, Outcome, Prior, Search, together
 from servotwin.identification.fitting.begin import Begin
+from servotwin.identification.fitting.case import TIME
 from servotwin.identification.fitting.clocks import ticking, with_clocks
 from servotwin.identification.fitting.first_offset import DELAYS, at_likely_delay, first_offset
 from servotwin.identification.fitting.forecast import Forecast
@@ -79,6 +80,8 @@ class Task:
         beliefs = [p.scaled_prior for p in space.parameters] + [None] * len(extra)
         self.prior = Prior(np.array([b[0] if b else 0.0 for b in beliefs]),
                            np.array([1.0 / b[1] if b else 0.0 for b in beliefs]))
+        if self.noise is not None and TIME in self.noise:
+            self.forecast.noise[TIME] = self.noise[TIME]
         self.remarks: list[str] = []  # on what the search found out about clocks
         self.unsure: tuple[str, ...] = ()  # of which commands it is not sure which pulse carries them
         self.stamps_off: dict[int, float] = {}  # by how much the beat that replaced a log's stamps may lie off [s]
@@ -207,7 +210,8 @@ class Task:
 
     def measure(self, point: Point) -> None:
         """Take the noise of each sensor from its residuals at a point."""
-        self._set_noise(self.forecast.at(point, derivatives=False, cases=self.fitted), self.fitted)
+        if self.noise is None or not set(self.forecast.sensors) <= set(self.noise):
+            self._set_noise(self.forecast.at(point, derivatives=False, cases=self.fitted), self.fitted)
 
     def scan(self, point: Point) -> Scan:
         """Return what tries pulses at a point."""

@@ -77,7 +77,9 @@ class Watched(Forecast):
         self.purse.left -= self.price * (self.work - before)
         if self.seen is None:
             return found
-        return [[_hidden(part, self.seen[k]) for k, part in zip(which, parts, strict=True)] for parts in found]
+        each = how.get("each") or [which] * len(points)
+        return [[_hidden(part, self.seen[k]) for k, part in zip(some, parts, strict=True)]
+                for some, parts in zip(each, found, strict=True)]
 
 
 def _hidden(part: LogPart, seen: NDArray[np.bool_]) -> LogPart:

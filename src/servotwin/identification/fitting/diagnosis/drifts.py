@@ -238,7 +238,7 @@ class _Drift:
         case, first = self.bench.cases[k], 0
         for name, place in case.places.items():
             if name in ("output_angle", "feedback_voltage"):
-                return np.asarray(residual[first:first + len(place)] * self.bench.base.forecast.noise[name])
+                return np.asarray(residual[first:first + len(place)] * case.sigma(name, self.bench.base.forecast.noise))
             first += len(place)
         return np.zeros(0)
 

@@ -30,6 +30,7 @@ _DELAY = 0.1  # s, more than the delay of a servo and its bus
 _LEAST = 0.2  # rad, a command that moves any servo
 _SHARE = 0.3  # of the commanded span
 _FOLLOWS = 0.5  # of the commanded span the shaft went through: else it is a soft servo that may stand still
+_FORGOTTEN = 3.0  # times e: a twentieth is left of how far off it was
 _MORE = 0.1  # s after an event, until the motion is as commanded
 
 
@@ -39,20 +40,45 @@ def not_followed(looks: Sequence[Look]) -> list[Finding]:
 
 
 def _not_followed(one: Look) -> list[Finding]:
-    windows = _joined([*_against(one), *_standing(one)])
+    habit = _usual(one)
+    windows = _joined([*(_against(one, habit) if habit else ()), *_standing(one)])
     if not windows:
         return []
-    out = np.zeros(len(one.time), np.bool_)
-    for start, stop in windows:
-        out |= (one.log.time >= start) & (one.log.time < stop)
-    kept = one.counts & ~out
-    enough = kept.sum() > _HALF * one.counts.sum()  # else nothing is left to fit
-    stays = replace(one.log, left_out=(*one.log.left_out, *windows)) if enough else None
+    far = _joined([(start, _back(one, habit, stop)) for start, stop in windows]) if habit else windows
+    # where nothing were left to fit, what follows stays; and all of it, if that is not enough
+    mended = next((some for some in (far, windows) if _is_enough(one, some)), None)
+    stays = None if mended is None else replace(one.log, left_out=(*one.log.left_out, *mended))
     said = ", ".join(f"{start:.4g} to {stop:.4g}" for start, stop in windows[:3])
     said += ", ..." if len(windows) > 3 else ""
     return [Finding("not followed", one.log.name, (
         f"log {one.log.name!r}: from {said} s the shaft does not follow its command, as if it got no pulses; look at "
         "wiring and supply; mending \"not followed\" leaves this out"), stays)]
+
+
+def _is_enough(one: Look, windows: Sequence[tuple[float, float]]) -> bool:
+    """Tell whether most of what counts lies outside some windows."""
+    out = np.zeros(len(one.time), np.bool_)
+    for start, stop in windows:
+        out |= (one.log.time >= start) & (one.log.time < stop)
+    return bool((one.counts & ~out).sum() > _HALF * one.counts.sum())
+
+
+def _back(one: Look, habit: _Habit, stop: float) -> float:
+    """Return when a shaft that was not driven until some time is where it would be if it had been [s].
+
+    As long as the drive is full it goes as it would from anywhere, and stays as far off as it was. Once its commands
+    are so near that the drive depends on where it is, that shrinks with the time that it takes to go so far at full
+    speed.
+    """
+    time, angle, asked = one.time[one.smooth], one.angle[one.smooth], one.asked[one.smooth]
+    shrunk = 0.0
+    for k in np.flatnonzero(time >= stop - one.log.start)[1:]:
+        before = asked[(time > time[k] - _DELAY) & (time <= time[k])]
+        if (np.abs(before - angle[k]) < habit.full_at).all():
+            shrunk += (time[k] - time[k - 1]) * one.top_speed / habit.full_at
+        if shrunk > _FORGOTTEN:
+            return float(time[k] + one.log.start)
+    return float(one.log.time[-1] + _BIN)
 
 
 def _joined(windows: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
@@ -77,17 +103,20 @@ class _Habit:
     arrived: Array  # what they would give to a shaft that is where it is afterwards: little, if it has arrived
     possible: Mask  # no speed around that only an outlier has
     scale: float
+    full_at: float  # of an error, from which on the drive is full [rad]
 
 
-def _against(one: Look) -> Iterator[tuple[float, float]]:
+def _usual(one: Look) -> _Habit | None:
+    """Return the habit that explains most of a log's speeds; None of a log that is too short for one."""
+    habits = [habit for error in _SATURATES if (habit := _habit(one, error)) is not None]
+    return min(habits, key=lambda habit: habit.scale, default=None)
+
+
+def _against(one: Look, best: _Habit) -> Iterator[tuple[float, float]]:
     """Give the windows in which the speed lacks more than all that the commands give to it.
 
     A shaft that gets no drive lacks just that, one on which an earlier command still acts twice as much.
     """
-    habits = [habit for error in _SATURATES if (habit := _habit(one, error)) is not None]
-    if not habits:
-        return
-    best = min(habits, key=lambda habit: habit.scale)
     full = float(np.quantile(np.abs(best.drive), 0.9))
     if full < _STRONG * one.top_speed or not best.scale > 0.0:
         return
@@ -139,7 +168,7 @@ def _habit(one: Look, error: float) -> _Habit | None:
     gains = line[-drives.shape[1]:]
     around = np.pad(np.abs(speed), _AROUND, mode="edge")[k[:, None] + _AHEAD + np.arange(2 * _AROUND + 1)]
     possible = (around < _TOO_FAST * one.top_speed).all(axis=1)
-    return _Habit(grid[k + _AHEAD], residual, drives @ gains, arrived @ gains, possible, scale)
+    return _Habit(grid[k + _AHEAD], residual, drives @ gains, arrived @ gains, possible, scale, error)
 
 
 def _binned(one: Look, grid: Array) -> Array:
