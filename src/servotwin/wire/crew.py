@@ -1,0 +1,201 @@
+"""The twins behind the IDs of a bus: lanes of one compiled simulator, on one supply."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import ServotwinError
+from servotwin.models import DigitalServo
+from servotwin.parameters.firmware import Firmware
+from servotwin.parameters.groups import Supply
+from servotwin.robots.unlike import OF_THE_BUS, differing, of_one_form
+from servotwin.simulation import VectorSimulator
+
+Array = NDArray[np.float64]
+_TICK = 1.5e-3  # s, more than a tick of every program here: what it takes to see that torque was off
+_FIRMWARE = tuple(one.name for one in fields(Firmware))
+_COLD = 298.15  # K, shown where a servo has no thermal numbers
+
+
+class Seen(NamedTuple):
+    """What shows of a servo, in SI; angles at the output shaft."""
+
+    angle: float
+    speed: float
+    duty: float
+    current: float
+    supply_current: float
+    voltage: float
+    temperature: float
+    goal: float
+    reference: float
+    trip: int
+
+
+class Crew:
+    """Servos on one supply, told and seen one by one, led on together.
+
+    Parameters
+    ----------
+    models : sequence of DigitalServo
+    supply : Supply
+    angles : sequence of float
+        Where they rest at first [rad].
+    loads : sequence of Load
+    seed : int
+    say : callable
+        Told what cannot be computed.
+    """
+
+    def __init__(self, models: Sequence[DigitalServo], supply: Supply, angles: Sequence[float], loads: Sequence[Any],
+                 seed: int, say: Callable[[str], None]) -> None:
+        self._say, count = say, len(models)
+        alike = of_one_form(models)
+        parameters = {name: values for name, values in differing(alike, [str(k) for k in range(count)]).items()
+                      if name not in OF_THE_BUS}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # limits that stand for none are beyond any servo's
+            self.sims = VectorSimulator(alike[0], count, load=list(loads), parameters=parameters, bus=supply, threads=1,
+                                        seed=seed)
+        self._goals = np.array(angles, dtype=np.float64)
+        self.sims.reset(command_angle=self._goals, output_angle=self._goals)
+        self.sims.set(torque_enable=False)
+        self._told = False
+        self._torque = np.zeros(count, np.bool_)
+        self._have: list[dict[str, float | str | None]] = [
+            {f"firmware.{name}": model.servo.get(f"firmware.{name}") for name in _FIRMWARE} for model in models]
+        self._changes: dict[str, dict[int, float | str]] = {}
+        self._releases = list[int]()
+        self._hands: dict[int, float] = {}
+        self._warm = "housing_temperature" in self.sims.signals
+        self._rows: list[Seen] | None = None
+
+    def __len__(self) -> int:
+        """Return the number of servos."""
+        return len(self._goals)
+
+    # --- time ---------------------------------------------------------------------------------------------------------
+
+    def advance(self, duration: float) -> None:
+        """Let all go on [s]."""
+        if duration <= 0.0:
+            return
+        self._rows = None
+        if self._changes:
+            self._change()
+        while self._releases:
+            which, part = self._releases, min(_TICK, duration)
+            self._releases = []
+            self._step(part)
+            self.sims.set(torque_enable=self._torque[which], lanes=which)
+            duration -= part
+        if duration > 0.0:
+            self._step(duration)
+
+    def _step(self, duration: float) -> None:
+        if self._hands:
+            held = [k for k in self._hands if not self._torque[k]]
+            if held:
+                self.sims.set(output_angle=[self._hands[k] for k in held], output_speed=0.0, lanes=held)
+        if self._told:
+            self.sims.advance(duration, command_angle=self._goals)
+            self._told = False
+        else:
+            self.sims.advance(duration)
+
+    # --- what a servo is told -----------------------------------------------------------------------------------------
+
+    def goal(self, servo: int, angle: float) -> None:
+        """Tell a servo where to go [rad]."""
+        self._goals[servo] = angle
+        self._told = True
+
+    def torque(self, servo: int, on: bool) -> None:
+        """Switch a servo's torque."""
+        if on != self._torque[servo]:
+            self._torque[servo] = on
+            self._rows = None
+            self.sims.set(torque_enable=bool(on), lanes=[servo])
+
+    def release(self, servo: int) -> None:
+        """Let a protection go: torque is off for a tick."""
+        self.sims.set(torque_enable=False, lanes=[servo])
+        self._rows = None
+        self._releases.append(servo)
+
+    def change(self, servo: int, numbers: Mapping[str, float | str]) -> None:
+        """Give a servo other numbers (SI), by dotted name, before time goes on."""
+        have = self._have[servo]
+        for name, value in numbers.items():
+            if have.get(name) != value:
+                have[name] = value
+                self._changes.setdefault(name, {})[servo] = value
+
+    def restart(self, servo: int) -> None:
+        """Let a servo's program begin anew, limp, where its shaft is; it keeps its numbers."""
+        angle = self.seen(servo).angle
+        self._goals[servo] = angle
+        self.sims.reset(command_angle=angle, output_angle=angle, lanes=[servo])
+        self.sims.set(torque_enable=False, lanes=[servo])
+        self._torque[servo], self._told, self._rows = False, True, None
+
+    def hand(self, servo: int, angle: float | None) -> None:
+        """Hold a limp servo's shaft at an angle [rad], or let go of it."""
+        if angle is None:
+            self._hands.pop(servo, None)
+        else:
+            self._hands[servo] = angle
+
+    def _change(self) -> None:
+        """Set what has changed, all at once; where that is refused one by one, so that the others act."""
+        changes, self._changes = self._changes, {}
+        lanes = sorted({servo for of in changes.values() for servo in of})
+        try:
+            self._set(changes, lanes)
+        except ServotwinError:
+            for name, of in changes.items():
+                for servo, value in of.items():
+                    try:
+                        self._set({name: {servo: value}}, [servo])
+                    except ServotwinError as error:
+                        self._say(f"servo {servo}: {error}; it keeps what it had")
+
+    def _set(self, changes: Mapping[str, Mapping[int, float | str]], lanes: list[int]) -> None:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            if all(len(of) == len(lanes) for of in changes.values()):
+                self.sims.set(parameters={name: [of[k] for k in lanes] for name, of in changes.items()}, lanes=lanes)
+                return
+            for name, of in changes.items():
+                self.sims.set(parameters={name: list(of.values())}, lanes=list(of))
+
+    # --- what shows ---------------------------------------------------------------------------------------------------
+
+    def seen(self, servo: int) -> Seen:
+        """Return what shows of a servo."""
+        if self._rows is None:
+            sims, none = self.sims, np.full(len(self), _COLD)
+            columns = [sims[name] for name in (
+                "output_angle", "output_speed", "duty", "armature_current", "supply_current", "bus_voltage")]
+            warm = sims["housing_temperature"] if self._warm else none
+            rest = [sims[name] for name in ("goal_angle", "reference_angle", "trip")]
+            self._rows = [Seen(*row[:-1], int(row[-1]) if row[-1] == row[-1] else 0) for row in zip(
+                *(column.tolist() for column in (*columns, warm, *rest)), strict=True)]
+        return self._rows[servo]
+
+    def failed(self) -> str | None:
+        """Return why a servo cannot go on; None while all can."""
+        failures = self.sims.failures if self.sims.status.any() else ()
+        return f"servo {failures[0].lane}: {failures[0].cause}" if failures else None
+
+
+def finite(value: float) -> float:
+    """Return a number, 0 for what is none: the duty of a limp servo."""
+    return value if math.isfinite(value) else 0.0
