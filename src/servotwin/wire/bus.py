@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bisect
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -64,7 +65,7 @@ class Bus:
     servos : mapping of int to DigitalServo, Servo or str
         By ID: models, servos, or catalog ids. All of one maker.
     supply : Supply, optional
-        That all share; without one an ideal source of the first servo's voltage.
+        That all share; without one an ideal source for all servos of one voltage.
     angles : mapping of int to float, optional
         Where shafts rest at first [rad]; count 2048 is 0.
     loads : mapping of int to Load, optional
@@ -108,15 +109,13 @@ class Bus:
             unknown = [id for id in given or {} if id not in models]
             if unknown:
                 raise InputError(f"{what} of a Bus", got=unknown, allowed=f"IDs out of {sorted(models)}")
-        self.counts = Counts()
+        self.counts, self.lock = Counts(), threading.RLock()
         self.time = 0.0
         self.rate: float | None = None  # bit/s at which the client talks; None: every servo hears it
         self.devices = self._devices(models, lock, firmware)
         of = (family_of_sts if self.protocol == "feetech" else family_of_x)
         made = [ready(model, of(model.servo)) for model in models.values()]
-        shared = supply if supply is not None else Supply(
-            open_circuit_voltage=made[0].servo.supply.open_circuit_voltage or 12.0)
-        self.crew = body(made, shared, [float((angles or {}).get(id, 0.0)) for id in models],
+        self.crew = body(made, _supplies(made, supply), [float((angles or {}).get(id, 0.0)) for id in models],
                          [as_load((loads or {}).get(id)) for id in models], seed, self.say)
         self.ids = tuple(models)
         for id, device in zip(models, self.devices, strict=True):
@@ -242,23 +241,27 @@ class Bus:
 
     def seen(self, id: int) -> Seen:
         """Return what shows of the twin behind an ID, in SI: the truth beside what the registers say."""
-        return self.crew.seen(self.device(id).lane)  # type: ignore[no-any-return]
+        with self.lock:
+            return self.crew.seen(self.device(id).lane)  # type: ignore[no-any-return]
 
     def registers(self, id: int) -> dict[str, int]:
         """Return what all registers of a servo hold, by name."""
         device = self.device(id)
-        device.read(0, 147)
-        return device.table.values()  # type: ignore[no-any-return]
+        with self.lock:
+            device.read(0, 147)
+            return device.table.values()  # type: ignore[no-any-return]
 
     def hand(self, id: int, angle: float | None) -> None:
         """Hold a limp servo's shaft at an angle [rad], as a hand does; None lets go."""
-        self.crew.hand(self.device(id).lane, angle)
+        with self.lock:
+            self.crew.hand(self.device(id).lane, angle)
 
     def power_cycle(self, id: int | None = None) -> None:
         """Take the supply from a servo, or from all, and give it back: what is not stored is lost."""
-        for device in self.devices if id is None else [self.device(id)]:
-            device.power_up()
-        self._buffer.clear()
+        with self.lock:
+            for device in self.devices if id is None else [self.device(id)]:
+                device.power_up()
+            self._buffer.clear()
 
     def kept(self) -> dict[str, dict[str, int]]:
         """Return what outlives power-off, by ID at the beginning and register."""
@@ -295,6 +298,11 @@ class Bus:
             self._service.start()
         return self._service.port
 
+    @property
+    def service(self) -> Service | None:
+        """What serves the port, with its `timing`; None while it is not open."""
+        return self._service
+
     def close(self) -> None:
         """End the port."""
         if self._service is not None:
@@ -308,6 +316,16 @@ class Bus:
     def __exit__(self, *_: object) -> None:
         """End the port."""
         self.close()
+
+
+def _supplies(models: Sequence[DigitalServo], supply: Supply | None) -> list[tuple[Supply, list[int]]]:
+    """Return supplies with the places of the servos on each: the one that is given, else one a voltage."""
+    if supply is not None:
+        return [(supply, list(range(len(models))))]
+    found: dict[float, list[int]] = {}
+    for k, model in enumerate(models):
+        found.setdefault(model.servo.supply.open_circuit_voltage or 12.0, []).append(k)
+    return [(Supply(open_circuit_voltage=volts), places) for volts, places in found.items()]
 
 
 def _model(id: Any, given: Any) -> DigitalServo:

@@ -45,7 +45,8 @@ class Crew:
     Parameters
     ----------
     models : sequence of DigitalServo
-    supply : Supply
+    supplies : sequence of (Supply, list of int)
+        Each with the places of those that share it.
     angles : sequence of float
         Where they rest at first [rad].
     loads : sequence of Load
@@ -54,7 +55,7 @@ class Crew:
         Told what cannot be computed.
     """
 
-    def __init__(self, models: Sequence[DigitalServo], supply: Supply, angles: Sequence[float], loads: Sequence[Any],
+    def __init__(self, models: Sequence[DigitalServo], supplies: Sequence[tuple[Supply, list[int]]], angles: Sequence[float], loads: Sequence[Any],
                  seed: int, say: Callable[[str], None]) -> None:
         self._say, count = say, len(models)
         alike = of_one_form(models)
@@ -62,8 +63,8 @@ class Crew:
                       if name not in OF_THE_BUS}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # limits that stand for none are beyond any servo's
-            self.sims = VectorSimulator(alike[0], count, load=list(loads), parameters=parameters, bus=supply, threads=1,
-                                        seed=seed)
+            self.sims = VectorSimulator(alike[0], count, load=list(loads), parameters=parameters, bus=list(supplies),
+                                        threads=1, seed=seed)
         self._goals = np.array(angles, dtype=np.float64)
         self.sims.reset(command_angle=self._goals, output_angle=self._goals)
         self.sims.set(torque_enable=False)
