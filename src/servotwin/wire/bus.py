@@ -223,6 +223,13 @@ class Bus:
         """When the next answer is through [s of simulated time]; None: none waits."""
         return self._out[0][0] if self._out else None
 
+    def due_within(self, span: float) -> float | None:
+        """Return when the last of those answers is through that are, within a span [s], after the next one."""
+        if not self._out:
+            return None
+        last = self._out[0][0] + span
+        return max(time for time, _, _ in self._out if time <= last)
+
     def ask(self, data: bytes, patience: float = 0.05) -> bytes:
         """Send bytes, go on until nothing is left to be answered, at most for a time [s]; return what came."""
         self.write(data)

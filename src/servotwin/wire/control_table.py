@@ -39,6 +39,8 @@ class ControlTable:
     def __getitem__(self, name: str) -> int:
         """Return what a register holds."""
         one = self.registers[name]
+        if one.size == 1:
+            return self.bytes[one.address]
         return one.decode(self.bytes[one.address:one.address + one.size])
 
     def __setitem__(self, name: str, value: int) -> None:

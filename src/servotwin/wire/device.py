@@ -115,8 +115,11 @@ class Device:
 
     def tune(self, *names: str) -> None:
         """Let the twin go on with what these registers hold."""
+        made = {one.name: one for name in names for one in self._settings[name]}
+        if not made:
+            return
         raw, numbers = self.table.values(), dict[str, float | str]()
-        for setting in {one.name: one for name in names for one in self._settings[name]}.values():
+        for setting in made.values():
             value = setting.value(raw, self.servo)
             if value is None:
                 if setting.name not in _ABSENT:

@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     from servotwin.wire.bus import Bus
 
 _LOOK = 1e-3  # s of computing between two looks at the port
-_SLICE = 2e-3  # s of simulated time led on at once
-_IDLE = 5e-3  # s between two looks where nothing happens
+_SLICE = 1e-2  # s of simulated time led on at once
+_TOGETHER = 1e-3  # s within which answers of several servos go out together, when the last is through
+_IDLE = 1e-2  # s between two looks where nothing happens
 _BEHIND = 0.05  # s behind the wall clock, from which simulated time loses the difference
 _PAUSE = 1.0  # s between two lines on that
 _TIMES = 20000  # answers whose cost is remembered
@@ -82,8 +83,8 @@ class Service:
         self._link = Link(link) if link is not None else None
         if self._link is not None:
             self._link.check()
-        bus.advance(_SLICE)  # kernels are there before anybody finds the port
-        bus.advance(_SLICE / 3.0)
+        bus.advance(2e-3)  # kernels are there before anybody finds the port
+        bus.advance(7e-4)
         bus.seen(bus.ids[0])
         self._port: PtyPort | TcpPort = PtyPort() if tcp is None else TcpPort(*tcp)
         self.port = self._port.name
@@ -111,23 +112,28 @@ class Service:
         self._thread = threading.Thread(target=self.run, daemon=True, name="servotwin wire")
         self._thread.start()
 
-    def stop(self) -> None:
-        """End, and take the link away."""
+    def end(self) -> None:
+        """Let `run` come to its end."""
         self._ended = True
         os.write(self._waker, b".")
+
+    def stop(self) -> None:
+        """End, and take the link away."""
+        self.end()
         if self._thread is not None:
             self._thread.join()
-        self._tidy()
-
-    def _tidy(self) -> None:
-        if self._keep is not None:
-            self._keep.save(always=False)
-        if self._link is not None:
-            self._link.remove()
+        self.tidy()
         self._port.close()
         for one in (self._wake, self._waker):
             with contextlib.suppress(OSError):
                 os.close(one)
+
+    def tidy(self) -> None:
+        """Keep what is stored, and take the link away: all that outlives the process."""
+        if self._keep is not None:
+            self._keep.save(always=True)
+        if self._link is not None:
+            self._link.remove()
 
     # --- the loop -----------------------------------------------------------------------------------------------------
 
@@ -147,8 +153,9 @@ class Service:
             with bus.lock:
                 start = self._follow(start)
                 self._finish()
-                wait = max(bus.due + start - clock(), 0.0) if bus.due is not None else _IDLE
-                behind = clock() - start - bus.time > _SLICE
+                due = bus.due_within(_TOGETHER)
+                wait = max(due + start - clock(), 0.0) if due is not None else _IDLE
+                behind = clock() - start - bus.time > _IDLE
             if end is not None:
                 wait = min(wait, max(end - clock(), 0.0))
             ready = select.select([self._port, self._wake], [], [], 0.0 if behind else min(wait, _IDLE))[0]
@@ -177,13 +184,11 @@ class Service:
             if began - self._said_at > _PAUSE:
                 self._said_at = began
                 self._say(f"{1e3 * behind:.0f} ms behind: simulated time has lost them ({self.timing.lost:.2f} s so far)")
-        while (left := clock() - start - bus.time) > 0.0:
+        target = began - start  # where the clock is by the end is for the next look
+        while (left := target - bus.time) > 0.0:
             if self._each is not None:
                 self._each(bus)
-            step = min(left, _SLICE)
-            if bus.due is not None and bus.time < bus.due < bus.time + step:
-                step = bus.due - bus.time
-            data = bus.advance(step)
+            data = bus.advance(min(left, _SLICE))
             if data:
                 self.timing.dropped += len(data) - self._port.write(data)
             if clock() - began > _LOOK:
