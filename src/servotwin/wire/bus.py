@@ -114,7 +114,7 @@ class Bus:
         self.rate: float | None = None  # bit/s at which the client talks; None: every servo hears it
         self.devices = self._devices(models, lock, firmware)
         of = (family_of_sts if self.protocol == "feetech" else family_of_x)
-        made = [ready(model, of(model.servo)) for model in models.values()]
+        made = ready(list(models.values()), [of(model.servo) for model in models.values()])
         self.crew = body(made, _supplies(made, supply), [float((angles or {}).get(id, 0.0)) for id in models],
                          [as_load((loads or {}).get(id)) for id in models], seed, self.say)
         self.ids = tuple(models)
@@ -272,8 +272,6 @@ class Bus:
 
     def kept(self) -> dict[str, dict[str, int]]:
         """Return what outlives power-off, by ID at the beginning and register."""
-        for device in self.devices:
-            device.changed = False
         return {str(id): device.table.kept() for id, device in zip(self.ids, self.devices, strict=True)}
 
     @property

@@ -73,7 +73,7 @@ class Crew:
         self._have: list[dict[str, float | str | None]] = [
             {f"firmware.{name}": model.servo.get(f"firmware.{name}") for name in _FIRMWARE} for model in models]
         self._changes: dict[str, dict[int, float | str]] = {}
-        self._releases = list[int]()
+        self._releases: dict[int, float] = {}
         self._hands: dict[int, float] = {}
         self._warm = "housing_temperature" in self.sims.signals
         self._rows: list[Seen] | None = None
@@ -91,12 +91,15 @@ class Crew:
         self._rows = None
         if self._changes:
             self._change()
-        while self._releases:
-            which, part = self._releases, min(_TICK, duration)
-            self._releases = []
+        while self._releases and duration > 0.0:
+            part = min(min(self._releases.values()), duration)
             self._step(part)
-            self.sims.set(torque_enable=self._torque[which], lanes=which)
             duration -= part
+            self._releases = {k: left - part for k, left in self._releases.items()}
+            over = [k for k, left in self._releases.items() if left <= 0.0]
+            for k in over:
+                del self._releases[k]
+                self.sims.set(torque_enable=bool(self._torque[k]), lanes=[k])
         if duration > 0.0:
             self._step(duration)
 
@@ -129,7 +132,7 @@ class Crew:
         """Let a protection go: torque is off for a tick."""
         self.sims.set(torque_enable=False, lanes=[servo])
         self._rows = None
-        self._releases.append(servo)
+        self._releases[servo] = _TICK
 
     def change(self, servo: int, numbers: Mapping[str, float | str]) -> None:
         """Give a servo other numbers (SI), by dotted name, before time goes on."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 from servotwin.models import DigitalServo
@@ -14,6 +14,7 @@ from servotwin.wire.crew import Crew, Seen
 
 COUNT = 2.0 * math.pi / 4096.0  # rad
 MIDDLE, TURN = 2048, 4096  # count at angle 0, counts a turn
+LANDED = 1e-9  # rad between reference and goal: rounding
 FAR = 1e4  # rad: no limit of goals; the bus keeps to those of the registers itself
 _ABSENT: Mapping[str, float] = {  # numbers that say the same as nothing
     "speed_limit": 1e6, "acceleration_limit": 1e9, "trip_current": 1e6, "trip_temperature": 1e6, "undervoltage": 1e-3,
@@ -160,17 +161,21 @@ class Device:
         self.changed = False
 
 
-def ready(model: DigitalServo, family: Family) -> DigitalServo:
-    """Return a model as it runs behind a bus: with a number for every limit that a register may set later."""
-    servo, changes = model.servo, dict[str, float | str]()
-    names = {one.name for one in family.settings if one.registers}
-    for name, value in _ABSENT.items():
-        if name in names and servo.get(f"firmware.{name}") is None:
-            changes[f"firmware.{name}"] = value
-    if "current_limit" in names and servo.get("firmware.current_sense") is None:
-        sense = next(one for one in family.settings if one.name == "current_sense")
-        changes["firmware.current_sense"] = str(sense.value({"Operating_Mode": 5}, servo))
-    changes |= {"firmware.lower_goal": -FAR, "firmware.upper_goal": FAR}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # limits that stand for none are beyond any servo's
-        return type(model)(servo.replace({**changes, "firmware.signal_timeout": None}))
+def ready(models: Sequence[DigitalServo], families: Sequence[Family]) -> list[DigitalServo]:
+    """Return models as they run behind a bus: with a number for every limit that a register may set later."""
+    names = {one.name for family in families for one in family.settings if one.registers}
+    made = list[DigitalServo]()
+    for model, family in zip(models, families, strict=True):
+        servo, changes = model.servo, dict[str, float | str]()
+        for name, value in _ABSENT.items():
+            has_it = any(other.servo.get(f"firmware.{name}") is not None for other in models)
+            if (name in names or has_it) and servo.get(f"firmware.{name}") is None:
+                changes[f"firmware.{name}"] = value
+        if "current_limit" in names and servo.get("firmware.current_sense") is None:
+            law = next((one.value for one in family.settings if one.name == "current_sense"), None)
+            changes["firmware.current_sense"] = "motor" if law is None else str(law({"Operating_Mode": 5}, servo))
+        changes |= {"firmware.lower_goal": -FAR, "firmware.upper_goal": FAR}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # limits that stand for none are beyond any servo's
+            made.append(type(model)(servo.replace({**changes, "firmware.signal_timeout": None})))
+    return made

@@ -43,6 +43,7 @@ class Keep:
         beside = self.path.with_name(f".{self.path.name}.{os.getpid()}")
         beside.write_text(text + "\n", "utf-8")
         beside.replace(self.path)
+        self._bus.to_keep = False  # not before: an interrupt may come at any time, and saves what is left
 
 
 def read_kept(path: Path, bus: Bus) -> dict[str, dict[str, int]]:

@@ -10,7 +10,7 @@ from servotwin.parameters.registers.feetech import REGISTERS, sts_family
 from servotwin.parameters.registers.feetech_models import STS_MODELS
 from servotwin.parameters.registers.model import model_for
 from servotwin.wire.crew import finite
-from servotwin.wire.device import COUNT, MIDDLE, TURN, Device
+from servotwin.wire.device import COUNT, LANDED, MIDDLE, TURN, Device
 
 VOLTAGE, HEAT, CURRENT, OVERLOAD = 1, 4, 8, 32  # bits of the status
 _TRIPS = {1: OVERLOAD, 2: CURRENT, 3: HEAT, 4: VOLTAGE}
@@ -107,7 +107,7 @@ class Sts(Device):
     def moving(self) -> bool:
         """Return whether the reference has not landed at its goal (assumed)."""
         seen = self.seen
-        return bool(self.table["Torque_Enable"]) and abs(seen.reference - seen.goal) > 0.25 * COUNT
+        return bool(self.table["Torque_Enable"]) and abs(seen.reference - seen.goal) > LANDED
 
     def status(self) -> int:
         """Return the bits of what is wrong; they stay while the cause lasts."""

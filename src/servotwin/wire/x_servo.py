@@ -10,7 +10,7 @@ from servotwin.parameters.registers.dynamixel_x import FULL, REGISTERS, SPEED, x
 from servotwin.parameters.registers.dynamixel_x_models import X_MODELS
 from servotwin.parameters.registers.model import model_for
 from servotwin.wire.crew import finite
-from servotwin.wire.device import COUNT, MIDDLE, Device
+from servotwin.wire.device import COUNT, LANDED, MIDDLE, Device
 
 RANGE, LENGTH, LIMIT, ACCESS = 4, 5, 6, 7  # errors
 ALERT = 128
@@ -113,7 +113,7 @@ class X(Device):
             table["Present_Current"] = round(finite(current) / kind.current_unit)
         table["Present_Input_Voltage"] = round(10.0 * seen.voltage)
         table["Present_Temperature"] = min(max(round(seen.temperature - 273.15), 0), 255)
-        landed = not abs(seen.reference - seen.goal) > 0.25 * COUNT
+        landed = not abs(seen.reference - seen.goal) > LANDED
         table["Moving"] = abs(speed) > table["Moving_Threshold"]
         table["Moving_Status"] = int(landed) | (0 if landed else 2)
         table["Position_Trajectory"] = (MIDDLE + round(self._way * finite(seen.reference) / COUNT)
