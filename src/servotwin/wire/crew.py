@@ -57,25 +57,29 @@ class Crew:
 
     def __init__(self, models: Sequence[DigitalServo], supplies: Sequence[tuple[Supply, list[int]]], angles: Sequence[float], loads: Sequence[Any],
                  seed: int, say: Callable[[str], None]) -> None:
-        self._say, count = say, len(models)
-        alike = of_one_form(models)
+        alike, count = of_one_form(models), len(models)
         parameters = {name: values for name, values in differing(alike, [str(k) for k in range(count)]).items()
                       if name not in OF_THE_BUS}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # limits that stand for none are beyond any servo's
-            self.sims = VectorSimulator(alike[0], count, load=list(loads), parameters=parameters, bus=list(supplies),
-                                        threads=1, seed=seed)
-        self._goals = np.array(angles, dtype=np.float64)
+            sims = VectorSimulator(alike[0], count, load=list(loads), parameters=parameters, bus=list(supplies),
+                                   threads=1, seed=seed)
+        self.begin(models, sims, np.array(angles, dtype=np.float64), say)
         self.sims.reset(command_angle=self._goals, output_angle=self._goals)
         self.sims.set(torque_enable=False)
+
+    def begin(self, models: Sequence[DigitalServo], sims: VectorSimulator, angles: Array,
+              say: Callable[[str], None]) -> None:
+        """Take the simulator of all servos, which are limp at these angles [rad]."""
+        self.sims, self._say, self._goals = sims, say, angles
         self._told = False
-        self._torque = np.zeros(count, np.bool_)
+        self._torque = np.zeros(len(models), np.bool_)
         self._have: list[dict[str, float | str | None]] = [
             {f"firmware.{name}": model.servo.get(f"firmware.{name}") for name in _FIRMWARE} for model in models]
         self._changes: dict[str, dict[int, float | str]] = {}
         self._releases: dict[int, float] = {}
         self._hands: dict[int, float] = {}
-        self._warm = "housing_temperature" in self.sims.signals
+        self._warm = "housing_temperature" in sims.signals
         self._rows: list[Seen] | None = None
 
     def __len__(self) -> int:
@@ -93,17 +97,18 @@ class Crew:
             self._change()
         while self._releases and duration > 0.0:
             part = min(min(self._releases.values()), duration)
-            self._step(part)
+            self.lead(part)
             duration -= part
             self._releases = {k: left - part for k, left in self._releases.items()}
             over = [k for k, left in self._releases.items() if left <= 0.0]
             for k in over:
                 del self._releases[k]
-                self.sims.set(torque_enable=bool(self._torque[k]), lanes=[k])
+                self._enable(k, bool(self._torque[k]))
         if duration > 0.0:
-            self._step(duration)
+            self.lead(duration)
 
-    def _step(self, duration: float) -> None:
+    def lead(self, duration: float) -> None:
+        """Let time go on [s] with nothing to be changed meanwhile."""
         if self._hands:
             held = [k for k in self._hands if not self._torque[k]]
             if held:
@@ -126,11 +131,11 @@ class Crew:
         if on != self._torque[servo]:
             self._torque[servo] = on
             self._rows = None
-            self.sims.set(torque_enable=bool(on), lanes=[servo])
+            self._enable(servo, bool(on))
 
     def release(self, servo: int) -> None:
         """Let a protection go: torque is off for a tick."""
-        self.sims.set(torque_enable=False, lanes=[servo])
+        self._enable(servo, False)
         self._rows = None
         self._releases[servo] = _TICK
 
@@ -176,9 +181,17 @@ class Crew:
             warnings.simplefilter("ignore")
             if all(len(of) == len(lanes) for of in changes.values()):
                 self.sims.set(parameters={name: [of[k] for k in lanes] for name, of in changes.items()}, lanes=lanes)
-                return
-            for name, of in changes.items():
-                self.sims.set(parameters={name: list(of.values())}, lanes=list(of))
+            else:
+                for name, of in changes.items():
+                    self.sims.set(parameters={name: list(of.values())}, lanes=list(of))
+        self.touched()
+
+    def touched(self) -> None:
+        """Do what it asks for that memories or numbers of lanes were changed."""
+
+    def _enable(self, servo: int, on: bool) -> None:
+        self.sims.set(torque_enable=on, lanes=[servo])
+        self.touched()
 
     # --- what shows ---------------------------------------------------------------------------------------------------
 
