@@ -270,13 +270,14 @@ class VectorSimulator:
                          "nothing: what all on its bus draw decides it")
         if angle is not None:
             self._numbers.check_angles(angle, which)
-        if parameters:
-            self._store.renew(self._numbers.changed(which, parameters), which)
+        anew = bool(parameters) and not self._numbers.retuned(which, parameters or {})
+        if anew:
+            self._store.renew(self._numbers.changed(which, parameters or {}), which)
         otherwise = False
         if inertia is not None or bus is not None:
             otherwise = self._numbers.impose(which, inertia, bus)
             self._store.refit(which, otherwise)
-        if self._entry is not None and (parameters or otherwise):
+        if self._entry is not None and (anew or otherwise):
             self._entry.refresh()
         if angle is not None or speed is not None:
             self._store.impose(which, angle, speed)
