@@ -6,10 +6,13 @@ Of what it does not need here there are empty modules. Prints what it found as J
 import importlib.machinery
 import json
 import sys
-import threading
 import time
 import types
 from pathlib import Path
+
+
+PATIENCE = 500.0  # ms
+MOVING = 8.0  # s for which a hand moves the arm
 
 
 class Anything:
@@ -37,13 +40,19 @@ for name in ("torch", "accelerate", "datasets", "datasets.utils", "datasets.util
     stub(name)
 
 
+def patient(bus):
+    """Let answers be late: LeRobot waits for 50 ms, and on a machine that is busy others have the processor."""
+    bus.port_handler.setPacketTimeout = lambda length: bus.port_handler.setPacketTimeoutMillis(PATIENCE)
+    return bus
+
+
 def of_bus(port, folder):
     from lerobot.motors import Motor, MotorCalibration, MotorNormMode
     from lerobot.motors.feetech import FeetechMotorsBus, OperatingMode
 
     names = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
     motors = {name: Motor(id, "sts3215", MotorNormMode.DEGREES) for id, name in enumerate(names, start=1)}
-    bus = FeetechMotorsBus(port, motors)
+    bus = patient(FeetechMotorsBus(port, motors))
     bus.connect()
     bus.disable_torque()
     for name in names:
@@ -74,7 +83,7 @@ def of_bus(port, folder):
     found = {"homed": homed, "calibrated": calibrated, "reached": reached, "lost": lost, "took": took,
              "ids": bus.broadcast_ping()}
     bus.disconnect()
-    again = FeetechMotorsBus(port, motors, calibration)
+    again = patient(FeetechMotorsBus(port, motors, calibration))
     again.connect()
     found["again"] = again.is_calibrated
     again.disconnect()
@@ -89,20 +98,14 @@ def of_arm(port, folder):
          TELEOPERATORS="teleoperators")
     import builtins
 
-    from lerobot.robots.so101_follower import SO101Follower, SO101FollowerConfig
+    from lerobot.motors import motors_bus
+    from lerobot.robots.so_follower import SO101Follower, SO101FollowerConfig
 
-    def answer(prompt=""):
-        return ""
-
-    builtins.input = answer
-    import lerobot.motors.motors_bus as motors_bus
-
-    motors_bus.enter_pressed, pressed = lambda: time.monotonic() > end[0], None
-    del pressed
-    end = [time.monotonic() + 1e9]
+    end = time.monotonic() + MOVING
+    builtins.input = lambda prompt="": ""
+    motors_bus.enter_pressed = lambda: time.monotonic() > end
     robot = SO101Follower(SO101FollowerConfig(port=port, id="twin"))
-    threading.Timer(0.0, lambda: None).start()
-    end[0] = time.monotonic() + 9.0
+    patient(robot.bus)
     robot.connect(calibrate=True)
     seen = robot.get_observation()
     robot.send_action(dict.fromkeys((f"{name}.pos" for name in robot.bus.motors), 5.0))

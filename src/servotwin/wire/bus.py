@@ -276,8 +276,13 @@ class Bus:
 
     @property
     def to_keep(self) -> bool:
-        """Whether something stored has changed since `kept`."""
+        """Whether something stored has changed since this was set to False."""
         return any(device.changed for device in self.devices)
+
+    @to_keep.setter
+    def to_keep(self, changed: bool) -> None:
+        for device in self.devices:
+            device.changed = changed
 
     def take_kept(self, kept: Mapping[str, Mapping[str, int]]) -> None:
         """Put back what `kept` returned, and switch the servos on anew."""
