@@ -10,7 +10,6 @@ import time
 import types
 from pathlib import Path
 
-
 PATIENCE = 500.0  # ms
 MOVING = 8.0  # s for which a hand moves the arm
 

@@ -1,6 +1,7 @@
 """Arms that are served, as people start them."""
 
 import pytest
+
 from wire_served import served
 
 

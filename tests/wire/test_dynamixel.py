@@ -3,9 +3,9 @@
 import math
 
 import pytest
-from wire_talk import COUNT, crc, dynamixel, word
 
 import servotwin as st
+from wire_talk import COUNT, crc, dynamixel, word
 
 XL330, XL430 = "dynamixel-xl330-m288", "dynamixel-xl430-w250"
 

@@ -1,9 +1,9 @@
 """What an STS3215 does with packets and registers, as its sources say."""
 
 import pytest
-from wire_talk import COUNT, STS, Client, feetech, word
 
 import servotwin as st
+from wire_talk import COUNT, STS, Client, feetech, word
 
 
 def bus_of(count=1, **more):

@@ -1,10 +1,10 @@
 import random
 
 import pytest
-from wire_talk import dynamixel, feetech
 
 from servotwin.wire import dynamixel_frames, feetech_frames
 from servotwin.wire.packet import Packet
+from wire_talk import dynamixel, feetech
 
 
 @pytest.mark.parametrize(("made", "text"), [
@@ -31,18 +31,19 @@ def test_a_header_within_a_packet_of_protocol_2_is_stuffed():
     assert dynamixel_frames.split(bytearray(made)) == ([Packet(1, 3, b"\xff\xff\xfd")], 0)
 
 
+@pytest.mark.parametrize("count", [5000, pytest.param(100_000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("frames", "plain"), [(feetech_frames, feetech), (dynamixel_frames, dynamixel)])
-def test_packets_come_out_as_they_went_in_whatever_is_between(frames, plain):
+def test_packets_come_out_as_they_went_in_whatever_is_between(frames, plain, count):
     draw, sent, buffer, found = random.Random(1), [], bytearray(), []
-    for _ in range(2000):
+    for _ in range(count):
         data = bytes(draw.choice((draw.randrange(256), 0xFF, 0xFD, 0)) for _ in range(draw.randrange(12)))
         sent.append(Packet(draw.randrange(254), draw.randrange(1, 256), data))
         whole = frames.frame(*sent[-1])
         assert whole == plain(sent[-1].id, sent[-1].code, *data)
         noise = bytes(draw.randrange(0xFE) for _ in range(draw.randrange(4)))
-        for part in (noise, whole[:draw.randrange(len(whole))], None):
-            buffer += part if part is not None else whole[done:]
-            done = len(part or b"")
+        cut = draw.randrange(len(whole))
+        for part in (noise, whole[:cut], whole[cut:]):
+            buffer += part
             found += frames.split(buffer)[0]
     assert found == sent
     assert len(buffer) < 3

@@ -7,6 +7,7 @@ import sys
 import time
 
 import pytest
+
 from wire_served import served
 from wire_talk import feetech, word
 

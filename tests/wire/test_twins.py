@@ -5,9 +5,9 @@ import resource
 
 import numpy as np
 import pytest
-from wire_talk import COUNT, STS, Client, feetech, word
 
 import servotwin as st
+from wire_talk import COUNT, STS, Client, feetech, word
 
 
 def bus_of(count=1, **more):

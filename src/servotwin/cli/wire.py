@@ -12,6 +12,7 @@ from servotwin.cli.terminal import emit, emit_json
 
 if TYPE_CHECKING:
     from servotwin.wire import Bus
+    from servotwin.wire.service import Service
 
 _MOST_PORT = 65535
 
@@ -20,8 +21,8 @@ def wire(
     arm: Annotated[str | None, typer.Argument(
         metavar="[ARM]", help="so101 or koch, or path of an arm file (.toml); none: the servos of --servo.")] = None,
     servo: Annotated[list[str] | None, typer.Option(
-        metavar="ID=SERVO", help="A servo on the wire, such as 1=feetech-sts3215-12v; repeatable. It replaces the arm's "
-        "of that ID.")] = None,
+        metavar="ID=SERVO", help="A servo on the wire, such as 1=feetech-sts3215-12v; repeatable. It replaces the "
+        "arm's of that ID.")] = None,
     link: Annotated[Path | None, typer.Option(
         metavar="PATH", help="Link to the port, such as /tmp/so101; it appears when the servos are ready.")] = None,
     keep: Annotated[Path | None, typer.Option(
@@ -39,7 +40,7 @@ def wire(
     faults: Annotated[Path | None, typer.Option(
         metavar="FILE.toml", help="What is wrong with the wire: [[fault]] tables with a kind.")] = None,
     lock: Annotated[str, typer.Option(
-        metavar="HOW", help="What a write to the EEPROM does while Lock is 1: keep (until power-off) or drop.")] = "keep",
+        metavar="HOW", help="A write to the EEPROM while Lock is 1: keep (until power-off), or drop.")] = "keep",
     firmware: Annotated[str | None, typer.Option(
         metavar="MAJOR.MINOR", help="Version that the servos tell (default 3.10; Dynamixel 45).")] = None,
     body: Annotated[bool, typer.Option(
@@ -56,7 +57,8 @@ def wire(
 
     _check(duration)
     asked = Asked(arm=arm, servos=_servos(servo or []), supply=supply, registers=tuple(register or ()), lock=lock,
-                  firmware=_version(firmware), faults=read_faults(faults, seed) if faults else None, body=body, seed=seed)
+                  firmware=_version(firmware), faults=read_faults(faults, seed) if faults else None, body=body,
+                  seed=seed)
     bus, names = arm_bus(asked, registers=_written)
     _serve(bus, names, tcp=_tcp(tcp), link=link, keep=keep, each=hand_of(hand, bus, names) if hand else None,
            duration=duration, as_json=as_json)
@@ -80,22 +82,26 @@ def _serve(bus: Bus, names: dict[int, str], *, tcp: tuple[str, int] | None, link
         sys.stderr.flush()
 
     service = Service(bus, tcp=tcp, link=link, keep=keep, say=say, each=each)
-    facts = {"port": service.port, "link": None if link is None else str(link), "protocol": bus.protocol,
-             "servos": {str(id): names.get(id, "") for id in bus.ids}}
-    if as_json:
-        emit_json(facts)
-    else:
-        who = ", ".join(f"{id} {names.get(id, '')}".rstrip() for id in bus.ids)
-        emit(f"{bus.protocol} at {link or service.port}: {who}  (Ctrl-C ends it)")
-        if not service.tells_rate:
-            emit("the speed that a program sets is not seen here: servos answer at every one")
     try:
         with interrupts.last_words(service.tidy):
+            _tell(bus, names, service, link, as_json=as_json)
             service.run(duration)
     finally:
         service.stop()
     if service.error is not None:
         raise service.error
+
+
+def _tell(bus: Bus, names: dict[int, str], service: Service, link: Path | None, *, as_json: bool) -> None:
+    """Say where the port is, and who is there."""
+    if as_json:
+        emit_json({"port": service.port, "link": None if link is None else str(link), "protocol": bus.protocol,
+                   "servos": {str(id): names.get(id, "") for id in bus.ids}})
+        return
+    who = ", ".join(f"{id} {names.get(id, '')}".rstrip() for id in bus.ids)
+    emit(f"{bus.protocol} at {link or service.port}: {who}  (Ctrl-C ends it)")
+    if not service.tells_rate:
+        emit("the speed that a program sets is not seen here: servos answer at every one")
 
 
 def _servos(words: list[str]) -> dict[int, str]:

@@ -84,7 +84,8 @@ def arm_bus(asked: Asked, *, registers: Callable[[Servo, tuple[str, ...]], Servo
     arm = _arm(asked.arm)
     named = {**arm.servos, **asked.servos}
     if not named:
-        raise InputError("servotwin wire", got="no servos", allowed=f"{' or '.join(ARMS)}, an arm file, or --servo ID=SERVO")
+        raise InputError("servotwin wire", got="no servos",
+                         allowed=f"{' or '.join(ARMS)}, an arm file, or --servo ID=SERVO")
     servos = {id: registers(registers(load_servo(name), arm.registers.get(id, ())), asked.registers)
               for id, name in named.items()}
     words = asked.supply or arm.supply
@@ -123,7 +124,8 @@ def _read(path: Path) -> _Arm:
     tables = found.get("servo")
     if not isinstance(tables, list) or not tables or not all(isinstance(one, dict) for one in tables):
         raise InputError(f"{path}", got="no [[servo]]", allowed="a table [[servo]] with id and servo for each")
-    servos, joints, angles, registers = dict[int, str](), dict[int, str](), dict[int, float](), dict[int, tuple[str, ...]]()
+    servos, joints = dict[int, str](), dict[int, str]()
+    angles, registers = dict[int, float](), dict[int, tuple[str, ...]]()
     for one in tables:
         _known(f"{path}: key of a servo", one, _SERVO_KEYS)
         id = one.get("id")

@@ -55,8 +55,8 @@ class Crew:
         Told what cannot be computed.
     """
 
-    def __init__(self, models: Sequence[DigitalServo], supplies: Sequence[tuple[Supply, list[int]]], angles: Sequence[float], loads: Sequence[Any],
-                 seed: int, say: Callable[[str], None]) -> None:
+    def __init__(self, models: Sequence[DigitalServo], supplies: Sequence[tuple[Supply, list[int]]],
+                 angles: Sequence[float], loads: Sequence[Any], seed: int, say: Callable[[str], None]) -> None:
         alike, count = of_one_form(models), len(models)
         parameters = {name: values for name, values in differing(alike, [str(k) for k in range(count)]).items()
                       if name not in OF_THE_BUS}

@@ -46,7 +46,8 @@ class Device:
         self.lane, self.servo, self.family, self._version = lane, model.servo, family, version
         self.table = ControlTable(family, self.SIZE, {
             **{name: one.factory for name, one in family.registers.items() if not one.reading},
-            **{name: value for name, value in written(family, model.servo).items() if not family.registers[name].reading},
+            **{name: value for name, value in written(family, model.servo).items()
+               if not family.registers[name].reading},
             **self.fixed()})
         self.changed = False  # whether what is stored is another than when it was kept
         self.waiting: bytes | None = None  # what a REG WRITE left

@@ -60,7 +60,7 @@ def answer(id: int, error: int, data: bytes = b"") -> bytes:
     Examples
     --------
     >>> answer(1, 0, bytes([0x06, 0x04, 0x26])).hex()
-    'fffffd00010700550006042665 5d'.replace(' ', '')
+    'fffffd000107005500060426655d'
     """
     return frame(id, STATUS, bytes((error,)) + data)
 
@@ -81,12 +81,12 @@ def fast_answer(parts: list[tuple[int, int, bytes]]) -> bytes:
 
 
 def split(buffer: bytearray) -> tuple[list[Packet], int]:
-    """Take whole packets out of a buffer; return them, and how many had a bad CRC.
+    r"""Take whole packets out of a buffer; return them, and how many had a bad CRC.
 
     Examples
     --------
-    >>> split(bytearray(b"junk" + frame(1, WRITE, b"\\x74\\x00\\xff\\xff\\xfd\\x00")))
-    ([Packet(id=1, code=3, data=b't\\x00\\xff\\xff\\xfd\\x00')], 0)
+    >>> split(bytearray(b"junk" + frame(1, WRITE, b"\x74\x00\xff\xff\xfd\x00")))
+    ([Packet(id=1, code=3, data=b't\x00\xff\xff\xfd\x00')], 0)
     """
     found, bad, at, end = list[Packet](), 0, 0, len(buffer)
     while True:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -59,7 +59,8 @@ class Fault:
         if self.kind not in KINDS:
             raise UnknownNameError("fault", self.kind, KINDS)
         for name, bad, allowed in (
-                ("rate", not 0.0 <= self.rate <= 1.0, "0 to 1"), ("seconds", not 0.0 <= self.seconds <= 60.0, "0 to 60"),
+                ("rate", not 0.0 <= self.rate <= 1.0, "0 to 1"),
+                ("seconds", not 0.0 <= self.seconds <= 60.0, "0 to 60"),
                 ("until", not self.until >= self.at >= 0.0, "not before `at`, which is at least 0"),
                 ("id", self.id is None and self.kind in ("absent", "duplicate", "firmware", "overload"), "an ID"),
                 ("to", self.to is None and self.kind == "duplicate", "an ID"),
@@ -79,7 +80,7 @@ class Faults:
 
     def __init__(self, faults: Sequence[Fault] = (), seed: int = 0) -> None:
         self.all = list(faults)
-        self._random = random.Random(seed)  # noqa: S311
+        self._random = random.Random(seed)
         self._running: list[Fault] = []
         self._done: set[int] = set()
         self.absent: set[int] = set()

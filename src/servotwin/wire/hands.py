@@ -46,8 +46,8 @@ def _table(path: Path) -> dict[str, np.ndarray]:
     lines = [line.strip() for line in path.read_text("utf-8").splitlines() if line.strip() and line[:1] != "#"]
     head = [word.strip() for word in lines[0].split(",")] if lines else []
     if "time_s" not in head or len(head) < 2 or len(set(head)) < len(head):
-        raise InputError(f"{path}", got=", ".join(head) or "nothing", allowed="columns time_s and angles, each once, such as "
-                         "time_s,shoulder_pan_deg")
+        raise InputError(f"{path}", got=", ".join(head) or "nothing",
+                         allowed="columns time_s and angles, each once, such as time_s,shoulder_pan_deg")
     rows = []
     for number, line in enumerate(lines[1:], start=2):
         try:
@@ -60,5 +60,6 @@ def _table(path: Path) -> dict[str, np.ndarray]:
     columns = np.array(rows, dtype=np.float64).reshape(-1, len(head)).T
     found = dict(zip(head, columns, strict=True))
     if not rows or np.any(np.diff(found["time_s"]) < 0.0):
-        raise InputError(f"{path}", got="no rows" if not rows else "times that go back", allowed="rows in order of time")
+        raise InputError(f"{path}", got="no rows" if not rows else "times that go back",
+                         allowed="rows in order of time")
     return found

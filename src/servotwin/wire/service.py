@@ -183,7 +183,8 @@ class Service:
             self.timing.losses += 1
             if began - self._said_at > _PAUSE:
                 self._said_at = began
-                self._say(f"{1e3 * behind:.0f} ms behind: simulated time has lost them ({self.timing.lost:.2f} s so far)")
+                self._say(f"{1e3 * behind:.0f} ms behind: simulated time has lost them "
+                          f"({self.timing.lost:.2f} s so far)")
         target = began - start  # where the clock is by the end is for the next look
         while (left := target - bus.time) > 0.0:
             if self._each is not None:

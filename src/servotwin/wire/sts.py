@@ -27,8 +27,8 @@ class Sts(Device):
     BAUDS: ClassVar[dict[int, int]] = dict(enumerate(
         (1_000_000, 500_000, 250_000, 128_000, 115_200, 76_800, 57_600, 38_400)))
 
-    def __init__(self, lane: int, model: DigitalServo, say: Callable[[str], None], *, firmware: tuple[int, int] = (3, 10),
-                 lock: str = "keep") -> None:
+    def __init__(self, lane: int, model: DigitalServo, say: Callable[[str], None], *,
+                 firmware: tuple[int, int] = (3, 10), lock: str = "keep") -> None:
         self._drops = lock == "drop"
         self._kind = model_for(STS_MODELS, model.servo, 0, REGISTERS)
         super().__init__(lane, model, sts_family(self._kind), say, firmware)

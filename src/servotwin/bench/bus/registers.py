@@ -1,7 +1,7 @@
 """How the registers of bus servos lie in their memory: address, bytes, sign.
 
-Names, addresses, bytes and signs are those of `servotwin.parameters.registers`; those of protocol 1 have their bytes and
-signs here (Robotis' e-manual of MX and AX).
+Names, addresses, bytes and signs are those of `servotwin.parameters.registers`; those of protocol 1 have their bytes
+and signs here (Robotis' e-manual of MX and AX).
 """
 
 from __future__ import annotations
