@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from servotwin.parameters.registers.table import Family, Register
+from servotwin.parameters.registers.table import Family, Register, is_read_only
 
 
 class ControlTable:
@@ -84,8 +84,3 @@ class ControlTable:
                 self.stored[place] = self.bytes[place]
                 changed = True
         return changed
-
-
-def is_read_only(name: str, one: Register) -> bool:
-    """Return whether a register is the servo's own to write: goals are not, though the servo may change them too."""
-    return one.reading and (not name.startswith("Goal_") or name == "Goal_Position_2")

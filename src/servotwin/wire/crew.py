@@ -74,7 +74,7 @@ class Crew:
         self.sims, self._say, self._goals = sims, say, angles
         self._told = False
         self._torque = np.zeros(len(models), np.bool_)
-        self._have: list[dict[str, float | str | None]] = [
+        self._have: list[dict[str, Any]] = [
             {f"firmware.{name}": model.servo.get(f"firmware.{name}") for name in _FIRMWARE} for model in models]
         self._changes: dict[str, dict[int, float | str]] = {}
         self._releases: dict[int, float] = {}
@@ -203,7 +203,7 @@ class Crew:
                 "output_angle", "output_speed", "duty", "armature_current", "supply_current", "bus_voltage")]
             warm = sims["housing_temperature"] if self._warm else none
             rest = [sims[name] for name in ("goal_angle", "reference_angle", "trip")]
-            self._rows = [Seen(*row[:-1], int(row[-1]) if row[-1] == row[-1] else 0) for row in zip(
+            self._rows = [Seen._make((*row[:-1], int(row[-1]) if row[-1] == row[-1] else 0)) for row in zip(
                 *(column.tolist() for column in (*columns, warm, *rest)), strict=True)]
         return self._rows[servo]
 

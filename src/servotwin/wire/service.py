@@ -91,7 +91,7 @@ class Service:
         self._wake, self._waker = os.pipe()
         self._thread: threading.Thread | None = None
         self._ended = False
-        self._told = 0
+        self._asked: float | None = None
         self._said_at = -1e9
         self.error: ServotwinError | None = None
         if self._link is not None:
@@ -164,13 +164,16 @@ class Service:
                 if data:
                     with bus.lock:
                         start = self._follow(start)
-                        began = time.thread_time()
-                        bus.rate = self._port.rate()
-                        bus.write(data)
-                        if bus.due is not None:
-                            self.timing.costs.append(time.thread_time() - began)
+                        self._hear(data)
         with bus.lock:
             self._finish()
+
+    def _hear(self, data: bytes) -> None:
+        """Take bytes, and note what it costs from here to the answer."""
+        began = time.thread_time()
+        self.bus.rate = self._port.rate()
+        self.bus.write(data)
+        self._asked = began if self.bus.due is not None else None
 
     def _follow(self, start: float) -> float:
         """Lead the bus on to the wall clock, as far as a look allows; return where that has its zero."""
@@ -192,6 +195,9 @@ class Service:
             data = bus.advance(min(left, _SLICE))
             if data:
                 self.timing.dropped += len(data) - self._port.write(data)
+                if self._asked is not None:
+                    self.timing.costs.append(time.thread_time() - self._asked)
+                    self._asked = None
             if clock() - began > _LOOK:
                 break
         return start

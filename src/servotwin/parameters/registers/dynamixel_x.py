@@ -93,6 +93,11 @@ REGISTERS: dict[str, Register] = laid(_KNOWN, sizes={2: _WORDS, 4: _LONG}, signs
 """By the e-manual's names with underscores; 0 to 63 outlive power-off."""
 
 
+_SERVED = frozenset({
+    "ID", "Baud_Rate", "Return_Delay_Time", "Status_Return_Level", "Homing_Offset", "Moving_Threshold", "Drive_Mode",
+    "Velocity_Limit", "Current_Limit", "Torque_Enable", "Goal_Position", "Feedforward_1st_Gain", "Feedforward_2nd_Gain"})
+
+
 def dynamixel_x(registers: Given, *, servo: str | Path | Servo) -> Servo:
     """Return a servo with registers of Dynamixel's X series set into its firmware.
 
@@ -143,7 +148,7 @@ def x_family(model: XModel) -> Family:
         assumed=model.unseen(REGISTERS), masks=("Shutdown",), settings=settings,
         other_names={"Secondary_Shadow_ID": "Secondary_ID"},
         copied={"Goal_PWM": "PWM_Limit", **({"Goal_Current": "Current_Limit"} if model.current_unit else {})},
-        check=lambda raw: _check(model, raw))
+        check=lambda raw: _check(model, raw), served=_SERVED, idle=frozenset({"Bus_Watchdog"}), refuses=True)
 
 
 def _check(model: XModel, raw: Raw) -> None:

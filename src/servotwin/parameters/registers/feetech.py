@@ -93,6 +93,11 @@ REGISTERS: dict[str, Register] = laid(_KNOWN, sizes={2: (
 """By LeRobot's names; 0 to 39 and 78 to 86 outlive power-off."""
 
 
+_SERVED = frozenset({
+    "ID", "Baud_Rate", "Return_Delay_Time", "Response_Status_Level", "Max_Voltage_Limit", "Max_Torque_Limit",
+    "Homing_Offset", "Torque_Enable", "Goal_Position", "Lock", "Angular_Resolution"})
+
+
 def feetech_sts(registers: Given, *, servo: str | Path | Servo) -> Servo:
     """Return a servo with registers of Feetech's STS series set into its firmware.
 
@@ -144,7 +149,8 @@ def sts_family(model: StsModel) -> Family:
         assumed=model.unseen(REGISTERS), elsewhere=model.elsewhere, masks=(_MASK,), sets=LEROBOT_SETS,
         settings=(*_CONTROL, *_profile(model), *_trips(model)),
         other_names={"Hts": "Minimum_Velocity_Limit", "Moving_Velocity": "Moving_Velocity_Threshold"},
-        copied={"Torque_Limit": "Max_Torque_Limit"}, pairs=(("CW_Dead_Zone", "CCW_Dead_Zone"),), check=_check)
+        copied={"Torque_Limit": "Max_Torque_Limit"}, pairs=(("CW_Dead_Zone", "CCW_Dead_Zone"),), check=_check,
+        served=_SERVED)
 
 
 def _check(raw: Raw) -> None:

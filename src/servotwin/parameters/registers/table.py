@@ -164,6 +164,12 @@ class Family:
         Registers for the two ways of turning, of which the larger value counts.
     check : callable
         Raises ParameterError where raw values do not go together.
+    served : frozenset of str
+        Registers that act on a wire, or on power-up, though no number of the firmware follows from them.
+    idle : frozenset of str
+        Registers of which a wire only keeps what is written, though a number follows from them.
+    refuses : bool
+        Whether a servo refuses values that are not computed; else it keeps them.
     """
 
     label: str
@@ -179,6 +185,29 @@ class Family:
     copied: Mapping[str, str] = field(default_factory=dict)
     pairs: tuple[tuple[str, str], ...] = ()
     check: Callable[[Raw], None] = lambda raw: None
+    served: frozenset[str] = frozenset()
+    idle: frozenset[str] = frozenset()
+    refuses: bool = False
+
+    def does(self, name: str) -> str:
+        """Return what a write to a register does on a wire: acts, kept, read only; and what becomes of other values.
+
+        Examples
+        --------
+        >>> from servotwin.parameters.registers.feetech import family_of
+        >>> family = family_of(load_servo("feetech-sts3215-12v"))
+        >>> [family.does(name) for name in ("P_Coefficient", "Goal_Time", "Present_Load")]
+        ['acts', 'kept', 'read only']
+        """
+        one = self.registers[name]
+        if is_read_only(name, one):
+            return "read only"
+        acts = name not in self.idle and (name in self.served or any(name in each.registers for each in self.settings))
+        if not acts:
+            return "kept"
+        if not one.only:
+            return "acts"
+        return f"acts; others than {', '.join(map(str, one.only))} {'refused' if self.refuses else 'kept'}"
 
     def document(self, name: str) -> str:
         """Return where the factory value of a register is printed; empty where it is assumed."""
@@ -210,6 +239,12 @@ def laid(registers: Mapping[str, Register], *, sizes: Mapping[int, str], signs: 
                           signed=name in signs and signs[name] is None,
                           stored=any(one.address in some for some in stored), unit=unit_of.get(name, ""))
             for name, one in registers.items()}
+
+
+def is_read_only(name: str, one: Register) -> bool:
+    """Return whether a register is the servo's own to write: goals are not, though the servo may change them too."""
+    told = name.startswith("Goal_") and name != "Goal_Position_2"
+    return (one.reading and not told) or name in ("Model_Number", "Registered_Instruction")
 
 
 Given = Mapping[str, int] | str
