@@ -1,4 +1,4 @@
-"""A client: `python client.py sdk|raw PORT CYCLES` reads and writes six servos at 100 Hz, and prints how long it took."""
+"""A client: `python client.py sdk|raw PORT CYCLES IDS` reads and writes servos at 100 Hz; prints how long it took."""
 
 import json
 import os
@@ -8,7 +8,7 @@ import time
 import tty
 
 PERIOD, PATIENCE = 0.01, 0.05  # s
-IDS = range(1, 7)
+IDS = range(1, int(sys.argv[4]) + 1)
 
 
 def frame(id, code, data):
@@ -56,11 +56,11 @@ class Raw:
     def ask(self):
         os.write(self.port, self.question)
         got, end = 0, time.perf_counter() + PATIENCE
-        while got < 48:
+        while got < 8 * len(IDS):
             if not select.select([self.port], [], [], max(end - time.perf_counter(), 0.0))[0]:
                 return False
             got += len(os.read(self.port, 4096))
-        return got == 48
+        return got == 8 * len(IDS)
 
     def tell(self, goal):
         data = b"".join(bytes((id,)) + goal.to_bytes(2, "little") for id in IDS)

@@ -1,17 +1,36 @@
-"""Our bus at a pseudo-terminal: `python ours.py free|arm|four`; as bare.py, and what it lost."""
+"""Our bus at a pseudo-terminal: `python ours.py still|free|arm|four`; as bare.py, and what it lost."""
 
 import json
 import sys
 import time
 
 import servotwin as st
+from servotwin.wire import Seen
 from servotwin.wire.arms import Asked, arm_bus
 from servotwin.wire.service import Service
 
 SUPPLY = "12V:0.1ohm"
 
 
+class Still:
+    """In the place of the crew: shafts that stand."""
+
+    def __init__(self, models, *_):
+        self._seen = Seen(0.0, 0.0, 0.0, 0.0, 0.0, 12.0, 0.0, 0.0, 0, 298.15)
+
+    def seen(self, servo):
+        return self._seen
+
+    def failed(self):
+        return None
+
+    def __getattr__(self, name):
+        return lambda *_: None
+
+
 def buses(what):
+    if what == "still":
+        return [st.wire.Bus({k: "feetech-sts3215-12v" for k in range(1, 7)}, body=Still)]
     if what == "four":
         return [st.wire.Bus({k: "feetech-sts3215-12v" for k in range(1, 6)}, supply=st.Supply.of(SUPPLY))
                 for _ in range(4)]

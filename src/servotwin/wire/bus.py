@@ -167,12 +167,19 @@ class Bus:
         for packet in packets:
             self.counts.packets += 1
             listening = [one for one in self.devices if self._hears(one)]
-            if listening:
-                for reply in self._talk.replies(packet, listening, BITS / (self.rate or self._rate(listening))):
+            if not listening:
+                continue
+            replies = self._talk.replies(packet, listening, BITS / (self.rate or self._rate(listening)))
+            if self.faults.all:
+                for reply in replies:
                     self._answer(reply.after, reply.data)
+            else:
+                self.counts.answers += len(replies)
+                for reply in replies:
+                    self._send(self.time + reply.after, reply.data)
 
     def _hears(self, one: Any) -> bool:
-        if one.id in self.faults.absent or one.lane in self.faults.off:
+        if self.faults.absent and one.id in self.faults.absent:
             return False
         return self.rate is None or (one.baud is not None and abs(one.baud - self.rate) <= _NEAR * self.rate)
 

@@ -21,6 +21,8 @@ from servotwin.simulation import VectorSimulator
 Array = NDArray[np.float64]
 _TICK = 1.5e-3  # s, more than a tick of every program here: what it takes to see that torque was off
 _FIRMWARE = tuple(one.name for one in fields(Firmware))
+_SHOWN = ("duty", "armature_current", "supply_current", "bus_voltage", "goal_angle",
+          "reference_angle", "trip")
 _COLD = 298.15  # K, shown where a servo has no thermal numbers
 
 
@@ -33,10 +35,10 @@ class Seen(NamedTuple):
     current: float
     supply_current: float
     voltage: float
-    temperature: float
     goal: float
     reference: float
     trip: int
+    temperature: float
 
 
 class Crew:
@@ -80,6 +82,7 @@ class Crew:
         self._releases: dict[int, float] = {}
         self._hands: dict[int, float] = {}
         self._warm = "housing_temperature" in sims.signals
+        self._names = _SHOWN + ("housing_temperature",) * self._warm
         self._rows: list[Seen] | None = None
 
     def __len__(self) -> int:
@@ -198,13 +201,11 @@ class Crew:
     def seen(self, servo: int) -> Seen:
         """Return what shows of a servo."""
         if self._rows is None:
-            sims, none = self.sims, np.full(len(self), _COLD)
-            columns = [sims[name] for name in (
-                "output_angle", "output_speed", "duty", "armature_current", "supply_current", "bus_voltage")]
-            warm = sims["housing_temperature"] if self._warm else none
-            rest = [sims[name] for name in ("goal_angle", "reference_angle", "trip")]
-            self._rows = [Seen._make((*row[:-1], int(row[-1]) if row[-1] == row[-1] else 0)) for row in zip(
-                *(column.tolist() for column in (*columns, warm, *rest)), strict=True)]
+            sims = self.sims
+            self._rows = [
+                Seen(angle, speed, *row[:6], int(row[6]) if row[6] == row[6] else 0, row[7] if self._warm else _COLD)
+                for angle, speed, row in zip(sims["output_angle"].tolist(), sims["output_speed"].tolist(),
+                                             sims.shown(self._names).tolist(), strict=True)]
         return self._rows[servo]
 
     def failed(self) -> str | None:

@@ -58,6 +58,7 @@ class Device:
         self.forced = 0  # bits of the status, as a fault
         self._say = say
         self._said = set[str]()
+        self._id_at = family.registers["ID"].address
         self._settings = {name: tuple(one for one in family.settings if name in one.registers and one.name not in _OWN)
                           for name in family.registers}
 
@@ -81,7 +82,7 @@ class Device:
     @property
     def id(self) -> int:
         """Its number on the wire."""
-        return self.table["ID"]
+        return self.table.bytes[self._id_at]
 
     def is_called(self, id: int) -> bool:
         """Return whether it answers to an ID."""

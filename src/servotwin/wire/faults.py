@@ -84,7 +84,6 @@ class Faults:
         self._running: list[Fault] = []
         self._done: set[int] = set()
         self.absent: set[int] = set()
-        self.off: set[int] = set()
         self.echo = self.unplugged = False
         self._undo: dict[int, Any] = {}
 

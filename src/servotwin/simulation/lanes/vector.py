@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
@@ -222,6 +222,20 @@ class VectorSimulator:
             return np.where(self._store.status != 0, math.nan, numbers.commanded(name, self._store.command))
         values = self._store.look()[:, _COLUMNS[name]]
         return np.asarray(AT_MOTOR[name](values, numbers.reduction)) if name in AT_MOTOR else values.copy()
+
+    def shown(self, names: Sequence[str]) -> Array:
+        """Return several signals (SI) of all lanes at their present time, shape (lanes, names): one look for all.
+
+        Raises
+        ------
+        UnknownNameError
+            If one is none that is looked up: what is told, and the motor's own, are not.
+        """
+        unknown = next((name for name in names if name not in _COLUMNS or name not in self._numbers.available), None)
+        if unknown is not None:
+            raise UnknownNameError("signal that is looked up", unknown,
+                                   [name for name in _COLUMNS if name in self._numbers.available])
+        return self._store.look()[:, [_COLUMNS[name] for name in names]]
 
     @property
     def impulse_work(self) -> Array:
