@@ -100,3 +100,20 @@ def test_bad_faults(numbers):
 def test_a_fault_of_nobody():
     with pytest.raises(st.errors.InputError):
         bus_of(Fault("overload", id=7)).advance(0.1)
+
+
+def test_traffic_is_a_log_with_the_truth_beside(tmp_path):
+    bus = bus_of()
+    logs, client = bus.record(tmp_path / "logs"), Client(bus)
+    for k in range(60):
+        bus.ask(feetech(0xFE, 0x82, 56, 15, 1, 2))
+        client.write(1, 42, *word(2048 + 10 * k))
+        bus.advance(0.02)
+    logs.close()
+    with pytest.raises(st.errors.InputError):
+        bus.record(tmp_path / "logs")
+    told, = st.read_logs(tmp_path / "logs" / "1.csv")
+    true, = st.read_logs(tmp_path / "logs" / "truth" / "1.csv")
+    assert len(told.time) == 60
+    assert abs(told.measured["output_angle"] - true.measured["output_angle"]).max() < 1e-3
+    assert told.measured["output_angle"].max() > 0.5

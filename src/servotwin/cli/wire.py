@@ -37,6 +37,9 @@ def wire(
     hand: Annotated[Path | None, typer.Option(
         metavar="FILE.csv", help="What a hand does to limp servos: columns time_s and, by joint or ID, angles in "
         "degrees, such as shoulder_pan_deg; it begins anew at its end.")] = None,
+    record: Annotated[Path | None, typer.Option(
+        metavar="FOLDER", help="Logs of what programs read, a file a servo, and the truth beside; servotwin fit reads "
+        "them.")] = None,
     faults: Annotated[Path | None, typer.Option(
         metavar="FILE.toml", help="What is wrong with the wire: [[fault]] tables with a kind.")] = None,
     lock: Annotated[str, typer.Option(
@@ -60,8 +63,9 @@ def wire(
                   firmware=_version(firmware), faults=read_faults(faults, seed) if faults else None, body=body,
                   seed=seed)
     bus, names = arm_bus(asked, registers=_written)
+    logs = bus.record(record) if record is not None else None
     _serve(bus, names, tcp=_tcp(tcp), link=link, keep=keep, each=hand_of(hand, bus, names) if hand else None,
-           duration=duration, as_json=as_json)
+           duration=duration, as_json=as_json, logs=logs)
 
 
 def _written(servo: Any, words: tuple[str, ...]) -> Any:
@@ -71,7 +75,7 @@ def _written(servo: Any, words: tuple[str, ...]) -> Any:
 
 
 def _serve(bus: Bus, names: dict[int, str], *, tcp: tuple[str, int] | None, link: Path | None, keep: Path | None,
-           each: Any, duration: float | None, as_json: bool) -> None:
+           each: Any, duration: float | None, as_json: bool, logs: Any) -> None:
     import sys
 
     from servotwin.cli import interrupts
@@ -82,12 +86,19 @@ def _serve(bus: Bus, names: dict[int, str], *, tcp: tuple[str, int] | None, link
         sys.stderr.flush()
 
     service = Service(bus, tcp=tcp, link=link, keep=keep, say=say, each=each)
+    def tidy() -> None:
+        service.tidy()
+        if logs is not None:
+            logs.flush()
+
     try:
-        with interrupts.last_words(service.tidy):
+        with interrupts.last_words(tidy):
             _tell(bus, names, service, link, as_json=as_json)
             service.run(duration)
     finally:
         service.stop()
+        if logs is not None:
+            logs.close()
     if service.error is not None:
         raise service.error
 

@@ -6,6 +6,7 @@ import bisect
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from servotwin.errors import InputError, SimulationError
@@ -22,6 +23,7 @@ from servotwin.wire.dynamixel_talk import DynamixelTalk
 from servotwin.wire.faults import Faults
 from servotwin.wire.feetech_talk import BITS, FeetechTalk
 from servotwin.wire.sts import Sts
+from servotwin.wire.traffic import Traffic
 from servotwin.wire.x_servo import X
 
 if TYPE_CHECKING:
@@ -128,6 +130,7 @@ class Bus:
         self._out: list[tuple[float, int, bytes]] = []
         self._number = 0
         self._service: Service | None = None
+        self._traffic: Traffic | None = None
 
     def _devices(self, models: Mapping[int, DigitalServo], lock: str, firmware: tuple[int, ...] | None) -> list[Any]:
         if self.protocol == "feetech":
@@ -166,6 +169,8 @@ class Bus:
         self.counts.bad += bad
         for packet in packets:
             self.counts.packets += 1
+            if self._traffic is not None:
+                self._traffic.heard(packet)
             listening = [one for one in self.devices if self._hears(one)]
             if not listening:
                 continue
@@ -297,6 +302,17 @@ class Bus:
             if str(id) in kept:
                 device.put_stored(kept[str(id)])
         self.power_cycle()
+
+    def record(self, folder: str | Path) -> Traffic:
+        """Write logs of all servos from now on, a row where a program asks for a position, and the truth beside.
+
+        Returns
+        -------
+        Traffic
+            Its `close` ends them.
+        """
+        self._traffic = Traffic(folder, self)
+        return self._traffic
 
     # --- a port of it -------------------------------------------------------------------------------------------------
 
