@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from servotwin.parameters.registers.table import Family, Register, is_read_only
+from servotwin.parameters.registers.register import Register, is_read_only
+from servotwin.parameters.registers.table import Family
 
 
 class ControlTable:

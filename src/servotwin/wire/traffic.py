@@ -99,8 +99,8 @@ class Traffic:
             round(round(seen.speed / COUNT) * count, 6), round(duty, 3),
             round(seen.current / 6.5e-3) * 6.5e-3 if math.isfinite(seen.current) else 0.0, round(seen.voltage, 1),
             round(seen.temperature - 273.15) + 273.15, float(on)))
-        self._truth[id].writerow((self._bus.time, "" if not on else seen.goal, seen.angle, seen.speed, duty, seen.current,
-                                  seen.voltage, seen.temperature))
+        self._truth[id].writerow((self._bus.time, "" if not on else seen.goal, seen.angle, seen.speed, duty,
+                                  seen.current, seen.voltage, seen.temperature))
 
     def close(self) -> None:
         """End the logs."""

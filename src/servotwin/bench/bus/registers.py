@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from servotwin.parameters.registers.dynamixel_one import AX_REGISTERS, MX_REGISTERS
 from servotwin.parameters.registers.dynamixel_x import REGISTERS as X_REGISTERS
 from servotwin.parameters.registers.feetech import REGISTERS as STS_REGISTERS
-from servotwin.parameters.registers.table import Register, laid
+from servotwin.parameters.registers.register import Register, laid
 
 _CHUNK = 32  # bytes of one read of many registers
 

@@ -10,7 +10,8 @@ from servotwin.errors import ParameterError
 from servotwin.parameters.catalog import load_servo
 from servotwin.parameters.registers.dynamixel_x_models import OF_CURRENT, OF_SLOPE, X_MODELS, XModel
 from servotwin.parameters.registers.model import model_for
-from servotwin.parameters.registers.table import Family, Given, Raw, Register, Setting, laid, on, set_registers
+from servotwin.parameters.registers.register import Register, laid
+from servotwin.parameters.registers.table import Family, Given, Raw, Setting, on, set_registers
 from servotwin.parameters.servo import Servo
 
 _COUNT = 2.0 * math.pi / 4096.0  # rad
@@ -95,7 +96,8 @@ REGISTERS: dict[str, Register] = laid(_KNOWN, sizes={2: _WORDS, 4: _LONG}, signs
 
 _SERVED = frozenset({
     "ID", "Baud_Rate", "Return_Delay_Time", "Status_Return_Level", "Homing_Offset", "Moving_Threshold", "Drive_Mode",
-    "Velocity_Limit", "Current_Limit", "Torque_Enable", "Goal_Position", "Feedforward_1st_Gain", "Feedforward_2nd_Gain"})
+    "Velocity_Limit", "Current_Limit", "Torque_Enable", "Goal_Position", "Feedforward_1st_Gain",
+    "Feedforward_2nd_Gain"})
 
 
 def dynamixel_x(registers: Given, *, servo: str | Path | Servo) -> Servo:

@@ -10,8 +10,9 @@ from servotwin.errors import ParameterError
 from servotwin.parameters.catalog import load_servo
 from servotwin.parameters.registers.feetech_models import STS_MODELS, StsModel
 from servotwin.parameters.registers.model import model_for
+from servotwin.parameters.registers.register import Register, laid
 from servotwin.parameters.registers.sets import LEROBOT_SETS
-from servotwin.parameters.registers.table import Family, Given, Raw, Register, Setting, laid, on, set_registers
+from servotwin.parameters.registers.table import Family, Given, Raw, Setting, on, set_registers
 from servotwin.parameters.servo import Servo
 
 _COUNT = 2.0 * math.pi / 4096.0  # rad
