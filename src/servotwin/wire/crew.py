@@ -203,7 +203,8 @@ class Crew:
         if self._rows is None:
             sims = self.sims
             self._rows = [
-                Seen(angle, speed, *row[:6], int(row[6]) if row[6] == row[6] else 0, row[7] if self._warm else _COLD)
+                Seen._make((angle, speed, *row[:6], int(row[6]) if row[6] == row[6] else 0,
+                            row[7] if self._warm else _COLD))
                 for angle, speed, row in zip(sims["output_angle"].tolist(), sims["output_speed"].tolist(),
                                              sims.shown(self._names).tolist(), strict=True)]
         return self._rows[servo]
