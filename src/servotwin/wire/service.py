@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import select
+import socket
 import threading
 import time
 from collections import deque
@@ -88,7 +88,7 @@ class Service:
         bus.seen(bus.ids[0])
         self._port: PtyPort | TcpPort = PtyPort() if tcp is None else TcpPort(*tcp)
         self.port = self._port.name
-        self._wake, self._waker = os.pipe()
+        self._wake, self._waker = socket.socketpair()  # which Windows can wait for too
         self._thread: threading.Thread | None = None
         self._ended = False
         self._asked: float | None = None
@@ -98,7 +98,7 @@ class Service:
             try:
                 self._link.make(self.port)
             except BaseException:
-                self._port.close()
+                self._close()
                 raise
             self.link = str(self._link.path)
 
@@ -115,7 +115,8 @@ class Service:
     def end(self) -> None:
         """Let `run` come to its end."""
         self._ended = True
-        os.write(self._waker, b".")
+        with contextlib.suppress(OSError):  # it is over already
+            self._waker.send(b".")
 
     def stop(self) -> None:
         """End, and take the link away."""
@@ -123,10 +124,11 @@ class Service:
         if self._thread is not None:
             self._thread.join()
         self.tidy()
-        self._port.close()
-        for one in (self._wake, self._waker):
-            with contextlib.suppress(OSError):
-                os.close(one)
+        self._close()
+
+    def _close(self) -> None:
+        for one in (self._port, self._wake, self._waker):
+            one.close()
 
     def tidy(self) -> None:
         """Keep what is stored, and take the link away: all that outlives the process."""
