@@ -7,6 +7,8 @@ from collections.abc import Iterable, Mapping
 from servotwin.parameters.registers.register import Register, is_read_only
 from servotwin.parameters.registers.table import Family
 
+_MANY = 8  # bytes of a write: what more have touched is looked up each time
+
 
 class ControlTable:
     """Registers as bytes, what is stored beside what is there now.
@@ -33,16 +35,21 @@ class ControlTable:
                 self.named[place] = (*self.named[place], name)
                 self.read_only[place] |= is_read_only(name, one)
                 self.eeprom[place] |= one.stored
+        self._touched: dict[tuple[int, int], tuple[str, ...]] = {}
         for name, value in values.items():
             self[name] = value
         self.stored = bytearray(self.bytes)
 
     def __getitem__(self, name: str) -> int:
         """Return what a register holds."""
-        one = self.registers[name]
+        one, memory = self.registers[name], self.bytes
+        at = one.address
         if one.size == 1:
-            return self.bytes[one.address]
-        return one.decode(self.bytes[one.address:one.address + one.size])
+            return memory[at]
+        if one.size == 2 and not one.signed:  # what a goal in every cycle asks for
+            raw, sign = memory[at] | memory[at + 1] << 8, one.sign_bit
+            return raw if sign is None or not raw >> sign & 1 else -(raw & ((1 << sign) - 1))
+        return one.decode(memory[at:at + one.size])
 
     def __setitem__(self, name: str, value: int) -> None:
         """Put a value into a register; what does not fit is held at the nearest that does."""
@@ -62,11 +69,13 @@ class ControlTable:
 
     def touched(self, address: int, count: int) -> tuple[str, ...]:
         """Return the registers that have one of some bytes, each once."""
-        found: dict[str, None] = {}
-        for names in self.named[address:address + count]:
-            for name in names:
-                found[name] = None
-        return tuple(found)
+        found = self._touched.get((address, count))
+        if found is None:
+            names = (name for some in self.named[address:address + count] for name in some)
+            found = tuple(dict.fromkeys(names))
+            if count <= _MANY:
+                self._touched[address, count] = found
+        return found
 
     def values(self) -> dict[str, int]:
         """Return what all registers hold."""
