@@ -41,7 +41,7 @@ def wire(
         metavar="FOLDER", help="Logs of what programs read, a file a servo, and the truth beside; servotwin fit reads "
         "them.")] = None,
     faults: Annotated[Path | None, typer.Option(
-        metavar="FILE.toml", help="What is wrong with the wire: [[fault]] tables with a kind.")] = None,
+        metavar="FILE.toml", help="What is wrong with the wire: a table named fault, with a kind, for each.")] = None,
     lock: Annotated[str, typer.Option(
         metavar="HOW", help="A write to the EEPROM while Lock is 1: keep (until power-off), or drop.")] = "keep",
     firmware: Annotated[str | None, typer.Option(
