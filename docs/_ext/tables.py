@@ -17,7 +17,7 @@ from servotwin.models import MODELS
 from servotwin.models.outputs import SIGNALS
 from servotwin.parameters import GROUPS, catalog_names, load_servo
 from servotwin.parameters.plausible import AT_OUTPUT, plausible_range
-from servotwin.parameters.registers.listing import listed_models, rows_of
+from servotwin.parameters.registers.listing import listed_model, listed_models, rows_of, wire_rows
 from servotwin.units import DIMENSIONS, si_unit
 
 _GREEK = ("alpha", "beta", "tau")
@@ -233,6 +233,17 @@ def registers() -> str:
         parts.append(f"### {model.name}\n\n{model.family}, model number {model.number}; {model.assumed} of "
                      f"{model.rows} assumed.\n\n{head}")
     return "\n\n".join(parts)
+def wire_registers(*names: str) -> str:
+    """Return the registers of models as they lie in the memory, and what a write to each does."""
+    parts = []
+    for name in names or ("STS3215-12V", "XL330-M288", "XL430-W250"):
+        rows = [(str(row.address), str(row.size), f"`{row.name}`", row.sign, row.memory, row.value, row.range, row.unit,
+                 row.source, row.does) for row in wire_rows(listed_model(name))]
+        head = ("address", "bytes", "register", "sign", "memory", "new", "range", "unit", "printed in", "a write")
+        parts.append(f"### {name}\n\n{markdown(head, rows)}")
+    return "\n\n".join(parts)
+
+
 def recipes() -> str:
     """Servos beside their recipes for MuJoCo's actuators."""
     from recipe_table import HEAD
@@ -249,7 +260,7 @@ def _is_own(module, name: str) -> bool:
 TABLES = {"parameters": parameters, "models": models, "model-list": model_list, "signals": signals,
           "units": units, "catalog": catalog, "log-formats": log_formats,
           "bam-actuators": bam_actuators, "top-level": top_level, "api": api,
-          "register-models": register_models, "registers": registers,
+          "register-models": register_models, "registers": registers, "wire-registers": wire_registers,
           "protocol-messages": protocol_messages, "protocol-fields": protocol_fields,
           "protocol-numbers": protocol_numbers, "protocol-words": protocol_words, "recipes": recipes}
 

@@ -16,6 +16,7 @@ from servotwin import signals as signals
 from servotwin import simulation as simulation
 from servotwin import studies as studies
 from servotwin import units as units
+from servotwin import wire as wire
 from servotwin.datasheet import DataSheet as DataSheet
 from servotwin.datasheet import curves as curves
 from servotwin.datasheet import servos_that_lift as servos_that_lift

@@ -17,9 +17,10 @@ ROOT = Path(__file__).parents[2]
 WIDE, WIDTHS = 200, (60, 80, 120)
 NUMBER = re.compile(r"(?<![\w.])[+-]?\d[\d.]*(?:[eE][+-]?\d+)?")
 # Commands of the guide that need a board, a browser, minutes or files that no guide makes
-LEFT_OUT = ("servotwin paper", "servotwin web", "servotwin bench", "servotwin robot", "servotwin fit ",
-            "servotwin validate", "servotwin catalog check my-servo", "servotwin catalog from-sheet --csv",
-            "servotwin catalog which --robot", "servotwin catalog which --motion", "servotwin simulate my-servo",
+LEFT_OUT = ("servotwin paper", "servotwin web", "servotwin wire", "servotwin bench", "servotwin robot",
+            "servotwin fit ", "servotwin validate", "servotwin catalog check my-servo",
+            "servotwin catalog from-sheet --csv", "servotwin catalog which --robot",
+            "servotwin catalog which --motion", "servotwin simulate my-servo",
             "servotwin linear hitec-hs-755hb --load inertia=1e-3 --frame", "servotwin log ",
             "servotwin doctor my-servo", "servotwin doctor hitec")
 FIRST = "servotwin catalog which --lift 0.5kg --arm 10cm --voltage 5 --time 0.3"

@@ -42,7 +42,7 @@ def test_programs_in_c(page, tmp_path):
                         "c", "-"], input=text, text=True, check=True)
 
 
-SERVES = "$ servotwin web"  # until it is interrupted: tests/web run it
+SERVES = ("$ servotwin web", "$ servotwin wire")  # until they are interrupted: tests/web and tests/wire run them
 
 
 def commands():

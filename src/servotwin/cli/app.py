@@ -23,6 +23,7 @@ from servotwin.cli.sweep import sweep
 from servotwin.cli.terminal import emit, emit_help
 from servotwin.cli.validate import validate
 from servotwin.cli.web import web
+from servotwin.cli.wire import wire
 
 app = typer.Typer(
     name="servotwin", add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich",
@@ -82,6 +83,10 @@ app.command("web", help="Open the bench in a browser: turn a servo, and watch it
             epilog="Example: servotwin web hitec-hs-755hb\n\n"
                    "Example: servotwin web --lesson deadband\n\n"
                    "Example: servotwin web --host 0.0.0.0 --class")(web)
+app.command("wire", help="Serve servos that are not there at a serial port, where programs for real ones find them.",
+            epilog="Example: servotwin wire so101 --link /tmp/so101 --keep so101.json\n\n"
+                   "Example: servotwin wire --servo 1=feetech-sts3215-12v --servo 2=feetech-sts3250 --tcp 5000\n\n"
+                   "Example: servotwin wire koch --link /tmp/koch --faults faults.toml")(wire)
 app.add_typer(catalog, name="catalog")
 app.add_typer(robot, name="robot")
 app.add_typer(bench, name="bench")

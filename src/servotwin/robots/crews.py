@@ -138,6 +138,11 @@ class Berth:
                   "seen": self.entry.seen.ctypes.data, "pieces": self._pieces.ctypes.data, "count": len(self.pieces)}
         self.words[:] = [values[name] for name in GROUP]
 
+    def refresh(self) -> None:
+        """Find the memories where they are after numbers of the servos have changed."""
+        self.pieces = self.entry.memory()
+        self._pieces[:] = self.pieces
+
     @property
     def size(self) -> int:
         """Words that the memories of the crew take."""
@@ -232,6 +237,10 @@ class Instance:
         """Return the words of what servos remember that rest at these angles [rad] under these commands."""
         self.room[ROOM.index("angle")], self.room[ROOM.index("goal")] = angle, goal
         self.reset()
+        return self.remembered()
+
+    def remembered(self) -> NDArray[np.int64]:
+        """Return the words of what servos remember now."""
         found = []
         for piece in (piece for berth in self.berths for piece in berth.pieces):
             for row in range(piece.rows):

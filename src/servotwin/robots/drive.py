@@ -26,6 +26,7 @@ from servotwin.robots.solver import TOO_FEW, set_iterations
 from servotwin.robots.state import DriveState
 from servotwin.robots.told import told
 from servotwin.robots.wiring import arrays_of, check_options, maps_of, put_into_model, words_of
+from servotwin.simulation import VectorSimulator
 from servotwin.simulation.compile.calls import joint_addresses
 from servotwin.simulation.compile.joints_layout import BLOCK, FAILED, FOREIGN, INSTANCE, MESSAGES, RECORD, WELL
 from servotwin.simulation.status import Status
@@ -330,6 +331,25 @@ class ServoDrive:
             if name in (*berth.sims.signals, "time"):
                 found[berth.crew.which] = berth.sims[name]
         return found
+
+    def simulators(self, data: Any) -> tuple[VectorSimulator, ...]:
+        """Return the simulators of the servos in some data, one for each crew: their lanes are in `crew_joints`.
+
+        Torque and numbers may be set in them between steps; `changed` has to follow.
+        """
+        return tuple(berth.sims for berth in self._of(data).berths)
+
+    def crew_joints(self, data: Any) -> tuple[tuple[str, ...], ...]:
+        """Return the joints of the lanes of each of `simulators`."""
+        return tuple(tuple(self.joints[k] for k in berth.crew.which.tolist()) for berth in self._of(data).berths)
+
+    def changed(self, data: Any) -> None:
+        """Take up what was set in `simulators` since the last step; without it a step may go on from before."""
+        instance, block = self._of(data), self._block(data)
+        for berth in instance.berths:
+            berth.refresh()
+        first = self._harbour.head + instance.size * (1 - int(block[BLOCK.index("half")]))
+        block[first:first + instance.size] = instance.remembered().view(np.float64)
 
     def reset(self, data: Any) -> None:
         """Let the servos begin anew at the next step, at rest where their joints are then, as if time had gone back.

@@ -10,7 +10,8 @@ from servotwin.errors import ParameterError
 from servotwin.parameters.catalog import load_servo
 from servotwin.parameters.registers.dynamixel_one_models import AX_MODELS, MX_MODELS, OneModel
 from servotwin.parameters.registers.model import model_for
-from servotwin.parameters.registers.table import Family, Given, Raw, Register, Setting, on, set_registers
+from servotwin.parameters.registers.register import Register
+from servotwin.parameters.registers.table import Family, Given, Raw, Setting, on, set_registers
 from servotwin.parameters.servo import Servo
 
 _TICK = 1e-3  # s

@@ -10,7 +10,8 @@ from servotwin.errors import ParameterError
 from servotwin.parameters.catalog import load_servo
 from servotwin.parameters.registers.dynamixel_x_models import OF_CURRENT, OF_SLOPE, X_MODELS, XModel
 from servotwin.parameters.registers.model import model_for
-from servotwin.parameters.registers.table import Family, Given, Raw, Register, Setting, on, set_registers
+from servotwin.parameters.registers.register import Register, laid
+from servotwin.parameters.registers.table import Family, Given, Raw, Setting, on, set_registers
 from servotwin.parameters.servo import Servo
 
 _COUNT = 2.0 * math.pi / 4096.0  # rad
@@ -30,7 +31,7 @@ _FEEDBACK = tuple((name, address) for name, address in (
     ("Present_Current", 126), ("Present_Load", 126), ("Present_Velocity", 128), ("Present_Position", 132),
     ("Velocity_Trajectory", 136), ("Position_Trajectory", 140), ("Present_Input_Voltage", 144),
     ("Present_Temperature", 146), ("Backup_Ready", 147)))
-REGISTERS: dict[str, Register] = {
+_KNOWN: dict[str, Register] = {
     "Position_P_Gain": Register(84, 1, 16383, 800, why="without P the servo does not control its angle"),
     "Position_I_Gain": Register(82, 0, 16383, 0),
     "Position_D_Gain": Register(80, 0, 16383, 0),
@@ -73,6 +74,30 @@ REGISTERS: dict[str, Register] = {
     "Velocity_P_Gain": Register(78, 0, 16383, 100),
     **{name: Register(address, -2**31, 2**31 - 1, 0, reading=True) for name, address in _FEEDBACK},
 }
+_WORDS = (
+    "Model_Number PWM_Limit Current_Limit Velocity_I_Gain Velocity_P_Gain Position_D_Gain Position_I_Gain "
+    "Position_P_Gain Feedforward_2nd_Gain Feedforward_1st_Gain Goal_PWM Goal_Current Realtime_Tick Present_PWM "
+    "Present_Current Present_Load Present_Input_Voltage Max_Voltage_Limit Min_Voltage_Limit")
+_LONG = (
+    "Model_Information Homing_Offset Moving_Threshold Acceleration_Limit Velocity_Limit Max_Position_Limit "
+    "Min_Position_Limit Goal_Velocity Profile_Acceleration Profile_Velocity Goal_Position Present_Velocity "
+    "Present_Position Velocity_Trajectory Position_Trajectory")
+REGISTERS: dict[str, Register] = laid(_KNOWN, sizes={2: _WORDS, 4: _LONG}, signs=dict.fromkeys((
+    "Homing_Offset", "Goal_PWM", "Goal_Current", "Goal_Velocity", "Goal_Position", "Present_PWM", "Present_Current",
+    "Present_Load", "Present_Velocity", "Present_Position", "Velocity_Trajectory", "Position_Trajectory")),
+    stored=(range(64),), units={
+    "count": "Homing_Offset Max_Position_Limit Min_Position_Limit Goal_Position Present_Position Position_Trajectory",
+    "0.1 V": "Max_Voltage_Limit Min_Voltage_Limit Present_Input_Voltage", "°C": "Temperature_Limit Present_Temperature",
+    "1/885": "PWM_Limit Goal_PWM Present_PWM", "20 ms": "Bus_Watchdog", "2 µs": "Return_Delay_Time",
+    "0.229 rpm": "Moving_Threshold Velocity_Limit Goal_Velocity Profile_Velocity Present_Velocity Velocity_Trajectory",
+    "214.577 rev/min²": "Acceleration_Limit Profile_Acceleration", "ms": "Realtime_Tick", "0.1 %": "Present_Load"})
+"""By the e-manual's names with underscores; 0 to 63 outlive power-off."""
+
+
+_SERVED = frozenset({
+    "ID", "Baud_Rate", "Return_Delay_Time", "Status_Return_Level", "Homing_Offset", "Moving_Threshold", "Drive_Mode",
+    "Velocity_Limit", "Current_Limit", "Torque_Enable", "Goal_Position", "Feedforward_1st_Gain",
+    "Feedforward_2nd_Gain"})
 
 
 def dynamixel_x(registers: Given, *, servo: str | Path | Servo) -> Servo:
@@ -125,7 +150,7 @@ def x_family(model: XModel) -> Family:
         assumed=model.unseen(REGISTERS), masks=("Shutdown",), settings=settings,
         other_names={"Secondary_Shadow_ID": "Secondary_ID"},
         copied={"Goal_PWM": "PWM_Limit", **({"Goal_Current": "Current_Limit"} if model.current_unit else {})},
-        check=lambda raw: _check(model, raw))
+        check=lambda raw: _check(model, raw), served=_SERVED, idle=frozenset({"Bus_Watchdog"}), refuses=True)
 
 
 def _check(model: XModel, raw: Raw) -> None:

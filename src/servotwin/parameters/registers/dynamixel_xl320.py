@@ -11,7 +11,8 @@ from pathlib import Path
 from servotwin.parameters.catalog import load_servo
 from servotwin.parameters.registers.dynamixel_one import check_limits, shared_settings
 from servotwin.parameters.registers.model import RegisterModel
-from servotwin.parameters.registers.table import Family, Given, Register, Setting, set_registers
+from servotwin.parameters.registers.register import Register
+from servotwin.parameters.registers.table import Family, Given, Setting, set_registers
 from servotwin.parameters.servo import Servo
 
 _RPM, _DEG = math.pi / 30.0, math.pi / 180.0

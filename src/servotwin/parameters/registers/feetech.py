@@ -10,8 +10,9 @@ from servotwin.errors import ParameterError
 from servotwin.parameters.catalog import load_servo
 from servotwin.parameters.registers.feetech_models import STS_MODELS, StsModel
 from servotwin.parameters.registers.model import model_for
+from servotwin.parameters.registers.register import Register, laid
 from servotwin.parameters.registers.sets import LEROBOT_SETS
-from servotwin.parameters.registers.table import Family, Given, Raw, Register, Setting, on, set_registers
+from servotwin.parameters.registers.table import Family, Given, Raw, Setting, on, set_registers
 from servotwin.parameters.servo import Servo
 
 _COUNT = 2.0 * math.pi / 4096.0  # rad
@@ -26,7 +27,7 @@ _FEEDBACK = tuple((name, address) for name, address in (
     ("Firmware_Major_Version", 0), ("Firmware_Minor_Version", 1), ("Model_Number", 3), ("Goal_Position", 42),
     ("Present_Position", 56), ("Present_Velocity", 58), ("Present_Load", 60), ("Present_Voltage", 62),
     ("Present_Temperature", 63), ("Status", 65), ("Moving", 66), ("Present_Current", 69), ("Goal_Position_2", 71)))
-REGISTERS: dict[str, Register] = {
+_KNOWN: dict[str, Register] = {
     "P_Coefficient": Register(21, 1, 254, 32, why="without P the servo does not control its angle"),
     "D_Coefficient": Register(22, 0, 254, 32),
     "I_Coefficient": Register(23, 0, 254, 0),
@@ -71,8 +72,31 @@ REGISTERS: dict[str, Register] = {
     "Goal_Time": Register(44, 0, 1000, 0),
     "Lock": Register(55, 0, 1, 0),
     "Velocity_Unit_factor": Register(82, 0, 254, 1),
-    **{name: Register(address, -65535, 65535, 0, reading=True) for name, address in _FEEDBACK},
+    **{name: Register(address, -32767, 65535, 0, reading=True) for name, address in _FEEDBACK},
 }
+# Bytes and signs: LeRobot's control and encoding tables, Feetech's SMS_STS library (signs of load and current)
+REGISTERS: dict[str, Register] = laid(_KNOWN, sizes={2: (
+    "Model_Number Min_Position_Limit Max_Position_Limit Max_Torque_Limit Protection_Current Homing_Offset "
+    "Goal_Position Goal_Time Goal_Velocity Torque_Limit Present_Position Present_Velocity Present_Load "
+    "Present_Current Goal_Position_2")}, signs={
+    "Homing_Offset": 11, "Goal_Position": 15, "Goal_Time": 10, "Goal_Velocity": 15, "Present_Position": 15,
+    "Present_Velocity": 15, "Present_Load": 10, "Present_Current": 15, "Goal_Position_2": 15},
+    stored=(range(40), range(78, 87)), units={
+    "count": "Min_Position_Limit Max_Position_Limit CW_Dead_Zone CCW_Dead_Zone Homing_Offset Goal_Position "
+             "Present_Position Moving_Velocity_Threshold",
+    "0.1 V": "Max_Voltage_Limit Min_Voltage_Limit Present_Voltage", "°C": "Max_Temperature_Limit Present_Temperature",
+    "0.1 %": "Max_Torque_Limit Torque_Limit Minimum_Startup_Force Present_Load Goal_Time",
+    "6.5 mA": "Protection_Current Present_Current", "%": "Protective_Torque Overload_Torque",
+    "10 ms": "Protection_Time Over_Current_Protection_Time", "2 µs": "Return_Delay_Time", "ms": "DTs",
+    "count/s": "Goal_Velocity Present_Velocity Goal_Position_2",
+    "50 count/s": "Minimum_Velocity_Limit Maximum_Velocity_Limit",
+    "100 count/s²": "Acceleration Maximum_Acceleration", "0.4 %": "Integral_Limit"})
+"""By LeRobot's names; 0 to 39 and 78 to 86 outlive power-off."""
+
+
+_SERVED = frozenset({
+    "ID", "Baud_Rate", "Return_Delay_Time", "Response_Status_Level", "Max_Voltage_Limit", "Max_Torque_Limit",
+    "Homing_Offset", "Torque_Enable", "Goal_Position", "Lock", "Angular_Resolution"})
 
 
 def feetech_sts(registers: Given, *, servo: str | Path | Servo) -> Servo:
@@ -126,7 +150,8 @@ def sts_family(model: StsModel) -> Family:
         assumed=model.unseen(REGISTERS), elsewhere=model.elsewhere, masks=(_MASK,), sets=LEROBOT_SETS,
         settings=(*_CONTROL, *_profile(model), *_trips(model)),
         other_names={"Hts": "Minimum_Velocity_Limit", "Moving_Velocity": "Moving_Velocity_Threshold"},
-        copied={"Torque_Limit": "Max_Torque_Limit"}, pairs=(("CW_Dead_Zone", "CCW_Dead_Zone"),), check=_check)
+        copied={"Torque_Limit": "Max_Torque_Limit"}, pairs=(("CW_Dead_Zone", "CCW_Dead_Zone"),), check=_check,
+        served=_SERVED)
 
 
 def _check(raw: Raw) -> None:

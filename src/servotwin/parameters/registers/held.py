@@ -9,7 +9,8 @@ from servotwin.parameters.registers.dynamixel_one import ax_family_of, mx_family
 from servotwin.parameters.registers.dynamixel_x import family_of as family_of_x
 from servotwin.parameters.registers.dynamixel_xl320 import family_of as family_of_xl320
 from servotwin.parameters.registers.feetech import family_of as family_of_sts
-from servotwin.parameters.registers.table import Family, Register, family_label, written
+from servotwin.parameters.registers.register import Register
+from servotwin.parameters.registers.table import Family, family_label, written
 from servotwin.parameters.servo import Servo
 
 _FAMILIES: dict[str, Callable[[Servo], Family]] = {

@@ -123,6 +123,59 @@ def rows_of(model: ListedModel) -> list[Row]:
     return rows
 
 
+class WireRow(NamedTuple):
+    """A register of a model as it lies in the memory.
+
+    Parameters
+    ----------
+    address, size : int
+        Size in bytes.
+    name : str
+    sign : str
+        "", "bit 15" that says minus, or "two's complement".
+    memory : str
+        "EEPROM" or "RAM".
+    value : str
+        When the servo is new, or after power-up; empty of what it writes itself.
+    range : str
+    unit : str
+    source : str
+        Document that prints the value, or "assumed".
+    does : str
+        What a write does on a wire.
+    """
+
+    address: int
+    size: int
+    name: str
+    sign: str
+    memory: str
+    value: str
+    range: str
+    unit: str
+    source: str
+    does: str
+
+
+def wire_rows(model: ListedModel) -> list[WireRow]:
+    """Return all registers of a model, those that it writes itself too, by address.
+
+    Examples
+    --------
+    >>> row = next(row for row in wire_rows(listed_model("STS3215-12V")) if row.name == "Homing_Offset")
+    >>> row.address, row.size, row.sign, row.memory, row.does
+    (31, 2, 'bit 11', 'EEPROM', 'acts')
+    """
+    family, found = model.table, []
+    for name, one in sorted(family.registers.items(), key=lambda item: item[1].address):
+        sign = "" if one.sign_bit is None else f"bit {one.sign_bit}"
+        found.append(WireRow(
+            one.address, one.size, name, "two's complement" if one.signed else sign, "EEPROM" if one.stored else "RAM",
+            "" if one.reading else str(one.factory), "" if one.reading else f"{one.lower} to {one.upper}", one.unit,
+            "" if one.reading else family.document(name) or "assumed", family.does(name)))
+    return found
+
+
 def _models() -> Iterator[ListedModel]:
     for name, (make, models) in _FAMILIES.items():
         for model in models:

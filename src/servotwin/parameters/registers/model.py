@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
-from servotwin.parameters.registers.table import Register
+from servotwin.parameters.registers.register import Register
 from servotwin.parameters.servo import Servo
 
 

@@ -15,6 +15,7 @@ from servotwin.parameters.catalog import load_servo
 from servotwin.parameters.firmware import Firmware
 from servotwin.parameters.group import FRACTION
 from servotwin.parameters.quantity import Quantity
+from servotwin.parameters.registers.register import Register, is_read_only
 from servotwin.parameters.servo import Servo, unit_of
 from servotwin.units import is_finite
 
@@ -23,44 +24,6 @@ Value = float | str | None
 _AS_WRITTEN = re.compile(r"(\w+) \((\d+)\) = (-?\d+)( assumed)?")  # in sources: P_Coefficient (21) = 32
 _GUESS = "assumed"
 _UNSURE = (0.5, 2.0)  # ends of the range over what an assumed register makes
-
-
-@dataclass(frozen=True)
-class Register:
-    """A register: where it stands, and what may be written into it.
-
-    Parameters
-    ----------
-    address : int
-    lower, upper : int
-        Range of the raw value.
-    factory : int
-        What it holds when the servo is new, or after power-up.
-    only : tuple of int
-        The values that are computed, where they are not all of the range; empty: all.
-    why : str
-        What to say of the others.
-    reading : bool
-        Whether the servo writes it, as what it measured or was told last: a new one holds nothing to speak of.
-    """
-
-    address: int
-    lower: int
-    upper: int
-    factory: int
-    only: tuple[int, ...] = ()
-    why: str = ""
-    reading: bool = False
-
-    def allows(self, value: int) -> bool:
-        """Return whether a raw value is in its range, and computed."""
-        return value in self.only if self.only else self.lower <= value <= self.upper
-
-    @property
-    def allowed(self) -> str:
-        """What may be written, in words."""
-        values = " or ".join(str(value) for value in self.only) or f"a whole number from {self.lower} to {self.upper}"
-        return f"{values}; {self.why}" if self.why else values
 
 
 @dataclass(frozen=True)
@@ -124,6 +87,12 @@ class Family:
         Registers for the two ways of turning, of which the larger value counts.
     check : callable
         Raises ParameterError where raw values do not go together.
+    served : frozenset of str
+        Registers that act on a wire, or on power-up, though no number of the firmware follows from them.
+    idle : frozenset of str
+        Registers of which a wire only keeps what is written, though a number follows from them.
+    refuses : bool
+        Whether a servo refuses values that are not computed; else it keeps them.
     """
 
     label: str
@@ -139,6 +108,29 @@ class Family:
     copied: Mapping[str, str] = field(default_factory=dict)
     pairs: tuple[tuple[str, str], ...] = ()
     check: Callable[[Raw], None] = lambda raw: None
+    served: frozenset[str] = frozenset()
+    idle: frozenset[str] = frozenset()
+    refuses: bool = False
+
+    def does(self, name: str) -> str:
+        """Return what a write to a register does on a wire: acts, kept, read only; and what becomes of other values.
+
+        Examples
+        --------
+        >>> from servotwin.parameters.registers.feetech import family_of
+        >>> family = family_of(load_servo("feetech-sts3215-12v"))
+        >>> [family.does(name) for name in ("P_Coefficient", "Goal_Time", "Present_Load")]
+        ['acts', 'kept', 'read only']
+        """
+        one = self.registers[name]
+        if is_read_only(name, one):
+            return "read only"
+        acts = name not in self.idle and (name in self.served or any(name in each.registers for each in self.settings))
+        if not acts:
+            return "kept"
+        if not one.only:
+            return "acts"
+        return f"acts; others than {', '.join(map(str, one.only))} {'refused' if self.refuses else 'kept'}"
 
     def document(self, name: str) -> str:
         """Return where the factory value of a register is printed; empty where it is assumed."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, LoadError
+from servotwin.models.base import Model
 from servotwin.models.engine.batch.tiles import Lanes
 from servotwin.models.engine.cosim.cosim_calls import INERTIA, SLACK, VOLTAGE
 from servotwin.models.engine.memory import Memories, put_started
@@ -34,6 +36,12 @@ from servotwin.simulation.lanes.translator import Translator
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+TUNED = frozenset(f"firmware.{name}" for name in (
+    "proportional_gain", "integral_gain", "derivative_gain", "derivative_ticks", "derivative_threshold",
+    "integral_limit", "rest_travel", "deadband_angle", "minimum_duty", "torque_limit", "duty_limit", "duty_slew",
+    "current_limit", "speed_limit", "acceleration_limit", "minimum_speed", "overload_duty", "overload_time",
+    "overload_output", "stall_travel", "trip_current", "trip_time", "trip_temperature", "undervoltage"))
+"""Numbers of a program that its ticks read, and nothing else."""
 
 
 class Imposed(NamedTuple):
@@ -90,6 +98,7 @@ class LaneNumbers:
         for k in np.concatenate([*supplies.lanes, np.zeros(0, np.int64)]).tolist():
             check_rigid(f"lane {k} on a bus", Elastic(*(x[0] for x in self.now(Elastic, np.array([k])))))
         self.given = self.columns.numbers.copy()
+        self._models: dict[int, Model] = {}  # of lanes that were retuned
         if imposed is not None:
             hung, fed = (np.flatnonzero(~np.isnan(values)) for values in imposed)
             if len(hung):
@@ -151,6 +160,40 @@ class LaneNumbers:
         has, given = asked({INERTIA: J_L, VOLTAGE: V}, which, self.count)
         return bool(kernels(TICKS).change(has, given, which, self.given, self.load_total, self.V_oc, self.pulsed,
                                           *self.imposed, self.columns.numbers))
+
+    def retuned(self, which: Indices, parameters: Mapping[str, Any]) -> bool:
+        """Take other numbers of programs in place, where nothing else follows from them; return whether that was all.
+
+        So it is with lanes on shared supplies, whose kernels read them at every tick: a few microseconds, and motions
+        go on, where `changed` lays all lanes out anew.
+
+        Raises
+        ------
+        InputError
+            Or one of its kinds, if a value is not possible; then nothing has changed.
+        """
+        if not self.digital or not TUNED.issuperset(parameters) or np.any(self.supplies.bus_of[which] < 0):
+            return False
+        numbers, values = dict(self.inputs.numbers), dict[str, Array]()
+        for name, value in parameters.items():
+            if isinstance(value, str) or (name not in numbers and self.inputs.model.servo.get(name) is None):
+                return False
+            given = np.asarray(value)
+            if given.dtype.kind not in "iuf" or given.shape not in ((), which.shape):
+                return False
+            values[name] = np.broadcast_to(given.astype(np.float64), which.shape)
+            numbers[name] = numbers[name].copy() if name in numbers else np.full(self.count, self._shared(name))
+            numbers[name][which] = values[name]
+        models = dict[int, Any]()
+        for k, lane in enumerate(which.tolist()):
+            model: Any = self._models.get(lane) or self.inputs.lane_model(lane)
+            own = {name: float(column[k]) for name, column in values.items()}
+            models[lane] = type(model)(model.servo.replace(own))
+        self._models |= models
+        for lane, model in models.items():
+            self.columns.firmware[lane] = tuple(np.float64(x) for x in model.firmware(None))
+        self.inputs = replace(self.inputs, numbers=numbers)
+        return True
 
     def changed(self, which: Indices, parameters: Mapping[str, Any]) -> LaneNumbers:
         """Return these lanes with other parameters in some of them.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
@@ -223,6 +223,20 @@ class VectorSimulator:
         values = self._store.look()[:, _COLUMNS[name]]
         return np.asarray(AT_MOTOR[name](values, numbers.reduction)) if name in AT_MOTOR else values.copy()
 
+    def shown(self, names: Sequence[str]) -> Array:
+        """Return several signals (SI) of all lanes at their present time, shape (lanes, names): one look for all.
+
+        Raises
+        ------
+        UnknownNameError
+            If one is none that is looked up: what is told, and the motor's own, are not.
+        """
+        unknown = next((name for name in names if name not in _COLUMNS or name not in self._numbers.available), None)
+        if unknown is not None:
+            raise UnknownNameError("signal that is looked up", unknown,
+                                   [name for name in _COLUMNS if name in self._numbers.available])
+        return self._store.look()[:, [_COLUMNS[name] for name in names]]
+
     @property
     def impulse_work(self) -> Array:
         """Kinetic energy that speeds which were set have given to each lane since its reset [J], shape (lanes,)."""
@@ -270,13 +284,14 @@ class VectorSimulator:
                          "nothing: what all on its bus draw decides it")
         if angle is not None:
             self._numbers.check_angles(angle, which)
-        if parameters:
-            self._store.renew(self._numbers.changed(which, parameters), which)
+        anew = bool(parameters) and not self._numbers.retuned(which, parameters or {})
+        if anew:
+            self._store.renew(self._numbers.changed(which, parameters or {}), which)
         otherwise = False
         if inertia is not None or bus is not None:
             otherwise = self._numbers.impose(which, inertia, bus)
             self._store.refit(which, otherwise)
-        if self._entry is not None and (parameters or otherwise):
+        if self._entry is not None and (anew or otherwise):
             self._entry.refresh()
         if angle is not None or speed is not None:
             self._store.impose(which, angle, speed)

@@ -1,0 +1,161 @@
+"""Arms that are on a wire: which servo has which ID, and at which joint."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from servotwin.errors import InputError, UnknownNameError
+from servotwin.parameters import Servo, load_servo
+from servotwin.parameters.groups import Supply
+from servotwin.wire.bus import Bus
+from servotwin.wire.faults import Faults
+
+JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
+ARMS: Mapping[str, Mapping[int, tuple[str, str]]] = {
+    "so101": {k: (joint, "feetech-sts3215-12v") for k, joint in enumerate(JOINTS, start=1)},
+    "koch": {k: (joint, "dynamixel-xl430-w250" if k < 3 else "dynamixel-xl330-m288")
+             for k, joint in enumerate(JOINTS, start=1)}}
+"""By ID: the joint as LeRobot names it, and the servo."""
+
+_KEYS = ("supply", "body", "servo")
+_SERVO_KEYS = ("id", "servo", "joint", "registers", "angle_deg")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """What a person asks for.
+
+    Parameters
+    ----------
+    arm : str, optional
+        Name, or path of an arm file.
+    servos : mapping of int to str
+        By ID, beside the arm's or instead of them.
+    supply : str, optional
+    registers : tuple of str
+        Written into all servos.
+    lock, firmware, faults, seed
+        As of `Bus`.
+    body : bool
+        Whether an arm that has links hangs at them.
+    """
+
+    arm: str | None = None
+    servos: Mapping[int, str] = field(default_factory=dict)
+    supply: str | None = None
+    registers: tuple[str, ...] = ()
+    lock: str = "keep"
+    firmware: tuple[int, ...] | None = None
+    faults: Faults | None = None
+    body: bool = True
+    seed: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Arm:
+    """An arm as it is read."""
+
+    joints: dict[int, str]
+    servos: dict[int, str]
+    registers: dict[int, tuple[str, ...]] = field(default_factory=dict)
+    angles: dict[int, float] = field(default_factory=dict)
+    supply: str | None = None
+    body: str | None = None
+
+
+def arm_bus(asked: Asked, *, registers: Callable[[Servo, tuple[str, ...]], Servo]) -> tuple[Bus, dict[int, str]]:
+    """Return the bus that is asked for, and the joint of each ID.
+
+    Parameters
+    ----------
+    asked : Asked
+    registers : callable
+        Returns a servo with registers that words say.
+
+    Raises
+    ------
+    InputError
+        Or one of its kinds, if there is no such arm or servo.
+    """
+    arm = _arm(asked.arm)
+    named = {**arm.servos, **asked.servos}
+    if not named:
+        raise InputError("servotwin wire", got="no servos",
+                         allowed=f"{' or '.join(ARMS)}, an arm file, or --servo ID=SERVO")
+    servos = {id: registers(registers(load_servo(name), arm.registers.get(id, ())), asked.registers)
+              for id, name in named.items()}
+    words = asked.supply or arm.supply
+    more: dict[str, Any] = {}
+    if asked.body and arm.body is not None and not asked.servos:
+        from servotwin.wire.body import body_of
+
+        made = body_of(arm.body, [arm.joints[id] for id in named])
+        if made is not None:
+            more["body"] = made
+    bus = Bus(servos, supply=None if words is None else Supply.of(words), angles=arm.angles, lock=asked.lock,
+              firmware=asked.firmware, faults=asked.faults, seed=asked.seed, **more)
+    return bus, {id: arm.joints.get(id, "") for id in named}
+
+
+def _arm(name: str | None) -> _Arm:
+    if name is None:
+        return _Arm(joints={}, servos={})
+    if name in ARMS:
+        return _Arm(joints={id: joint for id, (joint, _) in ARMS[name].items()},
+                    servos={id: servo for id, (_, servo) in ARMS[name].items()},
+                    body="so101" if name == "so101" else None)
+    path = Path(name)
+    if path.suffix != ".toml" and not path.exists():
+        raise UnknownNameError("arm", name, ARMS, allowed=f"{', '.join(ARMS)}, or path of an arm file (.toml)")
+    return _read(path)
+
+
+def _read(path: Path) -> _Arm:
+    """Read an arm file: `supply`, `body` and a table `[[servo]]` for each servo."""
+    try:
+        found = tomllib.loads(path.read_text("utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}", got=str(error), allowed="an arm file in TOML") from None
+    _known(f"{path}: key", found, _KEYS)
+    tables = found.get("servo")
+    if not isinstance(tables, list) or not tables or not all(isinstance(one, dict) for one in tables):
+        raise InputError(f"{path}", got="no [[servo]]", allowed="a table [[servo]] with id and servo for each")
+    servos, joints = dict[int, str](), dict[int, str]()
+    angles, registers = dict[int, float](), dict[int, tuple[str, ...]]()
+    for one in tables:
+        _known(f"{path}: key of a servo", one, _SERVO_KEYS)
+        id = one.get("id")
+        if type(id) is not int or not isinstance(one.get("servo"), str):
+            raise InputError(f"{path}: [[servo]]", got=one, allowed='id = 1 and servo = "feetech-sts3215-12v"')
+        if id in servos:
+            raise InputError(f"{path}: id of a servo", got=f"{id} twice", allowed="each ID once")
+        servos[id], joints[id] = one["servo"], str(one.get("joint", ""))
+        angles[id] = _degrees(path, one.get("angle_deg", 0.0))
+        words = one.get("registers", [])
+        registers[id] = (words,) if isinstance(words, str) else tuple(str(word) for word in words)
+    for key in ("supply", "body"):
+        if key in found and not isinstance(found[key], str):
+            raise InputError(f"{path}: {key}", got=found[key], allowed="a word in quotes")
+    body = found.get("body")
+    if body is not None and body != "so101":
+        beside = path.parent / body
+        body = str(beside) if beside.exists() else body
+    return _Arm(joints=joints, servos=servos, registers=registers, angles=angles, supply=found.get("supply"), body=body)
+
+
+def _degrees(path: Path, value: Any) -> float:
+    import math
+
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= 36000.0:
+        raise InputError(f"{path}: angle_deg", got=value, allowed="a number of degrees")
+    return math.radians(value)
+
+
+def _known(what: str, found: Mapping[str, Any], names: tuple[str, ...]) -> None:
+    unknown = next((name for name in found if name not in names), None)
+    if unknown is not None:
+        raise UnknownNameError(what, unknown, names)
