@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time as clock
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -78,6 +79,11 @@ def truths_of(truth: rig.Truth) -> dict[str, float]:
     return found | {f"zero.{joint}": -servo.zero for joint, servo in zip(truth.robot.joints, truth.servos, strict=True)}
 
 
+def late_by(episodes: Sequence[recorder.Episode]) -> float:
+    """Return by which share turns of the loop took longer than their stamps say, in the mean."""
+    return float(np.mean([np.ptp(one.true_time) / np.ptp(one.time) for one in episodes])) - 1.0
+
+
 def left_by(truth: rig.Truth, episode: recorder.Episode) -> float:
     """Return the rms that the rig itself leaves of an episode: counts, and a clock that is the stamps' [rad]."""
     start = -recorder.SETTLING
@@ -107,7 +113,7 @@ def judged(truth: rig.Truth, folder: Path, *, duration: float = 20.0, episodes: 
         fit = identify_arm(motions, file, files_of(truth), **{"free": FREE, "holdout": 1, **more})
     spent = clock.process_time() - began
     held, methods, off = dict[str, bool](), dict[str, str](), dict[str, float]()
-    true = truths_of(truth)
+    true = truths_of(truth) | {"clock": late_by(made[:episodes - 1])}
     for name, (lower, upper, method) in fit.intervals().items():
         methods[name] = method
         if name in true and not math.isnan(lower):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from servotwin.identification.fitting.uncertainty import Rows, Uncertainty, rows
 from servotwin.identification.fitting.words import Unidentifiable, explain, simplest, vague_directions
 
 Array = NDArray[np.float64]
+_BOTH = 2.0  # times the variance of half a difference: that of a single simulation
 
 
 class Doubts(NamedTuple):
@@ -28,8 +30,20 @@ class Doubts(NamedTuple):
     unidentifiable: tuple[Unidentifiable, ...]
 
 
-def doubts_of(what: Problem, x: Array, noise: Noise, found: Sequence[Array], slopes: Sequence[Array]) -> Doubts:
-    """Return what residuals and derivatives at a point say of the numbers."""
+def doubts_of(what: Problem, x: Array, noise: Noise, found: Sequence[Array], slopes: Sequence[Array],
+              shakes: Sequence[Array]) -> Doubts:
+    """Return what residuals and derivatives at a point say of the numbers.
+
+    Parameters
+    ----------
+    what : Problem
+    x : ndarray, shape (numbers,)
+    noise : Noise
+    found : sequence of ndarray, shape (n, joints)
+        Residuals [rad].
+    slopes, shakes : sequence of ndarray, shape (n, joints, numbers)
+        Derivatives, and by how much a simulation is off them [rad]: half of what steps to either side differ by.
+    """
     numbers, loss, nothing = what.numbers, Loss(HUBER), Prior(np.zeros(0), np.zeros(0))
     rows: list[Rows] = [rows_of(part, loss, nothing, np.zeros(0)) for episode, residual, slope, used in zip(
         what.episodes, found, slopes, what.used, strict=True)
@@ -37,6 +51,7 @@ def doubts_of(what: Problem, x: Array, noise: Noise, found: Sequence[Array], slo
     stuck = what.at_bound(x)
     prior = what.prior
     beliefs = uncertainty(rows, prior, stuck)
+    beliefs = replace(beliefs, covariance=beliefs.covariance + _shaken(what, noise, found, rows, shakes, beliefs))
     known = np.array([numbers.weight[k] if name in (VOLTAGE, RESISTANCE) else 0.0
                       for k, name in enumerate(numbers.names)])
     moves = ~stuck
@@ -52,6 +67,20 @@ def doubts_of(what: Problem, x: Array, noise: Noise, found: Sequence[Array], slo
     shares = [1.0 if one.logarithmic else math.nan for one in numbers.all]
     named = {str(one): one for one in explain(numbers.names, shares, flags, directions)}  # several of the same members
     return Doubts(beliefs, prior_share, tuple(named.values()))
+
+
+def _shaken(what: Problem, noise: Noise, found: Sequence[Array], rows: Sequence[Rows], shakes: Sequence[Array],
+            doubt: Uncertainty) -> Array:
+    """Return the covariance that the roughness of simulations adds.
+
+    Servos that stick and slip end a hair elsewhere for the smallest change, over many samples, and residuals at the
+    best point have that too. Each derivative shows a draw of it, halved: what its two sides differ by.
+    """
+    parts = [part for episode, residual, shake, used in zip(what.episodes, found, shakes, what.used, strict=True)
+             for part in parts_of(episode, residual, shake, noise, used)]
+    g = np.sum([(r.slope * r.inside[:, None]).T @ part.shared for r, part in zip(rows, parts, strict=True)], axis=0)
+    off = doubt.curvature @ g[:, np.abs(g).any(axis=0)]
+    return np.asarray(_BOTH * off @ off.T / max(off.shape[1], 1))
 
 
 def _sizes(what: Problem) -> Array:

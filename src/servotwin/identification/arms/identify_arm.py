@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError
 from servotwin.identification.arms.arm_fit import HALF, ArmFit
 from servotwin.identification.arms.dynamics import link_names, links_of, with_masses
-from servotwin.identification.arms.episodes import episodes_from, motions_of
-from servotwin.identification.arms.numbers import GAIN, Numbers
+from servotwin.identification.arms.episodes import counts_turns, episodes_from, motions_of
+from servotwin.identification.arms.numbers import CLOCK, GAIN, Numbers
 from servotwin.identification.arms.plant import UNKNOWN, mounts_of, plant_of, supply_of
 from servotwin.identification.arms.problem import Problem
 from servotwin.identification.arms.rows import used_rows
@@ -34,6 +34,7 @@ Array = NDArray[np.float64]
 _HELD_OUT = 4  # episodes for each that is held out
 _MOST_SHARE = 3.0  # of masses: beyond, a bound of three times that is none
 _PUSHED = 2.5  # widths of a belief, that are said
+_SURELY = 3.0  # standard deviations
 
 
 def identify_arm(logs: Any, robot: Any, servos: Any = None, *, bus: Supply | None = None, each: bool = False,
@@ -97,13 +98,14 @@ def identify_arm(logs: Any, robot: Any, servos: Any = None, *, bus: Supply | Non
     supply = supply_of(bus, mounts)
     joints = list(mounts)
     links = links_of(plant, joints)
+    episodes = episodes_from(first, joints, mounts)
+    counted = counts_turns(episodes)
 
     def make(gains: Sequence[str] = ()) -> Numbers:
         return Numbers(mounts, link_names(plant, links), supply, each=each, free=free, zeros=zeros, gains=gains,
-                       masses=max(masses, 2.0) if robot == UNKNOWN else masses)
+                       masses=max(masses, 2.0) if robot == UNKNOWN else masses, counted=counted)
 
     level, course = checks.checked_level(level), Stops(limit)
-    episodes = episodes_from(first, joints, mounts)
     count = _held_out(len(episodes), holdout)
     fitted, unseen = ([one.motion for one in some] for some in (
         episodes[:len(episodes) - count], episodes[len(episodes) - count:]))
@@ -152,12 +154,21 @@ def _pushed(way: Way) -> list[str]:
     """Return a line on each belief that the episodes push far and know better."""
     what, x, doubts, found = way.what, way.x, way.doubts, []
     for k, one in enumerate(what.numbers.all):
+        if one.name == CLOCK:
+            found += _late(one.value(float(x[k])), one.value(float(doubts.all.std[k])) if doubts else math.inf)
+            continue
         widths = (x[k] - one.start) / one.belief if math.isfinite(one.belief) else 0.0
         if abs(widths) > _PUSHED and (doubts is None or doubts.shares[one.name] < HALF):
             found.append(f"{one.name} was pushed {abs(widths):.1f} widths of its belief, from "
                          f"{one.value(one.start):.4g} to {one.value(float(x[k])):.4g} {one.unit}: the file may be of "
                          "another servo or robot")
     return found
+
+
+def _late(share: float, std: float) -> list[str]:
+    """Return a line on turns of the loop that take longer than stamps say, where that is sure."""
+    return [f"turns of the loop take {100 * share:.2g} % longer than the stamps say, which only count them: have the "
+            "recorder stamp each row when it is measured"] if share > _SURELY * std else []
 
 
 Tables = tuple[RobotValidation, RobotValidation, RobotValidation | None, RobotValidation | None]
@@ -167,14 +178,14 @@ def _tables(what: Problem, x: Array, fitted: Sequence[Motion], unseen: Sequence[
     """Return errors on fitted and unseen episodes, after the fit and before."""
     numbers, found = what.numbers, list[RobotValidation | None]()
     after = with_masses(what.plant, what.links, numbers.masses(x))
-    zeros = dict(zip(numbers.joints, numbers.zeros(x).tolist(), strict=True))
+    zeros, turn = dict(zip(numbers.joints, numbers.zeros(x).tolist(), strict=True)), numbers.turn(x)
     for motions in (fitted, unseen):
         if not motions:
             found += [None, None]
             continue
         plain = [replace(one, robot="") for one in motions]
-        moved = [replace(one, angles={name: one.angles[name] + zeros[name] for name in zeros}, measured={
-            name: one.measured[name] + zeros[name] for name in zeros}) for one in plain]
+        moved = [replace(one, time=turn * one.time, angles={name: one.angles[name] + zeros[name] for name in zeros},
+                         measured={name: one.measured[name] + zeros[name] for name in zeros}) for one in plain]
         found.append(validate_robot(after, numbers.mounts_at(x), moved, bus=numbers.supply(x), rivals=(),
                                     latency=numbers.latency(x), joint_friction="keep", assume_heat=False))
         found.append(validate_robot(what.plant, numbers.mounts, plain, bus=numbers.bus, rivals=(),

@@ -1,8 +1,8 @@
 """The first stage: every joint a lane of its own, under the torque and inertia that the measured motion asks of it.
 
 All joints, and copies of them with one number moved, run side by side, each as if it were alone on the supply; what the
-others draw counts in the second stage. Time is that of the goals: a joint at a stamp t
-is where its lane is at t less the latency.
+others draw, and how long turns take that stamps only count, counts in the second stage. Time is that of the goals: a
+joint at a stamp t is where its lane is at t less the latency.
 """
 
 from __future__ import annotations

@@ -19,15 +19,17 @@ from servotwin.robots.unlike import differing, of_one_form
 
 Array = NDArray[np.float64]
 
-VOLTAGE, RESISTANCE, LATENCY = "supply.open_circuit_voltage", "supply.internal_resistance", "latency"
+VOLTAGE, RESISTANCE, LATENCY, CLOCK = (
+    "supply.open_circuit_voltage", "supply.internal_resistance", "latency", "clock")
 GAIN = "firmware.proportional_gain"
 QUANTUM, FINER = "firmware.angle_quantum", 64.0
-ZERO_SCALE, LATENCY_SCALE, OHM_SCALE = 0.02, 0.01, 0.1  # rad, s, ohm
+ZERO_SCALE, LATENCY_SCALE, OHM_SCALE, CLOCK_SCALE = 0.02, 0.01, 0.1, 0.01  # rad, s, ohm, share
 _ZERO_STD = 0.05  # rad: how far a horn may sit off
 _VOLTAGE_STD = 0.03
 _LEAST_STD, _ANY_STD = 0.1, 0.7  # of logarithms: of what a file says how far it may be off, and of all else
 _MOTOR, _MOTOR_STD = ("motor.armature_resistance", "output_torque_constant"), 0.15  # that sheets tell fairly
 _LATENCIES = (-0.03, 0.2)  # s
+_CLOCKS = (-0.03, 0.15)  # share by which turns take longer than stamps say; believed to be within its scale
 _GAINS, GAIN_STD = math.log(10.0), 1.5  # how far a gain may be off its register's, either way, and is believed to be
 _MOST_ZERO, _MOST_OHMS, _USUAL_OHMS = 0.35, 2.0, 0.1  # rad, ohm: at most, and of wires that nobody has measured
 
@@ -92,11 +94,13 @@ class Numbers:
         Whether the joints' zeros are searched.
     gains : sequence of str
         Joints whose servos' proportional gain may be other than their registers say.
+    counted : bool
+        Whether stamps count turns of a loop, and so do not say how long these took.
     """
 
     def __init__(self, mounts: Mapping[str, Mount], links: Sequence[str], bus: Supply | None, *, each: bool = False,
                  masses: float = 0.1, free: Sequence[str] | None = None, zeros: bool = True,
-                 gains: Sequence[str] = ()) -> None:
+                 gains: Sequence[str] = (), counted: bool = False) -> None:
         alike = of_one_form([mount.model for mount in mounts.values()])
         self.mounts = {joint: Mount(model, mount.zero, mount.direction, mount.ratio)
                        for (joint, mount), model in zip(mounts.items(), alike, strict=True)}
@@ -122,6 +126,9 @@ class Numbers:
         numbers += [Number(f"gain.{joint}", "1", 0.0, -_GAINS, _GAINS, GAIN_STD, 1.0, True) for joint in gains]
         numbers.append(Number(LATENCY, "s", 1.0, _LATENCIES[0] / LATENCY_SCALE, _LATENCIES[1] / LATENCY_SCALE, math.inf,
                               LATENCY_SCALE, False))
+        if counted:
+            numbers.append(Number(CLOCK, "1", 0.0, _CLOCKS[0] / CLOCK_SCALE, _CLOCKS[1] / CLOCK_SCALE, 1.0,
+                                  CLOCK_SCALE, False))
         self.all = tuple(numbers)
         self.names = tuple(one.name for one in numbers)
         self.start = np.array([one.start for one in numbers])
@@ -163,6 +170,10 @@ class Numbers:
     def latency(self, x: Array) -> float:
         """Return how much later goals act than positions of their row are read [s]."""
         return self._value(x, LATENCY, 0.0)
+
+    def turn(self, x: Array) -> float:
+        """Return how many times as long as stamped a turn of the loop takes."""
+        return 1.0 + self._value(x, CLOCK, 0.0)
 
     def zeros(self, x: Array) -> Array:
         """Return by how much the joints of the robot are ahead of what is measured, shape (joints,) [rad]."""

@@ -153,7 +153,8 @@ def _second_stage(way: Way, show: Show, *, intervals: bool) -> None:
 
         show(0.45 + 0.2 * turn, "the whole robot")
         search, x = what.search(arm, noise, steps=way.steps), way.x
-        slopes = _clean(what, search.linear(x, central=True), noise)
+        steps, linear = search.steps, search.linear(x, central=True)
+        slopes, shakes = _clean(what, linear, noise), [one.scatter * steps for one in linear]
         way.steps = search.steps
         way.x = search.along(x, slopes, most=_WHOLE_STEPS, tell=tell)
         far = float(np.abs((way.x - x) * np.where(what.numbers.weight > 0.0, what.numbers.weight, 1.0)).max())
@@ -165,7 +166,7 @@ def _second_stage(way: Way, show: Show, *, intervals: bool) -> None:
     show(0.85, "intervals")
     found = what.left(arm, way.x)
     way.noise = noise_of(what.episodes, found, what.used)
-    way.doubts = doubts_of(what, way.x, way.noise, found, slopes)
+    way.doubts = doubts_of(what, way.x, way.noise, found, slopes, shakes)
     way.know(INTERVALS)
 
 

@@ -40,13 +40,14 @@ class WholeArm(Copies):
         drive.record(data)
         drive.command(data, dict(zip(drive.joints, goals[0].tolist(), strict=True)))
         drive.step(data, round(_SETTLE / step))
-        spans = np.diff(np.append(episode.time, episode.time[-1] + _SETTLE))
+        turn = numbers.turn(x)
+        spans = turn * np.diff(np.append(episode.time, episode.time[-1] + _SETTLE))
         for row, span in zip(goals.tolist(), spans.tolist(), strict=True):
             count = ticks_in(span, step)
             drive.model.opt.timestep = span / count  # a row acts at its time, not with the next tick
             drive.command(data, dict(zip(drive.joints, row, strict=True)))
             drive.step(data, count)
         record = drive.result(data)
-        at = episode.time - numbers.latency(x)
+        at = turn * episode.time - numbers.latency(x)
         return np.stack([np.interp(at, record.time, record[name]["joint_angle"]) for name in drive.joints],
                         axis=1) - zeros

@@ -75,7 +75,7 @@ _READING = """<section><h2>How to read this page</h2><ul>
 at the latency that fits these best.</li>
 <li><b>mass.…</b> are factors on the masses of the robot's file; <b>zero.…</b> is by how much a joint of the robot's
 model is ahead of what was measured; <b>latency</b> is from the reading of positions to when the goal of the same row
-acts.</li>
+acts; <b>clock</b> is the share by which turns of the loop take longer than stamps say that only count them.</li>
 <li><b>by beliefs</b>: episodes alone do not tell it; the interval stands on what the files of servo and robot say, and
 on how far masses may be off.</li></ul></section>
 """
