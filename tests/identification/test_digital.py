@@ -210,3 +210,21 @@ def test_chip_and_firmware_follow_from_each_other():
 def test_structures_that_make_no_sense_are_refused(servo, more, words):
     with pytest.raises(ServotwinError, match=words):
         compare_structures([digital_log(PULSED, "step")], servo, **more)
+
+
+def test_a_log_that_begins_off_its_goal_starts_at_the_side_of_its_play():
+    """The motor pushes towards the goal; a log of a load says nothing of it."""
+    servo = st.load_servo("feetech-sts3215-12v")
+    model, time = st.DigitalServo(servo), np.arange(0.0, 2.0, 0.01)
+    goals = np.where(time < 0.5, 0.0, 0.4)
+    play, start = servo.get("gear.backlash"), 0.0077
+    run = st.simulate(model, st.signals.samples(time, goals, unit="rad"), duration=2.0, output_times=time, initial={
+        "output_angle": start, "motor_angle": servo.get("gear.gear_reduction") * (start - 0.5 * play)})
+    log = Log(name="off", time=time, command=goals, command_kind="angle",
+              measured={"output_angle": run["output_angle"]})
+
+    def worst(log):
+        return max(float(np.abs(trace.residual).max()) for trace in validate(log, servo, st.DigitalServo).traces)
+
+    assert worst(log) < 1e-5
+    assert worst(replace(log, load=st.loads.Inertia(1e-3))) > 1e-3

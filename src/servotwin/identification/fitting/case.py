@@ -15,6 +15,7 @@ from servotwin.errors import InputError
 from servotwin.identification.fitting.frames import has_pulses
 from servotwin.identification.fitting.free import LUMPED, Space
 from servotwin.identification.fitting.loop_gain import with_loop_gain
+from servotwin.loads import Load
 from servotwin.logs.log import Log
 from servotwin.models import DigitalServo, Model
 from servotwin.parameters.output_side import N
@@ -30,6 +31,7 @@ _UNSURE = 3.0  # times what five samples scatter, which is known no better
 TIME = "time"  # of the noise: how far off the times of pulses, ticks and samples are, one by one [s]
 _RATE_OVER = 0.02  # s, at least: differences of neighbours would be those of their noise
 _LASTS = 0.1  # s: what came early or late leaves an error, until the loop has taken it away
+_STANDS = 0.1  # s, at least, without a new goal
 _FROM_REST = 0.5  # of its slope over five samples: what a shaft that begins from rest has over three
 
 
@@ -58,6 +60,8 @@ class Case:
         Cases of one key may be simulated together.
     period : float
         T_f that log or servo say [s]; 0 of a model without pulses.
+    leans : float
+        To which side of the gear's play the motor lies at first: -1 or 1; 0 in the middle, where the log does not tell.
     """
 
     log: Log
@@ -70,6 +74,7 @@ class Case:
     moving: bool
     key: tuple[Any, ...] = field(repr=False)
     period: float = 0.0
+    leans: float = 0.0
 
     @property
     def count(self) -> int:
@@ -120,7 +125,8 @@ def make_case(log: Log, model: Model, space: Space, sensors: Sequence[str], *, d
     key = (log.command_kind, overridden, tuple(sorted(places)), bool(log.sent.all()))
     signal = _signal(log, model, {} if signals is None else signals)
     return Case(log=log, signal=signal, times=times, places=places, values=values, start=(angle, speed),
-                scatter=scatter, moving=moving, key=key, period=_period(log, model))
+                scatter=scatter, moving=moving, key=key, period=_period(log, model),
+                leans=_leans(log, model, angle, scatter))
 
 
 def _usable(log: Log, model: Model, name: str) -> NDArray[np.bool_]:
@@ -153,6 +159,23 @@ def _start(log: Log, model: Model) -> tuple[float, float, float, bool]:
     if moving and not _begins(time, values, slope, scatter):
         return float(values[0] - slope * time[0]), slope, 3.0 * scatter, True
     return float(values[0]), 0.0, scatter, False
+
+
+def _leans(log: Log, model: Model, angle: float, scatter: float) -> float:
+    """Return to which side of its play the motor lies of a bus servo without a load that stands off its goal.
+
+    It stopped short of the goal, and pushes there still.
+    """
+    if not (isinstance(model, DigitalServo) and model.takes_goals and log.command_kind == "angle"
+            and log.load == Load() and "output_angle" in log.measured):
+        return 0.0
+    time = log.time - log.time[0]
+    first = log.used("output_angle") & (time < (time[log.changes[0]] if len(log.changes) else math.inf))
+    off = float(log.held[0]) - angle
+    if not first.any() or time[first][-1] < _STANDS or abs(off) <= 2.0 * scatter:
+        return 0.0
+    still = bool(np.abs(log.measured["output_angle"][first] - angle).max() <= 2.0 * scatter)
+    return math.copysign(1.0, off) if still else 0.0
 
 
 def _rough(time: Array, values: Array) -> float:

@@ -12,11 +12,12 @@ import numpy as np
 from servotwin.identification.fitting.case import Case
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.point import DELAY_SCALE, Point
-from servotwin.models import Model
+from servotwin.models import DigitalServo, Model
 
 if TYPE_CHECKING:
     from servotwin.identification.fitting.task import Task
 
+_OF_GOALS = (0.001, 0.002, 0.005, 0.01)  # s: a bus carries a goal sooner than pulses do
 DELAYS = (0.02, 0.0, 0.04, 0.06, 0.09)  # s, where the search for it begins, and some others
 _NEAR = 0.3  # rad, an offset that the search finds by itself
 _LOOKS = 25  # of each log
@@ -44,7 +45,8 @@ def at_likely_delay(task: Task, point: Point) -> Point:
     if "delay" not in forecast.extra or "delay" in task.begin.shared:
         return point
     place, tried = len(forecast.space) + forecast.extra.index("delay"), []
-    for delay in DELAYS:
+    goals = isinstance(forecast.model, DigitalServo) and forecast.model.takes_goals
+    for delay in (*DELAYS, *(_OF_GOALS if goals else ())):
         shared = point.shared.copy()
         shared[place] = delay / DELAY_SCALE
         tried.append(point._replace(shared=shared))

@@ -101,6 +101,9 @@ def ends(search: Search, best: Outcome, doubt: Uncertainty, which: Sequence[int]
     reached = together(search.forecast, search.cases, profiles)
     for k, (low, of_low), (high, of_high) in zip(bent, reached[::2], reached[1::2], strict=True):
         share = (low * of_low + high * of_high) / max(low + high, 1e-300)
+        if kinked:  # the first deep kink ends a profile, but says nothing of what lies behind it
+            low, high = (max(one, min(reaches[k], _room(search, best, doubt, k, side)))
+                         for one, side in ((low, -1.0), (high, 1.0)))
         found[k] = Ends(-low, high, "profile", min(max(share, 0.0), 1.0))
         tell(len(found))
     return {k: found[k] for k in every}
@@ -117,6 +120,12 @@ def _inside(search: Search, best: Outcome, doubt: Uncertainty, k: int, reach: fl
     """Tell whether all is within the bounds that is within some standard errors."""
     return all(search.lower[k] <= best.point.shared[k] + side * reach * doubt.std[k] <= search.upper[k]
                for side in (-1.0, 1.0))
+
+
+def _room(search: Search, best: Outcome, doubt: Uncertainty, k: int, side: float) -> float:
+    """Return how far off the bound on one side is [standard errors]."""
+    bound = search.upper[k] if side > 0.0 else search.lower[k]
+    return float(abs(bound - best.point.shared[k]) / max(doubt.std[k], 1e-300))
 
 
 def _over_kinks(search: Search, best: Outcome, doubt: Uncertainty, reaches: Mapping[int, float],
@@ -182,8 +191,7 @@ def _end(search: Search, best: Outcome, doubt: Uncertainty, k: int, side: float,
     held = search.held.copy()
     held[k] = True
     inner = Search(search.forecast, search.loss, search.prior, search.lower, search.upper, search.cases, held)
-    bound = search.upper[k] if side > 0.0 else search.lower[k]
-    farthest = float(abs(bound - best.point.shared[k]) / max(doubt.std[k], 1e-300))
+    farthest = _room(search, best, doubt, k, side)
     wanted = _expected(doubt, k, reach)
     low, of_low, high, of_high = 0.0, 0.0, math.inf, math.inf
     first = min(max(wanted / max(rise, 1e-300), 1.0), _FAR[0] ** 2) if math.isfinite(rise) else 1.0

@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 
 _VOLTAGE = "supply.open_circuit_voltage"
 _NOISE = "potentiometer.noise"
+_PLAY, _TEETH = "gear.backlash", "gear.gear_reduction"
 _TICK, _PHASE = "firmware.control_period", "firmware.control_phase"
 _DELAYS = ("log_delay", "frame_phase")  # a log's own: what they change follows from the speed, without a lane
 
@@ -112,7 +113,16 @@ class LogLanes:
         starts = "initial_state" in forecast.nuisance
         return Bundle(times=asked, duration=max(float(asked.max()), log.duration), load=log.load, signals=self.signals,
                       columns=columns,
-                      initial={"output_angle": self.angle, "output_speed": self.speed} if starts else {})
+                      initial=self._start(columns) if starts else {})
+
+    def _start(self, columns: Mapping[str, Array]) -> dict[str, Array]:
+        """Return where every lane starts (SI), the motor within the gear's play where the log tells."""
+        start, model = {"output_angle": self.angle, "output_speed": self.speed}, self.forecast.model
+        play = columns.get(_PLAY, np.full(self.count, model.value_or(_PLAY, 0.0)))
+        known = any(case.leans for case in self.forecast.cases)  # lanes that run together say the same of their starts
+        if known and np.any(play) and any(place.name == "motor_angle" for place in model.states):
+            start["motor_angle"] = model.value_or(_TEETH, 1.0) * (self.angle + self.case.leans * 0.5 * play)
+        return start
 
     def _ticks(self, columns: Mapping[str, Array]) -> dict[str, Array]:
         """Return when the first tick of each lane is [s]; pulses that come later move it by as much.
