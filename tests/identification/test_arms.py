@@ -12,11 +12,14 @@ from servotwin.errors import InputError
 from servotwin.identification.arms import dynamics, identify_arm
 from servotwin.identification.arms.arm_fit import BELIEFS, ArmCause
 from servotwin.identification.arms.causes import confirmed
+from servotwin.identification.arms.doubts import shaken
 from servotwin.identification.arms.episodes import episodes_from
 from servotwin.identification.arms.numbers import Numbers
 from servotwin.identification.arms.problem import Problem
 from servotwin.identification.arms.rows import Noise, beyond_scatter, used_rows, whitened
 from servotwin.identification.arms.whole import WholeArm
+from servotwin.identification.fitting.point import LogPart
+from servotwin.identification.fitting.uncertainty import Rows
 from servotwin.identification.fitting.words import Unidentifiable
 from servotwin.robots import Motion, Mount, run_motion
 
@@ -249,3 +252,13 @@ def test_turns_take_longer_than_stamps_that_count_them():
     wakes = np.random.default_rng(0).uniform(0.0, 1e-3, len(real.time))
     stamped = replace(real, time=real.time + wakes - wakes[0])
     assert "clock" not in fitted([stamped], intervals=False).names
+
+
+def test_roughness_of_simulations_widens_what_it_moves():
+    """A shake along a derivative is taken for a change of its number; one across all of them moves nothing."""
+    rng = np.random.default_rng(0)
+    slopes, _ = np.linalg.qr(rng.normal(size=(600, 3)))
+    shakes = np.stack([0.3 * slopes[:, 0], slopes[:, 2], np.zeros(600)], axis=1)
+    rows = [Rows(np.zeros(600), slopes[:, :2], np.ones(600))]
+    found = shaken(rows, [LogPart(np.zeros(600), shakes, np.zeros((600, 0)))], np.eye(2))
+    np.testing.assert_allclose(found, 2.0 * np.diag([0.3**2 / 2.0, 0.0]), atol=1e-12)

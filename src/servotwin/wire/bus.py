@@ -21,8 +21,9 @@ from servotwin.wire.crew import Crew, Seen
 from servotwin.wire.device import ready
 from servotwin.wire.dynamixel_talk import DynamixelTalk
 from servotwin.wire.faults import Faults
-from servotwin.wire.feetech_talk import BITS, FeetechTalk
+from servotwin.wire.feetech_talk import FeetechTalk
 from servotwin.wire.sts import Sts
+from servotwin.wire.talk import BITS, Talk
 from servotwin.wire.traffic import Traffic
 from servotwin.wire.x_servo import X
 
@@ -124,7 +125,7 @@ class Bus:
             device.crew, device.clock = self.crew, self._now
             device.put_stored({"ID": id})
             device.power_up()
-        self._talk: Any = FeetechTalk(self.devices) if self.protocol == "feetech" else DynamixelTalk(self.devices)
+        self._talk: Talk[Any] = FeetechTalk() if self.protocol == "feetech" else DynamixelTalk()
         self.faults = faults if faults is not None else Faults(seed=seed)
         self._buffer, self._fed = bytearray(), 0.0
         self._out: list[tuple[float, int, bytes]] = []

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from servotwin.wire.packet import Packet
+from servotwin.wire.packet import ALL, Packet
 
 PING, READ, WRITE, REG_WRITE, ACTION, RESET = 0x01, 0x02, 0x03, 0x04, 0x05, 0x06
 REBOOT, CLEAR, STATUS, SYNC_READ, SYNC_WRITE = 0x08, 0x10, 0x55, 0x82, 0x83
 FAST_SYNC_READ, BULK_READ, BULK_WRITE, FAST_BULK_READ = 0x8A, 0x92, 0x93, 0x9A
-ALL = 0xFE
 _HEAD, _STUFFED = b"\xff\xff\xfd", b"\xff\xff\xfd\xfd"
 _LONGEST = 2048  # bytes that a packet may say it has
 

@@ -5,33 +5,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from servotwin.wire import dynamixel_frames as frames
-from servotwin.wire.feetech_talk import Reply, _clash
 from servotwin.wire.packet import Packet
+from servotwin.wire.talk import Reply, Talk
 from servotwin.wire.x_servo import LENGTH, X
 
 _FAILED, _UNKNOWN, _DATA = 1, 2, 5  # errors: result, instruction, length
 _PING_ANSWER, _HEADER = 14, 11  # bytes
 
 
-class DynamixelTalk:
-    """Protocol 2.0 between packets and servos.
+class DynamixelTalk(Talk[X]):
+    """Protocol 2.0 between packets and servos."""
 
-    Parameters
-    ----------
-    devices : sequence of X
-    """
+    def split(self, buffer: bytearray) -> tuple[list[Packet], int]:
+        """Take whole packets off a buffer; return them, and how many were bad."""
+        return frames.split(buffer)
 
-    split = staticmethod(frames.split)
-
-    def __init__(self, devices: Sequence[X]) -> None:
-        self.devices = devices
-
-    def replies(self, packet: Packet, listening: Sequence[X], byte: float) -> list[Reply]:
-        """Return all answers to a packet, as `FeetechTalk.replies` does."""
-        if packet.id == frames.ALL:
-            return self._to_all(packet, listening, byte)
-        made = [reply for one in listening if one.is_called(packet.id) for reply in _own(one, packet, byte)]
-        return made if len(made) < 2 else [_clash(made)]
+    def _own(self, one: X, packet: Packet, byte: float) -> list[Reply]:
+        return _answers(one, packet, byte)
 
     def _to_all(self, packet: Packet, listening: Sequence[X], byte: float) -> list[Reply]:
         data, code = packet.data, packet.code
@@ -96,7 +86,7 @@ def _fast(asked: Sequence[tuple[int, int, int]], of: dict[int, X], byte: float) 
     return [Reply(of[asked[0][0]].delay + len(made) * byte, made)]
 
 
-def _own(one: X, packet: Packet, byte: float) -> list[Reply]:
+def _answers(one: X, packet: Packet, byte: float) -> list[Reply]:
     """Return what a servo answers to a packet of its own: nothing, or one packet."""
     data, code = packet.data, packet.code
     one.protect()

@@ -6,7 +6,6 @@ from servotwin.wire.packet import Packet
 
 PING, READ, WRITE, REG_WRITE, ACTION, RESET = 0x01, 0x02, 0x03, 0x04, 0x05, 0x06
 BOOT, SET_POSITION, SYNC_READ, SYNC_WRITE = 0x08, 0x0B, 0x82, 0x83
-ALL = 0xFE  # what is meant for everybody
 _HEAD = b"\xff\xff"
 _SHORTEST = 6  # bytes
 

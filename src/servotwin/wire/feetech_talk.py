@@ -3,51 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 from servotwin.wire import feetech_frames as frames
 from servotwin.wire.packet import Packet
 from servotwin.wire.sts import Sts
+from servotwin.wire.talk import Reply, Talk
 
-BITS = 10.0  # of a byte on the wire
 _MIDDLE_BYTES = 2
 
 
-class Reply(NamedTuple):
-    """Bytes of a servo's answer, and when the last is through after the packet has come [s]."""
+class FeetechTalk(Talk[Sts]):
+    """Feetech's protocol between packets and servos."""
 
-    after: float
-    data: bytes
+    def split(self, buffer: bytearray) -> tuple[list[Packet], int]:
+        """Take whole packets off a buffer; return them, and how many were bad."""
+        return frames.split(buffer)
 
-
-class FeetechTalk:
-    """Feetech's protocol between packets and servos.
-
-    Parameters
-    ----------
-    devices : sequence of Sts
-    """
-
-    split = staticmethod(frames.split)
-
-    def __init__(self, devices: Sequence[Sts]) -> None:
-        self.devices = devices
-
-    def replies(self, packet: Packet, listening: Sequence[Sts], byte: float) -> list[Reply]:
-        """Return all answers to a packet.
-
-        Parameters
-        ----------
-        packet : Packet
-        listening : sequence of Sts
-            Those that hear it.
-        byte : float
-            Time of a byte [s].
-        """
-        if packet.id == frames.ALL:
-            return self._to_all(packet, listening, byte)
-        made = [reply for one in listening if one.is_called(packet.id) for reply in _own(one, packet, byte)]
-        return made if len(made) < 2 else [_clash(made)]
+    def _own(self, one: Sts, packet: Packet, byte: float) -> list[Reply]:
+        return _answers(one, packet, byte)
 
     def _to_all(self, packet: Packet, listening: Sequence[Sts], byte: float) -> list[Reply]:
         data = packet.data
@@ -81,7 +54,7 @@ class FeetechTalk:
                 one.write(address, data[at + 1:at + 1 + count])
 
 
-def _own(one: Sts, packet: Packet, byte: float) -> list[Reply]:
+def _answers(one: Sts, packet: Packet, byte: float) -> list[Reply]:
     """Return what a servo answers to a packet of its own: nothing, or one packet."""
     data = packet.data
     if packet.code == frames.PING:
@@ -118,13 +91,3 @@ def _obey(one: Sts, packet: Packet) -> bool:
 def _reply(one: Sts, data: bytes, byte: float, wait: float = 0.0, *, id: int | None = None) -> Reply:
     whole = frames.frame(one.id if id is None else id, one.status(), data)
     return Reply(one.delay + wait + len(whole) * byte, whole)
-
-
-def _clash(replies: Sequence[Reply]) -> Reply:
-    """Return what is left of answers at one time: a line that one pulls low is low."""
-    longest = max(replies, key=lambda one: len(one.data))
-    left = bytearray(longest.data)
-    for one in replies:
-        for k, value in enumerate(one.data):
-            left[k] &= value
-    return Reply(longest.after, bytes(left))

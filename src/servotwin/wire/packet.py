@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+ALL = 0xFE
+"""The ID of a broadcast."""
+
 
 class Packet(NamedTuple):
     """An instruction, or an answer.

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 from servotwin.errors import InputError
 from servotwin.wire import dynamixel_frames, feetech_frames
 from servotwin.wire.device import COUNT, MIDDLE
+from servotwin.wire.packet import ALL
 
 if TYPE_CHECKING:
     from servotwin.wire.bus import Bus
@@ -86,7 +87,7 @@ class Traffic:
         first, end = _POSITION[self._bus.protocol]
         if address > first or address + count < end:
             return []
-        ids = data[2 * wide:] if packet.id == frames.ALL else bytes((packet.id,))
+        ids = data[2 * wide:] if packet.id == ALL else bytes((packet.id,))
         return [one for one in self._bus.devices if one.id in ids]
 
     def _row(self, id: int, device: Any) -> None:

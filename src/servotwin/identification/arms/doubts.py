@@ -14,6 +14,7 @@ from servotwin.identification.arms.numbers import RESISTANCE, VOLTAGE
 from servotwin.identification.arms.problem import Problem
 from servotwin.identification.arms.rows import Noise, parts_of
 from servotwin.identification.fitting.arrow import Loss, Prior
+from servotwin.identification.fitting.point import LogPart
 from servotwin.identification.fitting.task import HUBER
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty, rows_of, uncertainty
 from servotwin.identification.fitting.words import Unidentifiable, explain, simplest, vague_directions
@@ -51,7 +52,9 @@ def doubts_of(what: Problem, x: Array, noise: Noise, found: Sequence[Array], slo
     stuck = what.at_bound(x)
     prior = what.prior
     beliefs = uncertainty(rows, prior, stuck)
-    beliefs = replace(beliefs, covariance=beliefs.covariance + _shaken(what, noise, found, rows, shakes, beliefs))
+    rough = [part for episode, residual, shake, used in zip(what.episodes, found, shakes, what.used, strict=True)
+             for part in parts_of(episode, residual, shake, noise, used)]
+    beliefs = replace(beliefs, covariance=beliefs.covariance + shaken(rows, rough, beliefs.curvature))
     known = np.array([numbers.weight[k] if name in (VOLTAGE, RESISTANCE) else 0.0
                       for k, name in enumerate(numbers.names)])
     moves = ~stuck
@@ -69,17 +72,24 @@ def doubts_of(what: Problem, x: Array, noise: Noise, found: Sequence[Array], slo
     return Doubts(beliefs, prior_share, tuple(named.values()))
 
 
-def _shaken(what: Problem, noise: Noise, found: Sequence[Array], rows: Sequence[Rows], shakes: Sequence[Array],
-            doubt: Uncertainty) -> Array:
-    """Return the covariance that the roughness of simulations adds.
+def shaken(rows: Sequence[Rows], shakes: Sequence[LogPart], curvature: Array) -> Array:
+    """Return the covariance that the roughness of simulations adds, shape (numbers, numbers).
 
     Servos that stick and slip end a hair elsewhere for the smallest change, over many samples, and residuals at the
     best point have that too. Each derivative shows a draw of it, halved: what its two sides differ by.
+
+    Parameters
+    ----------
+    rows : sequence of Rows
+        What each part says of the numbers.
+    shakes : sequence of LogPart
+        Its draws in the place of derivatives, in units of noise; those of 0 are none.
+    curvature : ndarray, shape (numbers, numbers)
+        Inverse curvature of the cost.
     """
-    parts = [part for episode, residual, shake, used in zip(what.episodes, found, shakes, what.used, strict=True)
-             for part in parts_of(episode, residual, shake, noise, used)]
-    g = np.sum([(r.slope * r.inside[:, None]).T @ part.shared for r, part in zip(rows, parts, strict=True)], axis=0)
-    off = doubt.curvature @ g[:, np.abs(g).any(axis=0)]
+    g = np.sum([(r.slope * r.inside[:, None]).T @ part.shared for r, part in zip(rows, shakes, strict=True)], axis=0)
+    drawn = np.any([np.abs(part.shared).any(axis=0) for part in shakes], axis=0)
+    off = curvature @ g[:, drawn]
     return np.asarray(_BOTH * off @ off.T / max(off.shape[1], 1))
 
 

@@ -18,7 +18,6 @@ from servotwin.robots.episode import episodes_of
 Array = NDArray[np.float64]
 _FEWEST = 30  # samples
 _SAME = 1e-6  # s
-EVEN = 1e-3  # of a turn: stamps of a clock are not as even
 _WINDOW = 0.25  # s, over which measured positions are smoothed
 
 
@@ -118,12 +117,6 @@ def episodes_from(motions: Sequence[Motion], joints: Sequence[str], servos: Mapp
     if all(float(np.ptp(one.measured, axis=0).max()) < 1e-2 for one in made):
         raise InputError("logs of a robot", got="joints that never move", allowed="an episode in which they do")
     return made
-
-
-def counts_turns(episodes: Sequence[Episode]) -> bool:
-    """Tell whether stamps count the turns of a loop, as those of datasets do (k/30 s): no clock is as even."""
-    steps = [np.diff(one.time) for one in episodes]
-    return all(float(np.ptp(some)) <= EVEN * float(np.median(some)) for some in steps)
 
 
 def _smooth(time: Array, measured: Array) -> tuple[Array, Array, Array]:

@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError
 from servotwin.identification.arms.arm_fit import HALF, ArmFit
 from servotwin.identification.arms.dynamics import link_names, links_of, with_masses
-from servotwin.identification.arms.episodes import counts_turns, episodes_from, motions_of
+from servotwin.identification.arms.episodes import episodes_from, motions_of
 from servotwin.identification.arms.numbers import CLOCK, GAIN, Numbers
 from servotwin.identification.arms.plant import UNKNOWN, mounts_of, plant_of, supply_of
 from servotwin.identification.arms.problem import Problem
 from servotwin.identification.arms.rows import used_rows
 from servotwin.identification.arms.stages import Way, searched
 from servotwin.identification.fitting import checks
+from servotwin.identification.fitting.diagnosis.counted import counts_turns
 from servotwin.identification.fitting.stopping import Stops, Within
 from servotwin.parameters import Servo, Supply
 from servotwin.parameters.output_side import OUTPUT_SIDE
@@ -99,7 +100,7 @@ def identify_arm(logs: Any, robot: Any, servos: Any = None, *, bus: Supply | Non
     joints = list(mounts)
     links = links_of(plant, joints)
     episodes = episodes_from(first, joints, mounts)
-    counted = counts_turns(episodes)
+    counted = counts_turns([one.time for one in episodes])
 
     def make(gains: Sequence[str] = ()) -> Numbers:
         return Numbers(mounts, link_names(plant, links), supply, each=each, free=free, zeros=zeros, gains=gains,

@@ -22,6 +22,17 @@ _WITHIN = 2.0  # standard deviations: how late a turn may be
 _NORMAL = 1.4826  # standard deviation over median magnitude of a normal law
 
 
+def counts_turns(times: Sequence[Array]) -> bool:
+    """Tell whether all stamps [s] count the turns of a loop, as those of datasets do (k/30 s): no clock is as even.
+
+    Examples
+    --------
+    >>> counts_turns([np.arange(90) / 30.0]), counts_turns([np.array([0.0, 0.0333, 0.0669, 0.1])])
+    (True, False)
+    """
+    return all(float(np.ptp(steps)) <= _EVEN * float(np.median(steps)) for steps in map(np.diff, times))
+
+
 def counted_stamps(traces: Sequence[Trace], sensor: str, noise: float) -> Cause | None:
     """Return stamps that count turns as a cause, where late turns leave as much, in no motion more.
 
@@ -35,7 +46,7 @@ def counted_stamps(traces: Sequence[Trace], sensor: str, noise: float) -> Cause 
         Of the sensor (SI).
     """
     steps = [float(np.median(np.diff(trace.log.time))) for trace in traces]
-    if any(np.ptp(np.diff(trace.log.time)) > _EVEN * step for trace, step in zip(traces, steps, strict=True)):
+    if not counts_turns([trace.log.time for trace in traces]):
         return None
     speeds = [np.gradient(trace.simulated, trace.time) for trace in traces]
     late = [value for trace, speed in zip(traces, speeds, strict=True)
