@@ -21,7 +21,7 @@ from servotwin.models.engine.bus.event_log import Tape
 from servotwin.models.engine.demands import demanded
 from servotwin.models.engine.memory import Memories, Memory, forgotten, resumed
 from servotwin.models.engine.step import DIVERGED
-from servotwin.models.state.records import TILE, fields_of, numbers_in, object_of, record_of, room, rows_of
+from servotwin.models.state.records import TILE, numbers_in, object_of, put_fields, record_of, room, rows_of
 from servotwin.models.terms import control
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.dependence import CURVED_Q, SPRING
@@ -211,7 +211,7 @@ def shared_of(sources: Sequence[Source]) -> NDArray[Any]:
     """Return what servos on each of some sources remember together at their start."""
     records = np.zeros(len(sources), SHARED)
     for record, source in zip(records, sources, strict=True):
-        _put(record, at_start(source))
+        put_fields(record, at_start(source))
     return records
 
 
@@ -266,15 +266,8 @@ def _records_of(memories: Sequence[Memory]) -> Memories:
     """Return memories as records."""
     found = nothing_yet(len(memories))
     for record, firm, memory in zip(*found, memories, strict=True):
-        _put(record, memory)
+        put_fields(record, memory)
         own = memory.firm[0]
-        _put(firm, own if hasattr(own, "_fields") else control.frozen(own))
+        put_fields(firm, own if hasattr(own, "_fields") else control.frozen(own))
     return found
 
-
-def _put(record: Any, values: Any) -> None:
-    for (name, _), value in zip(fields_of(type(values)), values, strict=True):
-        if hasattr(value, "_fields"):
-            _put(record[name], value)
-        elif name in (record.dtype.names or ()):  # what programs remember stands elsewhere
-            record[name] = value

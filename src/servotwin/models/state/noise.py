@@ -45,3 +45,15 @@ def gaussian(seed: int, frame: int) -> float:
     b = scrambled(a ^ 0x5BD1E995)
     radius = math.sqrt(-2.0 * math.log((a + 0.5) * _UNIT))
     return radius * math.cos(_TURN * ((b + 0.5) * _UNIT))
+
+
+def uniform(seed: int, number: int) -> float:
+    """Return a draw from 0 to 1, both excluded, by its number, independent of those of `gaussian`.
+
+    Examples
+    --------
+    >>> uniform(1, 0) == uniform(1, 0), 0.0 < uniform(1, 1) < 1.0
+    (True, True)
+    """
+    a = scrambled(number + scrambled(seed + scrambled(seed >> 32)))
+    return (scrambled(a ^ 0x2545F491) + 0.5) * _UNIT

@@ -1,0 +1,170 @@
+"""Servos at a bench as kernels keep them: a record for each, the pulses that they hear, and where they begin."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from servotwin.models.engine.live import shapes
+from servotwin.models.engine.live.screen import Lines, Switch
+from servotwin.models.engine.live.sender import is_lost, next_edge, pass_edge
+from servotwin.models.engine.memory import Inputs, Memories, in_force, memory_at, put_memory, put_started, with_bodies
+from servotwin.models.state.modes import INSIDE, RIGID, Vector
+from servotwin.models.state.records import record_reader, record_writer
+from servotwin.models.terms import play
+from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.numbers import Numbers
+from servotwin.physics.pieces import piece_value
+
+if TYPE_CHECKING:
+    from servotwin.models.engine.live.screen import Floats
+
+UNITS = ("us", "deg", "V")
+"""Units of commands."""
+_SI = (1e-6, math.pi / 180.0, 1.0)
+NEVER = 1e9  # s: when the pulse begins that stands for those before the first
+NONE_BEFORE = Switch(0.0, 0.0, -1)
+
+
+class Follow(NamedTuple):
+    """How a servo follows a kind of command: by a straight line, if it takes it."""
+
+    gain: float
+    offset: float
+
+
+class Post(NamedTuple):
+    """A servo at a bench."""
+
+    numbers: Numbers
+    chip: Chip
+    lines: Lines
+    width: Follow  # in the order of `UNITS`
+    angle: Follow
+    voltage: Follow
+    was: Switch  # how its bridge drove at the end of the latest stretch
+    lowest: float  # where it may begin [rad]
+    highest: float
+    torque: float  # of its load, constant [N m]
+    push: float  # by hand, beside it [N m]
+    accuracy: float  # of what is integrated [rad]
+    seed: int  # of its noise
+    pulsed: int  # 1: it hears a pulse a frame; 0: the command as it is
+    changed: int  # 1: its numbers are others than in the latest stretch
+    command_first: int  # its rows in the table of commands
+    command_count: int
+    curve_first: int  # in that of potentiometers
+    curve_count: int
+    heard: int  # rows of its train of pulses
+
+
+class Told(NamedTuple):
+    """What servos at a bench are told: tables of pieces, of potentiometers, and trains of pulses with their edges."""
+
+    commands: Floats
+    curves: Floats
+    trains: Any  # shape (servos, pulses, 7)
+    edges: Any  # shape (servos, pulses)
+
+
+numbers_of = record_reader("numbers_of", Numbers)
+chip_of = record_reader("chip_of", Chip)
+lines_of = record_reader("lines_of", Lines)
+was_of = record_reader("was_of", Switch)
+put_was = record_writer("put_was", Switch)
+
+
+def take(post: Any, unit: int, shape: int, given: Floats, time: Floats, value: Floats, start: float, table: Floats,
+         ends: Floats) -> int:
+    """Put a command from a time on [s] into a table as a servo follows it; return how many pieces there are.
+
+    `ends` gets its lowest and highest value, and the same of what the servo follows (SI).
+    """
+    follow = post.width if unit == 0 else post.angle if unit == 1 else post.voltage
+    count = shapes.shaped(shape, given, time, value, table)
+    shapes.scaled(table, count, _SI[unit], 0.0)
+    ends[0], ends[1] = shapes.extremes(table, count)
+    shapes.scaled(table, count, follow.gain, follow.offset)
+    ends[2], ends[3] = shapes.extremes(table, count)
+    for n in range(count):
+        table[n, 0] += start
+    return count
+
+
+def asked(post: Any, told: Told, time: float) -> float:
+    """Return what a command asks for at a time [s]."""
+    rows = told.commands[post.command_first:post.command_first + post.command_count]
+    piece, _ = in_force(rows, 0.0, time, 0.0)
+    return piece_value(piece, time)
+
+
+def begin(posts: Any, k: int, told: Told, memories: Memories) -> None:
+    """Let a servo stand, without drive, where its first command asks for."""
+    post = posts[k]
+    first = asked(post, told, 0.0)
+    told.trains[k][0, 0], told.trains[k][0, 1], told.edges[k, 0], post.heard = NEVER, first, NEVER, 1
+    for n in range(2, 7):
+        told.trains[k][0, n] = 0.0
+    angle = min(max(post.lines.per_angle * first + post.lines.angle, post.lowest), post.highest)
+    warm = post.numbers.heat.T_amb
+    put_started(memories, k, Vector(angle, 0.0, 0.0, warm, warm, angle, 0.0),
+                INSIDE if play.present(numbers_of(post.numbers).play) else RIGID)
+    put_was(post.was, NONE_BEFORE)
+    post.changed = 1
+
+
+def change(posts: Any, k: int, memories: Memories) -> None:
+    """Let a servo go on with the numbers that its record has by now."""
+    post = posts[k]
+    memory = with_bodies(memory_at(memories, k), post.numbers.play.half, post.numbers.elastic.k > 0.0)
+    put_memory(memories.rows[k], memory)
+    post.changed = 1
+
+
+def hear(sender: Any, posts: Any, told: Told, pulses: Any, used: Any, until: float) -> None:
+    """Let all servos hear the pulses of the frames that begin before a time [s], which are written down.
+
+    A pulse is edge and width [s], width 0 of one that is lost.
+    """
+    fresh = True
+    edge = next_edge(sender)
+    while edge < until:
+        lost = is_lost(sender)
+        for k in range(len(posts)):
+            if posts[k].pulsed == 1:
+                width = asked(posts[k], told, edge)
+                if not lost:
+                    _take(posts[k], told.trains[k], told.edges[k], edge, width, fresh)
+                n = used[3 * k + 2]
+                if n < len(pulses[k]):
+                    pulses[k][n, 0], pulses[k][n, 1] = edge, 0.0 if lost else width
+                    used[3 * k + 2] = n + 1
+        fresh = fresh and lost
+        pass_edge(sender)
+        edge = next_edge(sender)
+
+
+def _take(post: Any, train: Floats, edges: Floats, edge: float, width: float, fresh: bool) -> None:
+    """Put a pulse behind those of a stretch; the first of it comes behind the latest of the stretch before."""
+    if fresh:
+        last = post.heard - 1
+        post.heard = 0
+        if train[last, 0] < edge:
+            train[0, 0], train[0, 1], edges[0], post.heard = train[last, 0], train[last, 1], edges[last], 1
+    n = post.heard
+    train[n, 0], train[n, 1], edges[n] = edge, width, edge
+    for place in range(2, 7):
+        train[n, place] = 0.0
+    post.heard = n + 1
+
+
+def inputs_of(post: Any, k: int, told: Told, programs: Any) -> Inputs:
+    """Return what a servo is told now."""
+    curve = told.curves[post.curve_first:post.curve_first + post.curve_count]
+    none = told.curves[0:0]
+    if post.pulsed == 1:
+        return Inputs(told.trains[k][:post.heard], none, post.torque + post.push, 0.0, told.edges[k][:post.heard], curve,
+                      post.seed, post.accuracy, programs[k:k + 1])
+    return Inputs(told.commands[post.command_first:post.command_first + post.command_count], none,
+                  post.torque + post.push, 0.0, told.edges[k][:0], curve, post.seed, post.accuracy,
+                  programs[k:k + 1])

@@ -1,0 +1,27 @@
+// Unpack what the page is made of, and begin.
+(async () => {
+  const say = (line) => { const place = document.getElementById("notice"); place.hidden = false; place.textContent = line; };
+  if (!("DecompressionStream" in self && "WebAssembly" in self)) { say("This browser is too old for the bench: it needs WebAssembly and DecompressionStream."); return; }
+  const unpacked = async (id) => {
+    const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (one) => one.charCodeAt(0));
+    return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
+  };
+  try {
+    const [text, code, records] = await Promise.all(["text", "code", "records"].map(unpacked));
+    const { modules, css, world } = JSON.parse(new TextDecoder().decode(text));
+    const style = document.createElement("style");
+    style.textContent = css;
+    document.head.append(style);
+    globalThis.servotwin = { world, module: await WebAssembly.compile(code), records: new Uint8Array(records) };
+    const imports = {};
+    for (const [name, own] of Object.entries(modules)) imports[name] = `data:text/javascript;charset=utf-8,${encodeURIComponent(own)}`;
+    const map = document.createElement("script");
+    map.type = "importmap";
+    map.textContent = JSON.stringify({ imports });
+    document.head.append(map);
+    await import("bench/main.js");
+  } catch (error) {
+    say(`The bench cannot begin: ${error.message}`);
+    throw error;
+  }
+})();
