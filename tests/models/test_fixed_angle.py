@@ -236,7 +236,7 @@ def test_noise_is_that_of_a_potentiometer_not_of_an_encoder():
 
 
 def test_the_packed_program_of_an_encoder_on_its_shaft_is_as_before():
-    encoder = pack(digital(PWM), 0.02)
+    encoder = pack(digital(PWM).given, 0.02)
     assert (encoder.per_volt, encoder.b_o) == (0.0, 0.0)
 
 

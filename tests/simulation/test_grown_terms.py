@@ -32,7 +32,7 @@ def parameters(*names):
 
 def value(name):
     """Return how `pack` asks for a parameter of friction."""
-    return f'model.value_or("friction.{name}", 0.0)'
+    return f"either(given.friction_{name}, 0.0)"
 
 
 def reads(*names):
@@ -55,10 +55,13 @@ def share_balance(""")],
         ('    "share_balance",\n', '    "quadratic_friction",\n    "share_balance",\n')],
     FRICTION: [
         reads("quadratic_friction"), ("    K_eq: float\n", "    K_eq: float\n    K_w: float\n"),
-        ("0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)", "0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)"),
+        ("Friction(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0,", "Friction(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0,"),
         ('**dict.fromkeys(_SHARES, _VARIES)}', '**dict.fromkeys(_SHARES, _VARIES), "K_w": CURVED_W}'),
         ("friction.K_e, 0.0, 0.0, 0.0, 0.0)", "friction.K_e, 0.0, 0.0, 0.0, 0.0, friction.K_w)"),
-        ("_replace(breakaway=", f"_replace(K_w={value('quadratic_friction')}, breakaway="),
+        ("K_m, K_e, K_ms, K_es, K_mq, K_eq)\n\n\ndef _coulomb",
+         f"K_m, K_e, K_ms, K_es, K_mq, K_eq, {value('quadratic_friction')})\n\n\ndef _coulomb"),
+        ("kappa, 0.0, 0.0, 1.0,", "kappa, 0.0, 0.0, 1.0, 0.0,"),
+        ("ratio, 0.0, 0.0, 0.0, 1.0,", "ratio, 0.0, 0.0, 0.0, 1.0, 0.0,"),
         ("    gear_friction_budget,\n", "    gear_friction_budget,\n    quadratic_friction,\n"),
         (SLIDES,
          "    F = coulomb(friction, forward)\n    if friction.K_w > 0.0:\n"
@@ -75,11 +78,11 @@ AN_OFF_STATE = {
                 "THEORY.of(0.0, 1e3))\n")],
     "models/terms/bridge.py": [
         ("READS = (\n", 'READS = (\n    "electronics.off_resistance",\n'),
-        ("    return Bridge(V_ce0 + V_br, R_a + r_c + R_b, off, silence, V_br, 0.0, 0.0)\n",
-         "    resists = 1.0 * np.equal(model.servo.get('electronics.off_state'), 'resist')\n"
-         "    R_off = resists * model.value_or('electronics.off_resistance', 0.0)\n"
-         "    off, silence = (own._replace(R=own.R + R_off) for own in (off, silence))\n"
-         "    return Bridge(V_ce0 + V_br, R_a + r_c + R_b, off, silence, V_br, 0.0, 0.0)\n")]}
+        ("\n\nclass Off(", '_RESIST = place("electronics.off_state", "resist")\n\n\nclass Off('),
+        ("    return Off(V_br + opens * V, given.motor_armature_resistance + (",
+         "    resists = given.electronics_off_state == _RESIST\n"
+         "    R_off = either(given.electronics_off_resistance, 0.0) if resists else 0.0\n"
+         "    return Off(V_br + opens * V, given.motor_armature_resistance + R_off + (")]}
 HEATS = {"thermal.winding_capacity": 0.5, "thermal.housing_capacity": 5.0, "thermal.winding_to_housing": 10.0,
          "thermal.housing_to_ambient": 20.0}
 PLAYS = {"gear.backlash": 0.02, "gear.output_inertia": 1e-3}
@@ -95,47 +98,56 @@ FORMS = {  # of servos that resist between drives: what they have anyway, by the
 # A number in each room, and of friction one of which `depends` says nothing
 NUMBERS = {
     FRICTION: [("    K_eq: float\n", "    K_eq: float\n    new: float = 0.0\n"),
-               ("_replace(breakaway=", f"_replace(new={value('new_friction')}, breakaway="),
+               ("K_m, K_e, K_ms, K_es, K_mq, K_eq)\n\n\ndef _coulomb",
+                f"K_m, K_e, K_ms, K_es, K_mq, K_eq, {value('new_friction')})\n\n\ndef _coulomb"),
                (SLIDES, SLIDES.replace("forward)\n", "forward) + friction.new\n", 1)),
                (HOLDS, HOLDS.replace("forward)\n", "forward) + friction.new\n", 1))],
     "models/terms/shaft.py": [("    b_out: float\n", "    b_out: float\n    new: float = 0.0\n"),
-                              ("J_out=load_inertia,", f"new={value('new_shaft')}, J_out=load_inertia,"),
+                              ("B_L, reduction), J_L, B_L)", f"B_L, reduction), J_L, B_L, {value('new_shaft')})"),
+                              ("import Given\n", "import Given, either\n"),
                               ("dry, against, shaft.b, shaft.J)", "dry, against, shaft.b + shaft.new, shaft.J)")],
     "models/engine/dynamics/coefficients.py": [("damping = (own.b + of_load", "damping = (own.b + own.new + of_load"),
                                       ("0.0, 0.0) - tau[0] -", "0.0, 0.0) - tau[0] - numbers.load.new -")],
     "models/terms/heat.py": [("    magnet: float  # [1/K]\n", "    magnet: float  # [1/K]\n    new: float = 0.0\n"),
-                             ("                magnet=", f"                new={value('new_heat')}, magnet="),
+                             ("magnet_coefficient, 0.0))", f"magnet_coefficient, 0.0), {value('new_heat')})"),
                              ("copper_loss(i, R), flow", "copper_loss(i, R) + heat.new, flow")],
     "models/terms/source.py": [("a regulator gives; inf: a battery\n",
                                 "a regulator gives; inf: a battery\n    new: float = 0.0\n"),
-                               ("I_max=model", f"new={value('new_source')}, I_max=model")],
+                               ("current_limit, math.inf))", f"current_limit, math.inf), {value('new_source')})")],
     "models/terms/bridge.py": [
         ("in the sense of the drive alone\n", "in the sense of the drive alone\n    new: float = 0.0\n"),
         ("bridge.pwm, bridge.one_way)", "bridge.pwm, bridge.one_way, bridge.new)"),
-        ("off, silence, V_br, 0.0, 0.0)", f"off, silence, V_br, 0.0, 0.0, {value('new_bridge')})"),
+        ("silent_coast), V_br, 0.0, 0.0)", f"silent_coast), V_br, 0.0, 0.0, {value('new_bridge')})"),
         ("    R = bridge.R_drive\n", "    R = bridge.R_drive + bridge.new + source.new\n")],
     "models/terms/chip.py": [("from which the bus sags\n", "from which the bus sags\n    new: float = 0.0\n"),
-                             ("timeout=timeout,", f"new={value('new_chip')}, timeout=timeout,")],
+                             ("T_f, given.supply_open_circuit_voltage)",
+                              f"T_f, given.supply_open_circuit_voltage, {value('new_chip')})")],
     "models/terms/frame.py": [("chip.slope, chip.T_0)", "chip.slope, chip.T_0 + chip.new)")],
     "models/terms/load.py": [("    hanging_angle: float\n", "    hanging_angle: float\n    new: float = 0.0\n"),
-                             ("torque = tau + spring", "torque = tau + load.new + spring")],
-    "models/base.py": [("load_term.pack(load),",
-                        f"load_term.pack(load)._replace(new=self.{value('new_load').partition('.')[2]}),")],
+                             ("torque = tau + spring", "torque = tau + load.new + spring"),
+                             ("def pack(hung: Hung)", "def pack(hung: Hung, new: float = 0.0)"),
+                             ("hung.hanging_angle)", "hung.hanging_angle, new)")],
+    "models/terms/packing.py": [
+        (f"load.pack(hung), stops.pack(given), play.pack(given),\n        sensor.pack_{kind}",
+         f"load.pack(hung, {value('new_load')}), stops.pack(given), play.pack(given),\n        sensor.pack_{kind}")
+        for kind in ("pulsed", "counted")],
     "models/terms/stops.py": [("    restitution: float\n", "    restitution: float\n    new: float = 0.0\n"),
-                              ('"stops.restitution", 0.0))', f'"stops.restitution", 0.0), {value("new_stops")})')],
+                              ("stops_restitution, 0.0))", f"stops_restitution, 0.0), {value('new_stops')})")],
     "models/engine/dynamics/contacts.py": [("numbers.stops.restitution)",
                                             "numbers.stops.restitution + numbers.stops.new)")],
     "models/terms/sensor.py": [("from one step to the next; 0: none\n",
                                 "from one step to the next; 0: none\n    new: float = 0.0\n"),
-                               ("_replace(half_slack=", f"_replace(new={value('new_sensor')}, half_slack="),
+                               ("potentiometer_quantisation, 0.0))",
+                                f"potentiometer_quantisation, 0.0), {value('new_sensor')})"),
                                ("    if len(curve) > 0:\n        v_o +=",
                                 "    v_o += sensor.new\n    if len(curve) > 0:\n        v_o +=")],
     "models/terms/firmware.py": [("    b_o: float  # V of", "    new: float  # grown\n    b_o: float  # V of"),
-                                 ("        noise=model", f"        new={value('new_firmware')}, noise=model")],
+                                 ("        noise=either", f"        new={value('new_firmware')}, noise=either")],
     "models/engine/controller.py": [("- firmware.b_o + noise", "- firmware.b_o + firmware.new + noise")],
     "models/terms/elastic.py": [("    hanging_angle: float\n", "    hanging_angle: float\n    new: float = 0.0\n"),
                                 ("        return NO_ELASTIC\n",
-                                 f"        return NO_ELASTIC._replace(new={value('new_elastic')})\n")],
+                                 "        return Elastic(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, "
+                                 f"{value('new_elastic')})\n")],
     "models/engine/dynamics/currents.py": [  # where there is no spring either
         ("    return bridge.loop(numbers.bridge, numbers.source, zone, u)\n",
          "    v, R = bridge.loop(numbers.bridge, numbers.source, zone, u)\n    return v, R + numbers.elastic.new\n")],

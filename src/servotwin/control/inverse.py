@@ -200,7 +200,7 @@ def inverse_of(model: Model, load: Load | Part | None = None) -> ServoInverse:
         viscous_friction=N**2 * model.value("motor.motor_viscous_friction"),
         coulomb_torque_forward=plant.friction.F_forward, coulomb_torque_backward=plant.friction.F_backward,
         friction_slope=N * (model.value_or("friction.zero_crossing_slope", FRICTION_SLOPE) or FRICTION_SLOPE),
-        motor_share=plant.friction.K_m, external_share=plant.friction.K_e, load_inertia=model.load_inertia(weight),
+        motor_share=plant.friction.K_m, external_share=plant.friction.K_e, load_inertia=plant.shaft.J_out,
         load_viscous_friction=weight.viscous_friction,
         voltage_limit=model.value_or("supply.open_circuit_voltage", math.inf) - lost
         if model.servo.get("supply.open_circuit_voltage") is not None else _ENOUGH,

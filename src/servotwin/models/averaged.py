@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, cast, final
 
 import numpy as np
 
 from servotwin import physics
 from servotwin.models.base import KINDS, Line, Model, check_accepted, check_sent, check_travel, feedback_line, solved
-from servotwin.models.terms import friction, sensor
-from servotwin.models.terms.follower import NO_FOLLOWER
-from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms import packing
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from servotwin.loads import Load
+    from servotwin.models.terms.numbers import Numbers
     from servotwin.physics.pieces import Pieces
     from servotwin.signals import Signal
 
@@ -39,12 +38,9 @@ class _Averaged(Model):
                 "electronics.pulse_width_max", "potentiometer.feedback_offset", "gear.output_inertia")
     signals = _SIGNALS
 
-    def _numbers(self, load: Load, inductance: float) -> Numbers:
-        N = self.value("gear.gear_reduction")
-        gain = self.value("electronics.bridge_gain") * self.value("electronics.comparator_gain")
-        return self.body(load, N, inductance)._replace(
-            friction=friction.pack_smoothed(self, N), sensor=sensor.pack(self),
-            follower=NO_FOLLOWER._replace(gain=gain))
+    def pack(self, load: Load) -> Numbers:
+        """Return the plant at the output shaft."""
+        return cast("Numbers", self.made_of(packing.averaged, self.hung(load)))
 
     def _line(self, kind: str) -> Line:
         """Return how the control voltage [V] follows a command of this kind."""
@@ -102,10 +98,6 @@ class AveragedServo(_Averaged):
     requires = _REQUIRES
     layout = ("output_angle", "output_speed")
 
-    def pack(self, load: Load) -> Numbers:
-        """Return the plant at the output shaft."""
-        return self._numbers(load, 0.0)
-
 
 @final
 class AveragedServoInductive(_Averaged):
@@ -123,7 +115,3 @@ class AveragedServoInductive(_Averaged):
 
     requires = (*_REQUIRES, "motor.armature_inductance")
     layout = ("output_angle", "output_speed", "armature_current")
-
-    def pack(self, load: Load) -> Numbers:
-        """Return the plant at the output shaft."""
-        return self._numbers(load, self.value("motor.armature_inductance"))

@@ -13,18 +13,21 @@ from servotwin.errors import CommandError, InputError, LoadError, MissingParamet
 from servotwin.models import outputs
 from servotwin.models.columns import LanePieces, LaneServo, LaneSignal
 from servotwin.models.state.modes import Vector
-from servotwin.models.terms import load as load_term
-from servotwin.models.terms import motor, shaft
-from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.given import Given, given_of
+from servotwin.models.terms.hung import Hung, hung_of
 from servotwin.parameters import Servo
+from servotwin.physics.laws import array_form
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from servotwin.loads import Load
     from servotwin.models.samples import Samples
     from servotwin.models.terms.chip import Chip
     from servotwin.models.terms.firmware import Firmware
+    from servotwin.models.terms.numbers import Numbers
     from servotwin.physics.pieces import Pieces
     from servotwin.signals import Signal
 
@@ -70,6 +73,7 @@ class Model(ABC):
     bears_flexible: ClassVar[bool] = False
     """Whether the class follows a body behind an elastic shaft."""
 
+    _given: Given | None = None
     _packed: tuple[Load, Numbers] | None = None
     _shown: tuple[Load, tuple[str, ...]] | None = None
 
@@ -135,14 +139,23 @@ class Model(ABC):
             return number  # type: ignore[return-value]
         return float(number) if isinstance(number, int | float) else default
 
-    @final
-    def load_inertia(self, load: Load) -> float:
-        """Return J_L [kg m²]: the load's, and that of gear wheel and horn where the servo gives it."""
-        own = self.value_or("gear.output_inertia", 0.0) if "gear.output_inertia" in self.optional else 0.0
-        return load.total_inertia + own
+    @property
+    def given(self) -> Given:
+        """What the servo gives of what this model reads, each a number or a column of lanes."""
+        if self._given is None:
+            self._given = given_of(self._servo, (*self.requires, *self.optional))
+        return self._given
 
-    def body(self, load: Load, reduction: float, inductance: float = 0.0) -> Numbers:
-        """Return motor, shaft and load at the output shaft; all else is absent.
+    def made_of(self, law: Callable[..., Any], *more: Any) -> Any:
+        """Return what a function of `terms` makes of what is given; of columns it makes columns."""
+        given, columns = self.given, isinstance(self._servo, LaneServo)
+        for each in more:
+            for x in each if isinstance(each, tuple) else (each,):
+                columns = columns or isinstance(x, np.ndarray)
+        return (array_form(law) if columns else law)(given, *more)
+
+    def hung(self, load: Load) -> Hung:
+        """Return the numbers of a load.
 
         Raises
         ------
@@ -152,8 +165,7 @@ class Model(ABC):
         if load.flexibles and not self.bears_flexible:
             raise LoadError(f"load.flexible of {type(self).__name__}", got="a body behind an elastic shaft",
                             allowed="PulseServo, PulseServoInductive or DigitalServo, which follow two bodies")
-        return Numbers(motor=motor.pack(self, reduction, inductance), load=load_term.pack(load),
-                       shaft=shaft.pack(self, load, self.load_inertia(load), reduction))
+        return hung_of(load)
 
     @property
     def endless(self) -> bool:

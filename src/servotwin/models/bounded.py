@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, cast, final
 
 import numpy as np
 
@@ -21,14 +21,13 @@ from servotwin.models.base import (
     feedback_line,
     solved,
 )
-from servotwin.models.terms import friction, sensor, stops
-from servotwin.models.terms.follower import Follower
-from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms import packing
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from servotwin.loads import Load
+    from servotwin.models.terms.numbers import Numbers
     from servotwin.physics.pieces import Pieces
     from servotwin.signals import Signal
 
@@ -118,12 +117,7 @@ class BoundedServo(Model):
 
     def pack(self, load: Load) -> Numbers:
         """Return the plant at the output shaft."""
-        N = self.value("gear.gear_reduction")
-        return self.body(load, N)._replace(
-            friction=friction.pack_sticking(self, N), sensor=sensor.pack(self), stops=stops.pack(self),
-            follower=Follower(
-                gain=self.value("electronics.bridge_gain") * self.value("electronics.comparator_gain"),
-                half_deadband=0.5 * self.value_or("electronics.voltage_deadband", 0.0), V_max=self.voltage_limit))
+        return cast("Numbers", self.made_of(packing.bounded, self.hung(load)))
 
     def _line(self, kind: str) -> Line:
         """Return how the control voltage [V] follows a command of this kind."""

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, Any, cast, final
 
 import numpy as np
 
 from servotwin.errors import CommandError, MissingParameterError
 from servotwin.models.base import check_goals, check_travel, clipped
 from servotwin.models.switched import HIDDEN, MOTOR, SHAFT, SwitchedServo
-from servotwin.models.terms import duty, elastic, firmware, friction, heat, play, sensor, source, stops
+from servotwin.models.terms import duty, elastic, firmware, friction, heat, packing, play, sensor, source, stops
 from servotwin.models.terms.firmware import Firmware
-from servotwin.models.terms.numbers import Numbers
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from servotwin.loads import Load
     from servotwin.physics.pieces import Pieces
     from servotwin.signals import Signal
 
@@ -48,6 +46,7 @@ class DigitalServo(SwitchedServo):
     True
     """
 
+    numbers = staticmethod(packing.digital)
     requires = (*MOTOR, "firmware.control_period", "firmware.proportional_gain")
     optional = (
         "gear.output_inertia", *elastic.READS, *play.READS, *friction.READS, *duty.READS, *firmware.READS,
@@ -78,21 +77,9 @@ class DigitalServo(SwitchedServo):
         shown = {*super().available, *goals}
         return tuple(name for name in self.signals if name in shown and name not in missing)
 
-    def pack(self, load: Load) -> Numbers:
-        """Return the plant at the output shaft, with the bridge before it as at full duty."""
-        N = self.value("gear.gear_reduction")
-        return self.body(load, N)._replace(
-            bridge=duty.pack(self), source=source.pack(self), friction=friction.pack(self, N),
-            play=play.pack(self, self.load_inertia(load)), stops=stops.pack(self), sensor=self._sensor(),
-            heat=heat.pack(self), elastic=elastic.pack(self, load, self.load_inertia(load)))
-
-    def _sensor(self) -> sensor.Sensor:
-        encoder = self.servo.get("potentiometer.feedback_gain") is None
-        return sensor.NO_SENSOR if encoder and not self.endless else sensor.pack_pulsed(self)
-
     def firmware(self, signal: Signal | None = None) -> Firmware:
         """Return the numbers of the program; the frame period is that of the command where it gives one."""
-        return firmware.pack(self, self._period(signal))
+        return cast("Firmware", self.made_of(firmware.pack, self._period(signal)))
 
     def command(self, signal: Signal) -> Pieces:
         """Return the pulse width t_a [s], or the goal [rad] of a servo on a bus.

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, cast, final
 
 from servotwin.errors import CommandError
 from servotwin.models.base import Model
-from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms import packing
 
 if TYPE_CHECKING:
     from servotwin.loads import Load
+    from servotwin.models.terms.numbers import Numbers
     from servotwin.physics.pieces import Pieces
     from servotwin.signals import Signal
 
@@ -41,7 +42,7 @@ class DCMotor(Model):
 
     def pack(self, load: Load) -> Numbers:
         """Return the plant at the motor's own shaft."""
-        return self.body(load, 1.0, self.value("motor.armature_inductance"))
+        return cast("Numbers", self.made_of(packing.motor_alone, self.hung(load)))
 
     def command(self, signal: Signal) -> Pieces:
         """Return the armature voltage [V]; other units are refused."""
@@ -71,7 +72,7 @@ class GearedMotor(Model):
 
     def pack(self, load: Load) -> Numbers:
         """Return the plant at the output shaft."""
-        return self.body(load, self.value("gear.gear_reduction"), self.value("motor.armature_inductance"))
+        return cast("Numbers", self.made_of(packing.motor_alone, self.hung(load)))
 
     def command(self, signal: Signal) -> Pieces:
         """Return the armature voltage [V]; other units are refused."""

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import warnings
-from typing import TYPE_CHECKING, Any, final
-
-import numpy as np
+from typing import TYPE_CHECKING, cast, final
 
 from servotwin import physics
 from servotwin.errors import InputError
@@ -14,32 +11,12 @@ from servotwin.loads import Inertia, as_load
 from servotwin.models.bounded import BoundedServo
 from servotwin.models.engine.dynamics.currents import stall_current
 from servotwin.models.switched import HIDDEN, MOTOR, SHAFT, SwitchedServo
-from servotwin.models.terms import bridge, chip, elastic, friction, heat, play, sensor, source, stops
-from servotwin.models.terms.bridge import Bridge
+from servotwin.models.terms import bridge, chip, elastic, friction, heat, packing, play, sensor, source, stops
 from servotwin.models.terms.chip import Chip
-from servotwin.models.terms.numbers import Numbers
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
-    from servotwin.loads import Load
     from servotwin.signals import Signal
-
-
-def _edges_first(timeout: Any, period: Any) -> Any:
-    """Return a timeout, longer by 1e-11 where it is a whole number of frames.
-
-    The edge that comes as it runs out then restarts the clock, whichever way k T_f is rounded.
-    """
-    if np.ndim(timeout) == 0 and math.isinf(timeout):
-        return timeout
-    frames = np.maximum(np.round(timeout / period), 1.0)
-    longer = np.where(abs(timeout - frames * period) <= 1e-9 * period, timeout * (1.0 + 1e-11), timeout)
-    return longer if longer.ndim else float(longer)
-
-
-def _opens(state: Any) -> Any:
-    """Return 1 where a bridge opens, 0 where it brakes."""
-    return np.where(state == "coast", 1.0, 0.0) if isinstance(state, np.ndarray) else float(state == "coast")
 
 
 _REQUIRES = (*MOTOR, "electronics.stretcher_gain", "electronics.one_shot_slope", "potentiometer.feedback_gain")
@@ -48,6 +25,7 @@ _REQUIRES = (*MOTOR, "electronics.stretcher_gain", "electronics.one_shot_slope",
 class _Pulsed(SwitchedServo):
     """What both pulse servos share: the chip and the bridge."""
 
+    numbers = staticmethod(packing.pulsed)
     optional = (
         "gear.output_inertia", *elastic.READS, *play.READS, *friction.READS, *chip.READS, *bridge.READS,
         *sensor.READS, *source.READS, *stops.READS, *heat.READS, "electronics.voltage_to_pulse_gain",
@@ -60,24 +38,9 @@ class _Pulsed(SwitchedServo):
         "housing_temperature",
     )
 
-    def _bridge(self) -> Bridge:
-        """Return the numbers of the bridge; without pulses it is off as between drives unless the servo says more."""
-        off: Any = self.servo.get("electronics.off_state")
-        silence: Any = self.servo.get("electronics.silence_state")
-        return bridge.pack(self, _opens(off), _opens(off if silence is None else silence))
-
-    def _numbers(self, load: Load, inductance: float) -> Numbers:
-        N = self.value("gear.gear_reduction")
-        return self.body(load, N, inductance)._replace(
-            bridge=self._bridge(), source=source.pack(self), friction=friction.pack(self, N),
-            play=play.pack(self, self.load_inertia(load)), stops=stops.pack(self), sensor=sensor.pack_pulsed(self),
-            heat=heat.pack(self), elastic=elastic.pack(self, load, self.load_inertia(load)))
-
     def chip(self, signal: Signal | None = None) -> Chip:
         """Return the numbers of the frame logic; the frame period is that of the command where it gives one."""
-        period = self._period(signal)
-        timeout = _edges_first(self.value_or("electronics.pulse_timeout", math.inf), period)
-        return chip.pack(self, period, timeout)
+        return cast("Chip", self.made_of(chip.pack, self._period(signal)))
 
     def check_mean(self, what: str, more: tuple[str, ...] = ()) -> None:
         """Say in one line where pulses have no mean that grows with the error; `what` is it that would need one.
@@ -148,10 +111,6 @@ class PulseServo(_Pulsed):
     requires = _REQUIRES
     layout = (*SHAFT, *HIDDEN)
 
-    def pack(self, load: Load) -> Numbers:
-        """Return the plant at the output shaft, with the bridge before it."""
-        return self._numbers(load, 0.0)
-
     def averaged(self, frame_period: float | None = None) -> BoundedServo:
         """Return the bounded servo that has the mean voltage of this one's pulses.
 
@@ -217,7 +176,3 @@ class PulseServoInductive(_Pulsed):
 
     requires = (*_REQUIRES, "motor.armature_inductance")
     layout = (*SHAFT, "armature_current", *HIDDEN)
-
-    def pack(self, load: Load) -> Numbers:
-        """Return the plant at the output shaft, with the bridge before it."""
-        return self._numbers(load, self.value("motor.armature_inductance"))

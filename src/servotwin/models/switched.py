@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from bisect import bisect_left
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from servotwin import physics
 from servotwin.errors import CommandError, InputError
 from servotwin.models.base import Line, Model, Place, check_travel, check_widths, clipped, feedback_line, solved
-from servotwin.models.terms import sensor
+from servotwin.models.terms import elastic, play, sensor
+from servotwin.models.terms.chip import FRAME
+from servotwin.models.terms.hung import inertia_on
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from servotwin.loads import Load
+    from servotwin.models.terms.given import Given
+    from servotwin.models.terms.hung import Hung
+    from servotwin.models.terms.numbers import Numbers
     from servotwin.physics.pieces import Pieces
     from servotwin.signals import Signal
 
@@ -37,6 +44,11 @@ class SwitchedServo(Model):
     """A servo whose motor hangs behind a switched bridge and which is told by pulses."""
 
     bears_flexible = True
+
+    @staticmethod
+    @abstractmethod
+    def numbers(given: Given, hung: Hung, error: float) -> Numbers:
+        """Return the numbers of the engine, as `terms.packing` makes them."""
 
     @property
     def available(self) -> tuple[str, ...]:
@@ -65,10 +77,33 @@ class SwitchedServo(Model):
     @property
     def frame_period(self) -> float:
         """T_f of a command that does not bring its own [s]; 20 ms unless the servo gives it."""
-        return self.value_or("electronics.frame_period", 0.02)
+        return self.value_or("electronics.frame_period", FRAME)
 
     def _period(self, signal: Signal | None) -> Any:
         return self.frame_period if signal is None or signal.frame_period is None else signal.frame_period
+
+    def pack(self, load: Load) -> Numbers:
+        """Return the plant at the output shaft, with the bridge before it.
+
+        Raises
+        ------
+        ParameterError, LoadError
+            If servo and load do not fit together.
+        """
+        hung = self.hung(load)
+        J_L = self.made_of(inertia_on, hung)
+        play.check(self.given, J_L)
+        elastic.check(self.given, load, J_L)
+        return cast("Numbers", self.made_of(self.numbers, hung, self.standing_error))
+
+    @property
+    def standing_error(self) -> Any:
+        """What the potentiometer's table adds where the feedback stands [V]; 0 where it does not."""
+        table: list[Any] = [self.servo.get(f"potentiometer.linearity_{name}") for name in ("angle", "error")]
+        if not self.endless or None in table:
+            return 0.0
+        angles, errors = table
+        return physics.linearity_error(self.value("potentiometer.fixed_angle"), angles, errors)
 
     def curve(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Return angles [rad] and errors [V] of the potentiometer's linearity table; empty without, or at a stand."""
@@ -154,7 +189,7 @@ class SwitchedServo(Model):
             raise InputError(f"neutral pulse of {self.servo.name}", got="no potentiometer.fixed_angle",
                              allowed="a servo that turns endlessly, such as servo.continuous(...)")
         return float(physics.pulse_width_from_feedback(
-            sensor.pack_standing(self).b_o, self.value("electronics.one_shot_slope"),
+            sensor.pack_standing(self.given, self.standing_error).b_o, self.value("electronics.one_shot_slope"),
             self.value_or("electronics.one_shot_offset", 0.0)))
 
     def start_angle(self, drive: float) -> float:

@@ -6,9 +6,7 @@ Behind it u is s V, or 0 between drives; the zone is the direction of the curren
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import NamedTuple
 
 from servotwin.models.state.modes import (
     CONDUCTING,
@@ -23,7 +21,7 @@ from servotwin.models.state.modes import (
     sign_of,
 )
 from servotwin.models.terms.dependence import DROPS, ONE_WAY, PULSES, PWM, SHOWN, SILENCE, STRAIGHT
-from servotwin.models.terms.given import Given
+from servotwin.models.terms.given import Given, either, is_given, place
 from servotwin.models.terms.motor import Motor, inductive
 from servotwin.models.terms.source import Source, loaded_voltage, regulated
 from servotwin.physics.bridge import bridge_voltage, driving_voltage, motor_voltage, needed_voltage
@@ -35,6 +33,7 @@ READS = (
     "supply.bridge_drop_resistance",
 )
 """What may be given of a pulse servo."""
+_COAST, _SILENT_COAST = place("electronics.off_state", "coast"), place("electronics.silence_state", "coast")
 
 
 class Off(NamedTuple):
@@ -198,12 +197,20 @@ def drops(bridge: Bridge, source: Source, motor: Motor, u: float) -> tuple[float
     return max(bridge.D_drive - bridge.V_br, 0.0), max(bridge.R_drive - motor.R - source.R_b, 0.0)
 
 
-def pack(model: Given, coast: Any, silent_coast: Any) -> Bridge:
-    """Return the numbers of a model's bridge, which opens between drives, and without pulses, where these are 1."""
-    R_a, R_b = model.value("motor.armature_resistance"), model.value_or("supply.internal_resistance", 0.0)
-    r_c, V_ce0 = (model.value_or(f"supply.bridge_drop_{name}", 0.0) for name in ("resistance", "voltage"))
-    V_oc, V_br = model.value("supply.open_circuit_voltage"), model.value_or("motor.brush_drop_voltage", 0.0)
-    battery = np.all(np.isinf(model.value_or("supply.current_limit", math.inf)))  # a regulator keeps its voltage
-    off, silence = (Off(V_br + opens * (V_oc + V_ce0), R_a + (R_b * opens if battery else 0.0), opens)
-                    for opens in (coast, silent_coast))
-    return Bridge(V_ce0 + V_br, R_a + r_c + R_b, off, silence, V_br, 0.0, 0.0)
+def pack(given: Given) -> Bridge:
+    """Return the numbers of an analog servo's bridge; without pulses it is off as between drives unless told."""
+    coast = 1.0 if given.electronics_off_state == _COAST else 0.0
+    silence = given.electronics_silence_state
+    silent_coast = coast if not is_given(silence) else 1.0 if silence == _SILENT_COAST else 0.0
+    V_ce0, V_br = either(given.supply_bridge_drop_voltage, 0.0), either(given.motor_brush_drop_voltage, 0.0)
+    R = given.motor_armature_resistance + either(given.supply_bridge_drop_resistance, 0.0) + either(
+        given.supply_internal_resistance, 0.0)
+    return Bridge(V_ce0 + V_br, R, opened(given, coast), opened(given, silent_coast), V_br, 0.0, 0.0)
+
+
+def opened(given: Given, opens: float) -> Off:
+    """Return a bridge that does not drive: open (1), or braked (0)."""
+    R_b, V_br = either(given.supply_internal_resistance, 0.0), either(given.motor_brush_drop_voltage, 0.0)
+    battery = either(given.supply_current_limit, math.inf) == math.inf  # a regulator keeps its voltage
+    V = given.supply_open_circuit_voltage + either(given.supply_bridge_drop_voltage, 0.0)
+    return Off(V_br + opens * V, given.motor_armature_resistance + (R_b * opens if battery else 0.0), opens)

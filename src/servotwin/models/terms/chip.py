@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from servotwin.models.terms.dependence import PULSES
-from servotwin.models.terms.given import Given
+from servotwin.models.terms.given import Given, either
 
 READS = (
     "electronics.frame_period", "electronics.deadband", "electronics.minimum_drive_time",
@@ -15,6 +15,8 @@ READS = (
     "electronics.pulse_width_max", "potentiometer.noise",
 )
 """What may be given of a pulse servo."""
+
+FRAME = 0.02  # s, from pulse to pulse where nothing says otherwise
 
 
 class Chip(NamedTuple):
@@ -53,15 +55,25 @@ def needs(chip: Chip) -> int:
     return PULSES if chip.K != 0.0 else 0  # edges may come at times of their own
 
 
-def pack(model: Given, period: Any, timeout: Any) -> Chip:
-    """Return the numbers of a model's chip in frames of so many seconds, of which it misses so many [s]."""
+def pack(given: Given, period: float) -> Chip:
+    """Return the numbers of a servo's chip in frames of so many seconds; nan: the frames that the servo gives."""
+    T_f = either(period, either(given.electronics_frame_period, FRAME))
     return Chip(
-        T_0=model.value_or("electronics.one_shot_offset", 0.0), slope=model.value("electronics.one_shot_slope"),
-        beta=model.value_or("electronics.back_emf_injection", 0.0),
-        c_s=model.value_or("electronics.supply_coupling", 0.0), noise=model.value_or("potentiometer.noise", 0.0),
-        half_deadband=0.5 * model.value_or("electronics.deadband", 0.0),
-        K=model.value("electronics.stretcher_gain"), t_min=model.value_or("electronics.minimum_drive_time", 0.0),
-        tau_s=model.value_or("electronics.stretcher_time_constant", 0.0),
-        shortest=model.value_or("electronics.pulse_width_min", 0.0),
-        longest=model.value_or("electronics.pulse_width_max", math.inf),
-        timeout=timeout, frame_period=period, V_oc=model.value("supply.open_circuit_voltage"))
+        either(given.electronics_one_shot_offset, 0.0), given.electronics_one_shot_slope,
+        either(given.electronics_back_emf_injection, 0.0), either(given.electronics_supply_coupling, 0.0),
+        either(given.potentiometer_noise, 0.0), 0.5 * either(given.electronics_deadband, 0.0),
+        given.electronics_stretcher_gain, either(given.electronics_minimum_drive_time, 0.0),
+        either(given.electronics_stretcher_time_constant, 0.0), either(given.electronics_pulse_width_min, 0.0),
+        either(given.electronics_pulse_width_max, math.inf),
+        _edges_first(either(given.electronics_pulse_timeout, math.inf), T_f), T_f, given.supply_open_circuit_voltage)
+
+
+def _edges_first(timeout: float, period: float) -> float:
+    """Return a timeout [s], longer by 1e-11 where it is a whole number of frames.
+
+    The edge that comes as it runs out then restarts the clock, whichever way k T_f is rounded.
+    """
+    if timeout == math.inf:
+        return timeout
+    frames = max(math.floor(timeout / period + 0.5), 1.0)
+    return timeout * (1.0 + 1e-11) if abs(timeout - frames * period) <= 1e-9 * period else timeout

@@ -7,12 +7,9 @@ I_max/d, and everything that holds for a driven bridge holds for it.
 from __future__ import annotations
 
 import math
-from typing import Any
 
-import numpy as np
-
-from servotwin.models.terms.bridge import Bridge, Off
-from servotwin.models.terms.given import Given
+from servotwin.models.terms.bridge import Bridge, Off, opened
+from servotwin.models.terms.given import Given, either, place
 from servotwin.models.terms.motor import Motor
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.source import Source
@@ -25,7 +22,7 @@ READS = (
 
 BRAKE, DIODE, COAST = 1.0, 2.0, 3.0  # what the bridge does in the pauses of its PWM
 OPEN, BRAKED = 2.0, 3.0  # stand in the place of a duty: torque is off
-_STATES = {None: BRAKE, "brake": BRAKE, "diode": DIODE, "coast": COAST}
+_BRAKE, _DIODE, _COAST = (place("firmware.off_state", word) for word in ("brake", "diode", "coast"))
 
 
 def present(bridge: Bridge) -> bool:
@@ -80,15 +77,12 @@ def on_share_of(bridge: Bridge, duty: float) -> float:
     return abs(duty) if drives(duty) and bridge.pwm == COAST else 1.0
 
 
-def pack(model: Given) -> Bridge:
+def pack(given: Given) -> Bridge:
     """Return the numbers of a digital servo's bridge, as at full duty."""
-    state = model.servo.get("firmware.off_state")
-    kind = np.vectorize(_STATES.get, otypes=[float])(state) if isinstance(state, np.ndarray) else _STATES[state]
-    R_a, R_b = model.value("motor.armature_resistance"), model.value_or("supply.internal_resistance", 0.0)
-    r_c, V_ce0 = (model.value_or(f"supply.bridge_drop_{name}", 0.0) for name in ("resistance", "voltage"))
-    V_oc, V_br = model.value("supply.open_circuit_voltage"), model.value_or("motor.brush_drop_voltage", 0.0)
-    battery: Any = np.all(np.isinf(model.value_or("supply.current_limit", math.inf)))
-    brakes = kind == BRAKE
-    opened = Off(V_br + V_oc + V_ce0, R_a + (R_b if battery else 0.0), 1.0)
-    off = Off(V_br + (1.0 - brakes) * (V_oc + V_ce0), R_a + (1.0 - brakes) * (R_b if battery else 0.0), 1.0 - brakes)
-    return Bridge(V_ce0 + V_br, R_a + r_c + R_b, off, opened, V_br, kind, 0.0)
+    pauses = either(given.firmware_off_state, _BRAKE)
+    kind = DIODE if pauses == _DIODE else COAST if pauses == _COAST else BRAKE
+    V_ce0, V_br = either(given.supply_bridge_drop_voltage, 0.0), either(given.motor_brush_drop_voltage, 0.0)
+    R = given.motor_armature_resistance + either(given.supply_bridge_drop_resistance, 0.0) + either(
+        given.supply_internal_resistance, 0.0)
+    off = opened(given, 0.0 if kind == BRAKE else 1.0)
+    return Bridge(V_ce0 + V_br, R, off, opened(given, 1.0), V_br, kind, 0.0)

@@ -15,7 +15,8 @@ from servotwin.errors import LoadError
 from servotwin.loads import Load
 from servotwin.models.state.modes import PUSH_BACKWARD, PUSH_FORWARD, SPRUNG, Vector
 from servotwin.models.terms.dependence import ON_Q, SPRING, TWO_BODIES
-from servotwin.models.terms.given import Given
+from servotwin.models.terms.given import Given, either, is_given
+from servotwin.models.terms.hung import Hung
 from servotwin.models.terms.shaft import Shaft
 from servotwin.parameters.group import Relation
 from servotwin.physics.shaft import stretch_beyond_play, twist_torque
@@ -101,8 +102,19 @@ def longest_step(elastic: Elastic, shaft: Shaft) -> float:
     return 2.0 * math.pi / (_PART * math.sqrt(elastic.k / first + elastic.k / second))
 
 
-def pack(model: Given, load: Load, load_inertia: Any) -> Elastic:
-    """Return the spring of a model's gear, or of its load.
+def pack(given: Given, hung: Hung) -> Elastic:
+    """Return the spring of a servo's gear, or of its load."""
+    if hung.flexible_stiffness > 0.0:
+        return Elastic(hung.flexible_stiffness, hung.flexible_damping, 0.0, hung.flexible_inertia,
+                       hung.flexible_viscous_friction, hung.flexible_gravity_torque, hung.flexible_hanging_angle)
+    if not is_given(given.gear_stiffness):
+        return NO_ELASTIC
+    return Elastic(given.gear_stiffness, either(given.gear_damping, 0.0), 0.5 * either(given.gear_backlash, 0.0),
+                   0.0, 0.0, 0.0, 0.0)
+
+
+def check(given: Given, load: Load, load_inertia: Any) -> None:
+    """Check the spring of a servo, or of lanes, and that of their load.
 
     Raises
     ------
@@ -111,21 +123,18 @@ def pack(model: Given, load: Load, load_inertia: Any) -> Elastic:
     LoadError
         If there is a body behind the shaft, and the gear is elastic or has play.
     """
-    k: Any = model.servo.get("gear.stiffness")
+    k = given.gear_stiffness
+    has_spring, has_play = (bool(np.any(x == x)) for x in (k, given.gear_backlash))
     if load.flexibles:
-        for name in ("gear.stiffness", "gear.backlash"):
-            if model.servo.get(name) is not None:
+        for name, there in (("gear.stiffness", has_spring), ("gear.backlash", has_play)):
+            if there:
                 raise LoadError("load.flexible", got=f"a servo that gives {name}",
                                 allowed="one whose motor turns with its shaft: two bodies, not three")
-        arm = load.flexible
-        return Elastic(arm.stiffness, arm.damping, 0.0, arm.moment_of_inertia, arm.viscous_friction,
-                       arm.gravity_torque, arm.hanging_angle)
-    if k is None:
-        return NO_ELASTIC
+        return
+    if not has_spring:
+        return
     has_body = np.asarray(np.asarray(load_inertia) > 0.0).ravel()
     alone = has_body.size == 1
     Relation("gear.stiffness", bool(has_body[0]) if alone else has_body,
              k if alone else np.broadcast_to(np.ravel(k), has_body.shape),
              "an elastic gear only with inertia behind it: gear.output_inertia, or a load that has some").check()
-    return Elastic(model.value("gear.stiffness"), model.value_or("gear.damping", 0.0),
-                   0.5 * model.value_or("gear.backlash", 0.0), 0.0, 0.0, 0.0, 0.0)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
-
-from servotwin.models.terms import sensor
+from servotwin.models.terms.chip import FRAME
 from servotwin.models.terms.dependence import AT_COMMANDS, BEYOND, PROGRAM
-from servotwin.models.terms.given import Given
-from servotwin.physics import cut
+from servotwin.models.terms.given import Given, either, place
+from servotwin.models.terms.sensor import stands
+from servotwin.physics.firmware import cut
 
 READS = tuple(f"firmware.{name}" for name in (
     "control_phase", "compute_delay", "angle_quantum", "filter_weight", "deadband_angle", "deadband_law",
@@ -25,6 +24,12 @@ READS = tuple(f"firmware.{name}" for name in (
 """What may be given of a digital servo."""
 
 HOLD, LIMP, FAILSAFE = 0.0, 1.0, 2.0  # what it does without a command
+_GATE, _WHOLE, _OF_MEASUREMENT, _AT_REST, _SENSES_BUS, _BRAKES, _GOALS, _LATCHES, _RESETS, _LIMP, _SAFE = (
+    place(f"firmware.{name}", word) for name, word in (
+        ("deadband_law", "gate"), ("whole_counts", "yes"), ("derivative_of", "measurement"),
+        ("integral_at_rest", "yes"), ("current_sense", "bus"), ("torque_off_state", "brake"), ("command_kind", "goal"),
+        ("overload_latches", "yes"), ("undervoltage_action", "reset"), ("signal_loss", "limp"),
+        ("signal_loss", "failsafe")))
 
 
 class Firmware(NamedTuple):
@@ -117,58 +122,60 @@ def needs(firmware: Firmware) -> int:
     return PROGRAM if firmware.T_c > 0.0 else 0
 
 
-def pack(model: Given, period: Any) -> Firmware:
-    """Return the numbers of a model's firmware, told by pulses in frames of so many seconds."""
-    def of(name: str, default: float = 0.0) -> Any:
-        return model.value_or(f"firmware.{name}", default)
-
-    def word(name: str, *words: str) -> Any:
-        """Return the place of a word among others, from 1 on; 0 where it is none of them."""
-        found = model.servo.get(f"firmware.{name}")
-        if isinstance(found, np.ndarray):
-            return sum((k + 1.0) * (found == one) for k, one in enumerate(words))
-        return words.index(found) + 1.0 if found in words else 0.0
-
-    limit = of("integral_limit")
-    slope, T_0 = model.value_or("electronics.one_shot_slope", 0.0), model.value_or("electronics.one_shot_offset", 0.0)
-    p, b_o = model.value_or("potentiometer.feedback_gain", 0.0), model.value_or("potentiometer.feedback_offset", 0.0)
-    pulses = np.all(np.asarray(slope) * p != 0.0)
+def pack(given: Given, period: float) -> Firmware:
+    """Return the numbers of a servo's program, told by pulses in frames of so many seconds; nan: as the servo says."""
+    slope, T_0 = either(given.electronics_one_shot_slope, 0.0), either(given.electronics_one_shot_offset, 0.0)
+    p, b_o = either(given.potentiometer_feedback_gain, 0.0), either(given.potentiometer_feedback_offset, 0.0)
     s_mu = slope * p
-    # an encoder that stands tells its angle as a voltage would, 1 V a radian
-    per_volt = 1.0 / p if np.all(p != 0.0) else 1.0 if sensor.stands(model) else 0.0
-    half_deadband = 0.5 * model.value_or("electronics.deadband", 0.0) / s_mu if pulses else 0.0
-    quantum, whole = of("angle_quantum"), word("whole_counts", "yes")
+    pulses = s_mu != 0.0
+    half_deadband = 0.5 * either(given.electronics_deadband, 0.0) / s_mu if pulses else 0.0
+    quantum = either(given.firmware_angle_quantum, 0.0)
+    whole = 1.0 if given.firmware_whole_counts == _WHOLE else 0.0
+    limit = either(given.firmware_integral_limit, 0.0)
     return Firmware(
-        T_c=of("control_period"), t_phi=of("control_phase"), T_d=of("compute_delay"), quantum=quantum,
-        weight=of("filter_weight", 1.0), h=cut(of("deadband_angle", half_deadband), whole * quantum),
-        gate=word("deadband_law", "gate"),
-        k_p=of("proportional_gain"), k_i=of("integral_gain"), k_d=of("derivative_gain"),
-        k_v=of("velocity_feedforward"), k_a=of("acceleration_feedforward"),
-        of_measurement=word("derivative_of", "measurement"), m=of("derivative_ticks", 1.0),
-        threshold=of("derivative_threshold"), I_limit=_infinite_where_0(limit), kappa=of("anti_windup"),
-        at_rest=word("integral_at_rest", "yes"), rest_travel=of("rest_travel"), delta=of("duty_quantum"),
-        whole=whole, minimum=of("minimum_duty"), torque_limit=of("torque_limit", 1.0),
-        duty_limit=of("duty_limit", 1.0), slew=of("duty_slew", math.inf), I_m=of("current_limit", math.inf),
-        senses_bus=word("current_sense", "bus"), brakes=word("torque_off_state", "brake"),
-        resolution=of("pulse_resolution"), goals=word("command_kind", "goal"), latency=of("bus_latency"),
-        lower=of("lower_goal", -math.inf), upper=of("upper_goal", math.inf), v=of("speed_limit", math.inf),
-        a=of("acceleration_limit", math.inf), v_0=of("minimum_speed"), overload_duty=of("overload_duty", math.inf),
-        overload_time=of("overload_time"), stall_travel=of("stall_travel", math.inf),
-        overload_output=of("overload_output"), latches=word("overload_latches", "yes"),
-        trip_current=of("trip_current", math.inf), trip_time=of("trip_time"),
-        trip_temperature=of("trip_temperature", math.inf), undervoltage=of("undervoltage"),
-        resets=word("undervoltage_action", "reset"), restart_time=of("restart_time"),
-        timeout=of("signal_timeout", math.inf), loss=word("signal_loss", "limp", "failsafe"),
-        failsafe=of("failsafe_angle"), soft_duty=of("soft_start_duty", math.inf), soft_time=of("soft_start_time"),
-        per_volt=per_volt, per_second=1.0 / s_mu if pulses else 0.0,
+        T_c=given.firmware_control_period, t_phi=either(given.firmware_control_phase, 0.0),
+        T_d=either(given.firmware_compute_delay, 0.0), quantum=quantum,
+        weight=either(given.firmware_filter_weight, 1.0),
+        h=cut(either(given.firmware_deadband_angle, half_deadband), whole * quantum),
+        gate=1.0 if given.firmware_deadband_law == _GATE else 0.0, k_p=given.firmware_proportional_gain,
+        k_i=either(given.firmware_integral_gain, 0.0), k_d=either(given.firmware_derivative_gain, 0.0),
+        k_v=either(given.firmware_velocity_feedforward, 0.0), k_a=either(given.firmware_acceleration_feedforward, 0.0),
+        of_measurement=1.0 if given.firmware_derivative_of == _OF_MEASUREMENT else 0.0,
+        m=either(given.firmware_derivative_ticks, 1.0), threshold=either(given.firmware_derivative_threshold, 0.0),
+        I_limit=math.inf if limit == 0.0 else limit, kappa=either(given.firmware_anti_windup, 0.0),
+        at_rest=1.0 if given.firmware_integral_at_rest == _AT_REST else 0.0,
+        rest_travel=either(given.firmware_rest_travel, 0.0), delta=either(given.firmware_duty_quantum, 0.0),
+        whole=whole, minimum=either(given.firmware_minimum_duty, 0.0),
+        torque_limit=either(given.firmware_torque_limit, 1.0), duty_limit=either(given.firmware_duty_limit, 1.0),
+        slew=either(given.firmware_duty_slew, math.inf), I_m=either(given.firmware_current_limit, math.inf),
+        senses_bus=1.0 if given.firmware_current_sense == _SENSES_BUS else 0.0,
+        brakes=1.0 if given.firmware_torque_off_state == _BRAKES else 0.0,
+        resolution=either(given.firmware_pulse_resolution, 0.0), goals=1.0 if takes_goals(given) else 0.0,
+        latency=either(given.firmware_bus_latency, 0.0), lower=either(given.firmware_lower_goal, -math.inf),
+        upper=either(given.firmware_upper_goal, math.inf), v=either(given.firmware_speed_limit, math.inf),
+        a=either(given.firmware_acceleration_limit, math.inf), v_0=either(given.firmware_minimum_speed, 0.0),
+        overload_duty=either(given.firmware_overload_duty, math.inf),
+        overload_time=either(given.firmware_overload_time, 0.0),
+        stall_travel=either(given.firmware_stall_travel, math.inf),
+        overload_output=either(given.firmware_overload_output, 0.0),
+        latches=1.0 if given.firmware_overload_latches == _LATCHES else 0.0,
+        trip_current=either(given.firmware_trip_current, math.inf), trip_time=either(given.firmware_trip_time, 0.0),
+        trip_temperature=either(given.firmware_trip_temperature, math.inf),
+        undervoltage=either(given.firmware_undervoltage, 0.0),
+        resets=1.0 if given.firmware_undervoltage_action == _RESETS else 0.0,
+        restart_time=either(given.firmware_restart_time, 0.0), timeout=either(given.firmware_signal_timeout, math.inf),
+        loss=LIMP if given.firmware_signal_loss == _LIMP else FAILSAFE if given.firmware_signal_loss == _SAFE else HOLD,
+        failsafe=either(given.firmware_failsafe_angle, 0.0), soft_duty=either(given.firmware_soft_start_duty, math.inf),
+        soft_time=either(given.firmware_soft_start_time, 0.0),
+        # an encoder that stands tells its angle as a voltage would, 1 V a radian
+        per_volt=1.0 / p if p != 0.0 else 1.0 if stands(given) else 0.0, per_second=1.0 / s_mu if pulses else 0.0,
         at_nothing=-(T_0 / slope + b_o) / p if pulses else 0.0,
-        shortest=model.value_or("electronics.pulse_width_min", 0.0),
-        longest=model.value_or("electronics.pulse_width_max", math.inf), T_f=period,
-        noise=model.value_or("potentiometer.noise", 0.0) if np.all(p != 0.0) else 0.0,
-        b_o=b_o if np.all(p != 0.0) else 0.0)
+        shortest=either(given.electronics_pulse_width_min, 0.0),
+        longest=either(given.electronics_pulse_width_max, math.inf),
+        T_f=either(period, either(given.electronics_frame_period, FRAME)),
+        noise=either(given.potentiometer_noise, 0.0) if p != 0.0 else 0.0, b_o=b_o if p != 0.0 else 0.0)
 
 
-def _infinite_where_0(limit: Any) -> Any:
-    """Return a limit, or inf where it is 0, which says that there is none."""
-    limits = np.where(limit == 0.0, math.inf, limit)
-    return limits if limits.ndim else float(limits)
+def takes_goals(given: Given) -> bool:
+    """Tell whether commands are goals on a bus, not pulses."""
+    return given.firmware_command_kind == _GOALS

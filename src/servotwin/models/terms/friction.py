@@ -7,15 +7,13 @@ to be held, up to the budget.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
-
-from servotwin import physics
 from servotwin.models.state.modes import CORE, at_rest
 from servotwin.models.terms.dependence import BY_SHARE, CURVED_W, DRY, FADING, STEEP_W
-from servotwin.models.terms.given import Given
+from servotwin.models.terms.given import Given, either
 from servotwin.physics.friction import breakaway_torque, coulomb_torque
+from servotwin.physics.gear import motor_from_output, output_torque
 from servotwin.physics.load_friction import (
     gear_friction_budget,
     quadratic_gear_friction,
@@ -175,33 +173,38 @@ def holding_friction(friction: Friction, forward: bool, tau_m: float, tau_e: flo
     return sliding_gear_friction(tau_m, tau_e, F, friction.K_m, friction.K_e) + static
 
 
-def pack_smoothed(model: Given, reduction: float) -> Friction:
-    """Return the friction (41) of a model."""
-    return _coulomb(model, reduction)._replace(
-        kappa=physics.motor_from_output(model.value("friction.zero_crossing_slope"), reduction))
+def pack_smoothed(given: Given, reduction: float) -> Friction:
+    """Return the friction (41) of a servo."""
+    forward, backward = _coulomb(given, reduction)
+    kappa = motor_from_output(given.friction_zero_crossing_slope, reduction)
+    return Friction(forward, backward, 1.0, kappa, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def pack_sticking(model: Given, reduction: float) -> Friction:
-    """Return the Coulomb and static friction of a model."""
-    return _coulomb(model, reduction)._replace(breakaway=model.value_or("friction.breakaway_ratio", 1.0))
+def pack_sticking(given: Given, reduction: float) -> Friction:
+    """Return the Coulomb and static friction of a servo."""
+    forward, backward = _coulomb(given, reduction)
+    ratio = either(given.friction_breakaway_ratio, 1.0)
+    return Friction(forward, backward, ratio, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def pack(model: Given, reduction: float) -> Friction:
-    """Return all friction of a model's gear."""
-    share, static = (model.value_or(f"friction.load_friction{name}", 0.0) for name in ("", "_stribeck"))
-    shares: dict[str, Any] = {
-        field: model.value_or(f"friction.load_friction_{name}", 0.0) for field, name in _SHARES.items()}
-    shares["K_m"], shares["K_e"] = shares["K_m"] + share, shares["K_e"] + share
-    shares["K_ms"], shares["K_es"] = shares["K_ms"] + static, shares["K_es"] + static
-    w_s = model.value_or("friction.stribeck_speed", 0.0) / reduction
-    fades = (w_s > 0.0) & (np.asarray(model.value_or("friction.breakaway_ratio", 1.0)) > 1.0)
-    varies = np.asarray(fades | np.any([np.asarray(x) != 0.0 for x in np.broadcast_arrays(*shares.values())], axis=0))
-    changes: Any = np.where(varies, 1.0, 0.0) if varies.ndim else float(varies)
-    return pack_sticking(model, reduction)._replace(
-        varies=changes, w_s=w_s, alpha=model.value_or("friction.stribeck_exponent", 1.0), **shares)
+def pack(given: Given, reduction: float) -> Friction:
+    """Return all friction of a servo's gear."""
+    forward, backward = _coulomb(given, reduction)
+    ratio = either(given.friction_breakaway_ratio, 1.0)
+    w_s = either(given.friction_stribeck_speed, 0.0) / reduction
+    share, static = either(given.friction_load_friction, 0.0), either(given.friction_load_friction_stribeck, 0.0)
+    K_m = either(given.friction_load_friction_motor, 0.0) + share
+    K_e = either(given.friction_load_friction_external, 0.0) + share
+    K_ms = either(given.friction_load_friction_motor_stribeck, 0.0) + static
+    K_es = either(given.friction_load_friction_external_stribeck, 0.0) + static
+    K_mq = either(given.friction_load_friction_motor_quad, 0.0)
+    K_eq = either(given.friction_load_friction_external_quad, 0.0)
+    fading = w_s > 0.0 and ratio > 1.0
+    shares = K_m != 0.0 or K_e != 0.0 or K_ms != 0.0 or K_es != 0.0 or K_mq != 0.0 or K_eq != 0.0
+    return Friction(forward, backward, ratio, 0.0, 1.0 if fading or shares else 0.0, w_s,
+                    either(given.friction_stribeck_exponent, 1.0), K_m, K_e, K_ms, K_es, K_mq, K_eq)
 
 
-def _coulomb(model: Given, reduction: float) -> Friction:
-    return NO_FRICTION._replace(
-        F_forward=physics.output_torque(model.value("friction.coulomb_torque_forward"), reduction),
-        F_backward=physics.output_torque(model.value("friction.coulomb_torque_backward"), reduction))
+def _coulomb(given: Given, reduction: float) -> tuple[float, float]:
+    return (output_torque(given.friction_coulomb_torque_forward, reduction),
+            output_torque(given.friction_coulomb_torque_backward, reduction))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from servotwin.models.terms.dependence import ON_HEAT
-from servotwin.models.terms.given import Given
+from servotwin.models.terms.given import Given, either, is_given
 from servotwin.physics.thermal import REFERENCE_TEMPERATURE, copper_loss, heat_flow, warming_rate
 
 READS = (
@@ -48,12 +48,10 @@ def warming_rates(heat: Heat, R: float, i: float, T_w: float, T_h: float) -> tup
             warming_rate(flow, heat_flow(T_h, heat.T_amb, heat.G_ha), heat.C_h))
 
 
-def pack(model: Given) -> Heat:
+def pack(given: Given) -> Heat:
     """Return the two thermal masses; nothing but ambient temperature where the servo does not give them."""
-    T_amb = model.value_or("thermal.ambient", REFERENCE_TEMPERATURE)
-    if model.servo.get("thermal.winding_capacity") is None:
-        return NO_HEAT._replace(T_amb=T_amb)
-    return Heat(C_w=model.value_or("thermal.winding_capacity", 0.0), C_h=model.value("thermal.housing_capacity"),
-                G_wh=1.0 / model.value("thermal.winding_to_housing"),
-                G_ha=1.0 / model.value("thermal.housing_to_ambient"), T_amb=T_amb,
-                magnet=model.value_or("thermal.magnet_coefficient", 0.0))
+    T_amb = either(given.thermal_ambient, REFERENCE_TEMPERATURE)
+    if not is_given(given.thermal_winding_capacity):
+        return Heat(0.0, 0.0, 0.0, 0.0, T_amb, 0.0)
+    return Heat(given.thermal_winding_capacity, given.thermal_housing_capacity, 1.0 / given.thermal_winding_to_housing,
+                1.0 / given.thermal_housing_to_ambient, T_amb, either(given.thermal_magnet_coefficient, 0.0))

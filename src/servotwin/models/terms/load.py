@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from servotwin import loads
 from servotwin.models.terms.dependence import CURVED_Q, DRY, ON_Q
+from servotwin.models.terms.hung import Hung
 from servotwin.physics.shaft import pendulum_stiffness, pendulum_torque, spring_torque
 
 _TOO_FAR = 1e12  # rad
@@ -70,8 +70,6 @@ def stiffness_at(load: Load, q: float) -> float:
     return k
 
 
-def pack(load: loads.Load) -> Load:
+def pack(hung: Hung) -> Load:
     """Return the numbers of a load."""
-    stiffness, rest_angle = load.elasticity
-    gravity, hanging = load.gravity
-    return Load(load.coulomb_torque, stiffness, rest_angle, gravity, hanging)
+    return Load(hung.coulomb_torque, hung.stiffness, hung.rest_angle, hung.gravity_torque, hung.hanging_angle)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from servotwin import physics
 from servotwin.models.terms.dependence import FREE_RUNNING, ON_I, STRAIGHT
-from servotwin.models.terms.given import Given
+from servotwin.models.terms.given import Given, either
+from servotwin.physics.gear import motor_from_output, output_torque
 
 
 class Motor(NamedTuple):
@@ -38,8 +38,8 @@ def needs(motor: Motor) -> int:
     return 0 if motor.K_b > 0.0 else FREE_RUNNING
 
 
-def pack(model: Given, reduction: float, inductance: float) -> Motor:
-    """Return the numbers of a model's motor."""
-    return Motor(K=physics.output_torque(model.value("motor.torque_constant"), reduction),
-                 K_b=physics.motor_from_output(model.value("motor.back_emf_constant"), reduction),
-                 R=model.value("motor.armature_resistance"), L=inductance)
+def pack(given: Given, reduction: float) -> Motor:
+    """Return the numbers of a servo's motor."""
+    return Motor(output_torque(given.motor_torque_constant, reduction),
+                 motor_from_output(given.motor_back_emf_constant, reduction),
+                 given.motor_armature_resistance, either(given.motor_armature_inductance, 0.0))

@@ -6,13 +6,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from servotwin import physics
 from servotwin.models.state.modes import INSIDE, ON_BACKWARD, ON_FORWARD, Vector, moving
 from servotwin.models.terms.dependence import PLAY, TWO_BODIES
-from servotwin.models.terms.given import Given
+from servotwin.models.terms.given import Given, either, is_given
 from servotwin.models.terms.shaft import Shaft
 from servotwin.parameters.group import Relation
 from servotwin.physics.backlash import impact_speed
+from servotwin.physics.gear import output_torque
+from servotwin.physics.laws import array_form
 
 _LAST_IMPACT = 1e-12  # rad/s: an impact of motor and output this slow is the last one of many
 _BEARING_SHARE = 0.06  # of the Coulomb friction, where the servo does not say: assumed, 0.02 to 0.15
@@ -68,8 +69,25 @@ def ahead(play: Play, mesh: int) -> float:
     return play.half if mesh == ON_FORWARD else -play.half if mesh == ON_BACKWARD else 0.0
 
 
-def pack(model: Given, load_inertia: Any) -> Play:
-    """Return the play of a model's gear and the friction behind it; the play of an elastic gear belongs to its spring.
+def pack(given: Given) -> Play:
+    """Return the play of a servo's gear and the friction behind it; that of an elastic gear belongs to its spring."""
+    play = either(given.gear_backlash, 0.0)
+    if is_given(given.gear_stiffness):
+        return NO_PLAY
+    most = _least_coulomb(given)
+    bearing = either(given.friction_bearing_coulomb_torque, _BEARING_SHARE * most)
+    return Play(0.5 * play, min(bearing, most) if play > 0.0 else 0.0)
+
+
+def _least_coulomb(given: Given) -> float:
+    """Return the smaller Coulomb friction of both ways, at the output shaft [N m]."""
+    N = given.gear_gear_reduction
+    return min(output_torque(given.friction_coulomb_torque_forward, N),
+               output_torque(given.friction_coulomb_torque_backward, N))
+
+
+def check(given: Given, load_inertia: Any) -> None:
+    """Check the play of a servo, or of lanes.
 
     Raises
     ------
@@ -77,22 +95,18 @@ def pack(model: Given, load_inertia: Any) -> Play:
         If there is play without inertia behind it, or more friction behind it than the gear has either way; if there
         is friction behind the play of an elastic gear.
     """
-    given: Any = model.servo.get(_BEARING)
-    if model.servo.get("gear.stiffness") is not None:
-        _require(_BEARING, given is None, given, "none beside gear.stiffness: the output of an elastic gear has the "
-                                                 "dry friction of the load alone")
-        return NO_PLAY
-    play: Any = model.value_or("gear.backlash", 0.0)
-    _require("gear.backlash", (np.asarray(play) == 0.0) | (np.asarray(load_inertia) > 0.0), play,
+    if not np.any(given.gear_backlash > 0.0) and not np.any(given.gear_stiffness > 0.0):
+        return
+    play, bearing = (np.asarray(x) for x in (given.gear_backlash, given.friction_bearing_coulomb_torque))
+    if np.any(given.gear_stiffness == given.gear_stiffness):
+        _require(_BEARING, np.all(bearing != bearing), bearing, "none beside gear.stiffness: the output of an elastic "
+                 "gear has the dry friction of the load alone")
+        return
+    _require("gear.backlash", ~(play > 0.0) | (np.asarray(load_inertia) > 0.0), play,
              "play only with inertia behind it: gear.output_inertia, or a load that has some")
-    N = model.value("gear.gear_reduction")
-    most = np.minimum(*(physics.output_torque(model.value(f"friction.coulomb_torque_{way}"), N)
-                        for way in ("forward", "backward")))
-    bearing = _BEARING_SHARE * most if given is None else np.asarray(given)
-    _require(_BEARING, (np.asarray(play) == 0.0) | (bearing <= most * (1.0 + _ROUNDING)), bearing,
+    most = array_form(_least_coulomb)(given)
+    _require(_BEARING, ~(play > 0.0) | ~(bearing > most * (1.0 + _ROUNDING)), bearing,
              "at most the Coulomb friction either way, at the output shaft: it is a part of that")
-    behind: Any = np.where(np.asarray(play) > 0.0, np.minimum(bearing, most), 0.0)
-    return Play(0.5 * play, behind if behind.ndim else float(behind))
 
 
 def _require(name: str, holds: Any, value: Any, allowed: str) -> None:

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
-from servotwin import physics
 from servotwin.models.terms.dependence import FOLLOWS, ON_Q, PROGRAM, PULSES, SLACK, STEPS
-from servotwin.models.terms.given import Given
+from servotwin.models.terms.given import Given, either, is_given
 from servotwin.models.terms.source import Source
 from servotwin.physics.backlash import play
 from servotwin.physics.electronics import feedback_error
@@ -17,6 +14,7 @@ from servotwin.physics.potentiometer import error_between, feedback_voltage, qua
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import numpy as np
     from numpy.typing import NDArray
 
 READS = (
@@ -94,35 +92,43 @@ def wiper_at(sensor: Sensor, wiper: float, q: float) -> float:
     return play(wiper, q, 2.0 * sensor.half_slack) if sensor.half_slack > 0.0 else q
 
 
-def pack(model: Given) -> Sensor:
-    """Return the numbers of a model's potentiometer, without what pulses alone show of it."""
-    return Sensor(p=model.value("potentiometer.feedback_gain"),
-                  b_o=model.value_or("potentiometer.feedback_offset", 0.0), half_slack=0.0, step=0.0)
+def pack(given: Given) -> Sensor:
+    """Return the numbers of a servo's potentiometer, without what pulses alone show of it."""
+    return Sensor(given.potentiometer_feedback_gain, either(given.potentiometer_feedback_offset, 0.0), 0.0, 0.0)
 
 
-def stands(model: Given) -> bool:
+def stands(given: Given) -> bool:
     """Tell whether the feedback stands still, whatever the shaft does."""
-    return model.servo.get("potentiometer.fixed_angle") is not None
+    return is_given(given.potentiometer_fixed_angle)
 
 
-def pack_standing(model: Given) -> Sensor:
-    """Return the numbers of a feedback that stands: one voltage at every angle, with its table, in its steps.
+def is_encoder(given: Given) -> bool:
+    """Tell whether the angle is counted, by no voltage."""
+    return not is_given(given.potentiometer_feedback_gain)
+
+
+def pack_standing(given: Given, error: float) -> Sensor:
+    """Return the numbers of a feedback that stands: one voltage at every angle, with its table's error, in its steps.
 
     An encoder has no voltage; its angle [rad] stands for one.
     """
-    angle = model.value("potentiometer.fixed_angle")
-    if model.servo.get("potentiometer.feedback_gain") is None:
+    angle = given.potentiometer_fixed_angle
+    if is_encoder(given):
         return Sensor(0.0, angle, 0.0, 0.0)
-    own = pack(model)
-    angles, errors = (model.servo.get(f"potentiometer.linearity_{name}") for name in ("angle", "error"))
-    v_o: Any = physics.sensed_voltage(angle, own.p, own.b_o, angles or (0.0,), errors or (0.0,),
-                                      model.servo.get("potentiometer.quantisation"))
-    return Sensor(0.0, v_o if np.ndim(v_o) else float(v_o), 0.0, 0.0)
+    v_o = feedback_voltage(angle, given.potentiometer_feedback_gain,
+                           either(given.potentiometer_feedback_offset, 0.0)) + error
+    step = given.potentiometer_quantisation
+    return Sensor(0.0, quantised(v_o, step) if is_given(step) else v_o, 0.0, 0.0)
 
 
-def pack_pulsed(model: Given) -> Sensor:
-    """Return all numbers of a model's potentiometer."""
-    if stands(model):
-        return pack_standing(model)
-    return pack(model)._replace(half_slack=0.5 * model.value_or("potentiometer.backlash", 0.0),
-                                step=model.value_or("potentiometer.quantisation", 0.0))
+def pack_pulsed(given: Given, error: float) -> Sensor:
+    """Return all numbers of a servo's potentiometer; `error` is that of its table at the angle where it stands [V]."""
+    if stands(given):
+        return pack_standing(given, error)
+    return Sensor(given.potentiometer_feedback_gain, either(given.potentiometer_feedback_offset, 0.0),
+                  0.5 * either(given.potentiometer_backlash, 0.0), either(given.potentiometer_quantisation, 0.0))
+
+
+def pack_counted(given: Given, error: float) -> Sensor:
+    """Return all numbers of the potentiometer, or the encoder, of a digital servo."""
+    return NO_SENSOR if is_encoder(given) and not stands(given) else pack_pulsed(given, error)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from servotwin import loads, physics
 from servotwin.models.state.modes import BACKWARD, FORWARD, FREE, ON_LOWER, ON_UPPER, STUCK
 from servotwin.models.terms.dependence import BY_SHARE, SHOWN, SPRING, STRAIGHT, TWO_BODIES
 from servotwin.models.terms.given import Given
+from servotwin.models.terms.hung import Hung, inertia_on
 from servotwin.physics.friction import sticks
+from servotwin.physics.gear import output_inertia, output_viscous_friction
 from servotwin.physics.shaft import shaft_acceleration
 
 
@@ -67,9 +68,8 @@ def from_rest(torque: float, backward: float, forward: float, at_upper: bool, at
     return ON_LOWER if at_lower and torque <= 0.0 else FREE
 
 
-def pack(model: Given, load: loads.Load, load_inertia: float, reduction: float) -> Shaft:
-    """Return the numbers of a model's shaft: the motor reflected through the gear, and the load on it."""
-    return Shaft(J=physics.output_inertia(model.value("motor.rotor_inertia"), load_inertia, reduction),
-                 b=physics.output_viscous_friction(
-                     model.value("motor.motor_viscous_friction"), load.viscous_friction, reduction),
-                 J_out=load_inertia, b_out=load.viscous_friction)
+def pack(given: Given, hung: Hung, reduction: float) -> Shaft:
+    """Return the numbers of a servo's shaft: the motor reflected through the gear, and the load on it."""
+    J_L, B_L = inertia_on(given, hung), hung.viscous_friction
+    return Shaft(output_inertia(given.motor_rotor_inertia, J_L, reduction),
+                 output_viscous_friction(given.motor_motor_viscous_friction, B_L, reduction), J_L, B_L)

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from servotwin.models.terms.dependence import FOLLOWS, REGULATED, STRAIGHT
-from servotwin.models.terms.given import Given
+from servotwin.models.terms.given import Given, either
 from servotwin.physics.supply import source_voltage
 
 READS = ("supply.internal_resistance", "supply.current_limit")
@@ -46,7 +46,7 @@ def loaded_voltage(source: Source, taken: float) -> float:
     return source_voltage(taken, source.V, source.R_b, regulated=source.I_max < math.inf)
 
 
-def pack(model: Given) -> Source:
-    """Return the numbers of a model's source."""
-    return Source(V=model.value("supply.open_circuit_voltage"), R_b=model.value_or("supply.internal_resistance", 0.0),
-                  I_max=model.value_or("supply.current_limit", math.inf))
+def pack(given: Given) -> Source:
+    """Return the numbers of a servo's source."""
+    return Source(given.supply_open_circuit_voltage, either(given.supply_internal_resistance, 0.0),
+                  either(given.supply_current_limit, math.inf))

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from servotwin.models.terms.dependence import AT_STOPS
-from servotwin.models.terms.given import Given
+from servotwin.models.terms.given import Given, either
 
 READS = ("stops.lower_angle", "stops.upper_angle", "stops.restitution")
 """What may be given of a pulse servo."""
@@ -25,7 +25,7 @@ ACTS = {"restitution": AT_STOPS}
 """Where each number acts; the angles say when the shaft gets there."""
 
 
-def pack(model: Given) -> Stops:
-    """Return the numbers of a model's stops."""
-    return Stops(model.value_or("stops.lower_angle", -math.inf), model.value_or("stops.upper_angle", math.inf),
-                 model.value_or("stops.restitution", 0.0))
+def pack(given: Given) -> Stops:
+    """Return the numbers of a servo's stops."""
+    return Stops(either(given.stops_lower_angle, -math.inf), either(given.stops_upper_angle, math.inf),
+                 either(given.stops_restitution, 0.0))
