@@ -19,6 +19,7 @@ from servotwin.models.state.records import record_of, rows_of
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.control import Firm
 from servotwin.models.terms.firmware import Firmware
+from servotwin.models.terms.given import Given
 from servotwin.models.terms.numbers import Numbers
 from servotwin.simulation.compile.kinds import (
     BOOL,
@@ -113,20 +114,22 @@ def _of_buses() -> Mapping[str, tuple[Kind, ...]]:
 @cache
 def _of_the_bench() -> Mapping[str, tuple[Kind, ...]]:
     """Return what entries are called with that let servos go on at a bench that is looked at."""
+    from servotwin.models.engine.live.making import Weights
     from servotwin.models.engine.live.posts import Post, Told
     from servotwin.models.engine.live.sender import Sender
 
-    posts, sender = _records(record_of(Post)), _records(record_of(Sender))
+    posts, sender, programs = _records(record_of(Post)), _records(record_of(Sender)), _records(record_of(Firmware))
     told = _tuple(Told, _TABLE, trains=_CUBE)
-    return {"bench:begin": (posts, INT64, told, _MEMORIES), "bench:change": (posts, INT64, _MEMORIES),
+    return {"bench:make": (posts, programs, INT64, INT64, _records(record_of(Given)), _records(record_of(Weights))),
+            "bench:begin": (posts, INT64, told, _MEMORIES), "bench:change": (posts, INT64, _MEMORIES),
             "bench:take": (posts, INT64, INT64, INT64, _FLOATS, _FLOATS, _FLOATS, FLOAT64, _TABLE, _FLOATS),
             "bench:count": (FLOAT64, FLOAT64, INT64, FLOAT64),
             "bench:tune": (sender, FLOAT64), "bench:snapped": (sender, FLOAT64), "bench:next_edge": (sender,),
-            "bench:advance": (posts, told, _records(record_of(Firmware)), _MEMORIES, sender, FLOAT64, FLOAT64, INT64,
+            "bench:advance": (posts, told, programs, _MEMORIES, sender, FLOAT64, FLOAT64, INT64,
                               _CUBE, _CUBE, _CUBE, _INDICES)}
 
 
-_OF_BENCH = ("begin", "change", "take", "count", "tune", "snapped", "next_edge", "advance")
+_OF_BENCH = ("make", "begin", "change", "take", "count", "tune", "snapped", "next_edge", "advance")
 _ELSEWHERE: Mapping[str, Callable[[], Mapping[str, tuple[Kind, ...]]]] = {  # where kinds take more than lanes have
     "digital_batch:go_on": _of_ticks, "leg_runs:go_on": _of_ticks, "leg_runs:go_on_nearly": _of_ticks,
     "coupled_runs:go_on": _of_ticks, **{f"bench:{name}": _of_the_bench for name in _OF_BENCH},

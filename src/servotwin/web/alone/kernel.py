@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 
 from servotwin.errors import ServotwinError
+from servotwin.models.engine.live.making import Weights
 from servotwin.models.engine.live.posts import Post
 from servotwin.models.engine.live.sender import Sender
 from servotwin.models.engine.memory import Memory
 from servotwin.models.state.records import record_of
 from servotwin.models.terms.control import Firm
 from servotwin.models.terms.firmware import Firmware
+from servotwin.models.terms.given import Given
 from servotwin.simulation.compile import Recipe
 from servotwin.simulation.compile.building import printed
 from servotwin.simulation.compile.compilers import Compiler, compilers
@@ -24,7 +26,7 @@ from servotwin.simulation.compile.kinds import Kind, Scalar, Tuple
 from servotwin.simulation.compile.signatures import signatures
 
 BENCH = Recipe("bench", tuple(f"servotwin.models.engine.live.bench:{name}" for name in (
-    "begin", "change", "take", "count", "tune", "snapped", "next_edge", "advance")))
+    "make", "begin", "change", "take", "count", "tune", "snapped", "next_edge", "advance")))
 _INCLUDE = Path(__file__).parent / "include"
 _FLAGS = ("-std=c99", "-Os", "-w", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv",
           "-fno-strict-aliasing", "-mbulk-memory", "-mnontrapping-fptoint", "-nostdlib", f"-I{_INCLUDE}",
@@ -79,7 +81,8 @@ def _compiled(compiler: Compiler, source: Path, made: Path) -> str:
 
 def layout() -> dict[str, Any]:
     """Return where a page finds what it writes and reads: fields of records, and arguments of entries."""
-    kinds = {"post": Post, "sender": Sender, "memory": Memory, "firm": Firm, "program": Firmware}
+    kinds = {"post": Post, "sender": Sender, "memory": Memory, "firm": Firm, "program": Firmware,
+             "given": Given, "weights": Weights}
     records = {name: {"size": record_of(kind).itemsize, "at": _places(record_of(kind))} for name, kind in kinds.items()}
     known = dict(signatures(BENCH))
     entries = {one.name: {"kinds": [_told(kind) for kind in known[one.name]], "result": one.result}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -207,10 +207,10 @@ class LiveBench:
     def _go_on(self, until: float, rate: float, switches: bool, rows: list[list[Row]],
                pulses: list[list[tuple[float, float]]], events: list[tuple[float, str, int]]) -> None:
         if until > self.time:
-            edges, times = self._sender.until(until), looks(self.time, until, rate)
+            edges = self._sender.until(until)
             for k, station in enumerate(self._stations):
                 pulses[k] += station.told.hear(edges)
-            for k, seen in enumerate(self._seen(until, times, switches)):
+            for k, seen in enumerate(self._seen(until, rate, switches)):
                 rows[k] += seen.rows
                 self.rows[k] = rows[k][-1] if rows[k] else self.rows[k]
                 events += [(time, kind, k) for time, kind in seen.events]
@@ -229,10 +229,10 @@ class LiveBench:
                 full = station.model.value("supply.open_circuit_voltage")
                 station.told.look(self.time, row[columns.index("bus_voltage")], full)
 
-    def _seen(self, until: float, times: Sequence[float], switches: bool) -> list[Seen]:
+    def _seen(self, until: float, rate: float, switches: bool) -> list[Seen]:
         if self._supply is not None:
-            return self._supply.advance(until, times, switches=switches)
-        return [station.advance(until, times, switches=switches) for station in self._stations]
+            return self._supply.advance(until, looks(self.time, until, rate), switches=switches)
+        return [station.advance(until, rate, switches=switches) for station in self._stations]
 
     def _catch_up(self, most: float = math.inf) -> None:
         """Do what the scene says was done by now, or, in a hurry, some of it."""
@@ -303,7 +303,8 @@ class LiveBench:
         def put() -> None:
             if "rate" in action.value:
                 self._sender.tune(action.value["rate"])
-            self._sender.lost = action.value.get("lost", self._sender.lost)
+            if "lost" in action.value:
+                self._sender.lose(action.value["lost"])
         self._check_rate(action.value.get("rate", 0.0))
         return [put]
 

@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
+from servotwin.errors import InputError
+from servotwin.models.engine.live import stretch
+from servotwin.models.engine.live.posts import NONE_BEFORE
+from servotwin.models.engine.live.screen import COLUMNS, SHOWN, Looks, Screen, first_look
+from servotwin.models.engine.memory import time_of
+from servotwin.models.engine.step import COMPLETED, DIVERGED
+from servotwin.models.terms import control
 from servotwin.simulation import Simulator
-from servotwin.simulation.engine import Event, Plan, Record, Segment, State
+from servotwin.simulation.engine import Event, Plan, Segment, State, failure
 from servotwin.simulation.sight import Sight, places_of
 from servotwin.simulation.sight import switches as switch_times
+from servotwin.simulation.status import Status
+from servotwin.web.live.lines import lines_of
 from servotwin.web.live.told import Taken, Told
 
 if TYPE_CHECKING:
@@ -18,6 +30,33 @@ if TYPE_CHECKING:
 
 Row = tuple[float, ...]
 _DULL = ("drive ", "current ", "zone", "pulse edge")  # how the names of events begin that come many times a second
+
+
+class Endless:
+    """Rows without an end, as kernels fill them in plain Python; `tell` is told the time [s] now and then."""
+
+    def __init__(self, tell: Callable[[float], object] | None = None) -> None:
+        self.rows: list[list[float]] = []
+        self.tell = tell or float
+
+    def __len__(self) -> int:
+        """Return more than there ever are."""
+        return sys.maxsize
+
+    def __getitem__(self, place: tuple[int, int]) -> float:
+        """Return a number."""
+        return self.rows[place[0]][place[1]]
+
+    def __setitem__(self, place: tuple[int, int], value: float) -> None:
+        """Put a number where it belongs, or behind those of its row."""
+        n, k = place
+        if n == len(self.rows):
+            self.rows.append([])
+        row = self.rows[n]
+        if k == len(row):
+            row.append(value)
+        else:
+            row[k] = value
 
 
 class Seen(NamedTuple):
@@ -53,8 +92,9 @@ class Station:
         self.told = Told(model, command, control)
         self.state = self._simulator.initial(self.told.signal)
         """Everything that it remembers."""
-        self._sight = Sight(model, load)
+        self._look_with(model, load)
         self._last: Segment | None = None
+        self._was = NONE_BEFORE
         self.push = 0.0  # N m, by hand
         self.tell: Callable[[float], object] | None = None
         """Is told the time [s] now and then within a motion."""
@@ -85,20 +125,42 @@ class Station:
         """Go on with other numbers."""
         self.state = change.state
         self.told.put(change.command)
-        self._sight = Sight(change.model, self._simulator.of(change.state).load)
+        self._look_with(change.model, self._simulator.of(change.state).load)
 
-    def advance(self, until: float, times: Sequence[float], *, switches: bool = True) -> Seen:
-        """Go on to a time [s]; return what shows at `times` on the way, and, if asked for, where the bridge switches.
+    def _look_with(self, model: Model, load: Load) -> None:
+        self._sight, self._lines = Sight(model, load), lines_of(model)
+        self._picks = [COLUMNS.index(name) for name in self.columns]
+
+    def advance(self, until: float, rate: float, *, switches: bool = True) -> Seen:
+        """Go on to a time [s]; return what shows at a rate [Hz] on the way, and, if asked for, where the bridge switches.
 
         Raises
         ------
         SimulationError
             If it cannot go on.
         """
-        record, plan = Record([], [], self.tell), self.plan
-        self.state = self._simulator.recorded(self.state, until, self.told.signal, record, external_torque=self.push)
-        looked = with_switches(times, self.switched(record.segments) if switches else [])
-        return self.seen(plan, record.segments, record.events, looked)
+        plan, now = self.plan, self.state
+        screen = Screen(Endless(self.tell), Endless(), np.zeros(2, np.int64))
+        memory = now.memory
+        if plan.digital:
+            memory = memory._replace(firm=(control.thawed(memory.firm[0]),))
+        looks = Looks(first_look(now.time, rate), rate, until, 1, int(switches))
+        try:
+            memory, self._was, status = stretch.go_on(
+                plan.numbers, plan.chip, plan.inputs, memory, plan.numbers != now.numbers, self._was, looks,
+                self._lines, screen)
+        except (ArithmeticError, ValueError) as error:  # numbers beyond what a float holds
+            if isinstance(error, InputError):
+                raise
+            status = DIVERGED
+        if status != COMPLETED:
+            raise failure(Status.of_code(status), time_of(memory))
+        if plan.digital:
+            memory = memory._replace(firm=(control.frozen(memory.firm[0]),))
+        self.state = State(until, now.places, memory, plan.numbers, now.changes)
+        picks = self._picks
+        return Seen([tuple(row[k] for k in picks) for row in screen.rows.rows],
+                    [(time, SHOWN[int(code)]) for time, code in screen.events.rows if int(code) in SHOWN])
 
     @property
     def plan(self) -> Plan:

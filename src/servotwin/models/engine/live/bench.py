@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from servotwin.models.engine.live import making, stretch
 from servotwin.models.engine.live import posts as those
 from servotwin.models.engine.live import sender as transmitter
-from servotwin.models.engine.live import stretch
 from servotwin.models.engine.live.posts import Told
 from servotwin.models.engine.live.screen import Looks, Screen, first_look
 from servotwin.models.engine.memory import Memories, memory_at, put_memory
@@ -16,6 +16,12 @@ from servotwin.physics.converter import counted
 PAUSED = -1  # as a status: the room for what shows is half full
 _LONGEST = 0.1  # s, of a part of the way
 _FRAMES = 48  # of a part
+
+
+def make(posts: Any, programs: Any, k: int, family: int, givens: Any, weights: Any) -> int:
+    """Make a servo of what is given of it and of what hangs on it; return `making.MADE`, or what forbids it."""
+    post = posts[k]
+    return making.make(post, programs[k], family, making.given_in(givens[k]), making.weights_in(weights[k]))
 
 
 def begin(posts: Any, k: int, told: Told, memories: Memories) -> None:

@@ -72,6 +72,10 @@ chip_of = record_reader("chip_of", Chip)
 lines_of = record_reader("lines_of", Lines)
 was_of = record_reader("was_of", Switch)
 put_was = record_writer("put_was", Switch)
+put_numbers = record_writer("put_numbers", Numbers)
+put_chip = record_writer("put_chip", Chip)
+put_lines = record_writer("put_lines", Lines)
+put_follow = record_writer("put_follow", Follow)
 
 
 def take(post: Any, unit: int, shape: int, given: Floats, time: Floats, value: Floats, start: float, table: Floats,

@@ -33,6 +33,8 @@ from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.chip import present as pulsed_chip
 from servotwin.models.terms.numbers import Numbers
 
+PLAIN = True  # the compiler takes it for False
+
 
 def go_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, changed: bool, was: Switch, looks: Looks,
           lines: Lines, screen: Screen) -> tuple[Memory, Switch, int]:
@@ -61,6 +63,8 @@ def go_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, changed:
         idle = idle + 1 if memory.point.time == before.point.time else 0
         if idle > MOST_IDLE:
             return before, was, CHATTER
+        if PLAIN:
+            screen.rows.tell(time_of(memory))  # type: ignore[attr-defined]
         told = told_of(memory, program)
         _note_doings(chip, inputs, numbers, before, said, memory, told, screen)
         if memory.point.time > before.point.time:

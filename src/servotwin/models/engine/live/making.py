@@ -1,0 +1,157 @@
+"""A servo at a bench, made of what is given of it and of what hangs on its shaft."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from servotwin.loads.parts import STANDARD_GRAVITY
+from servotwin.models.engine.live.posts import Follow, put_chip, put_follow, put_lines, put_numbers
+from servotwin.models.engine.live.screen import Lines
+from servotwin.models.state.records import record_reader, record_writer
+from servotwin.models.terms import chip, firmware, packing
+from servotwin.models.terms.chip import NO_CHIP
+from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
+from servotwin.models.terms.given import Given, either, is_given, place
+from servotwin.models.terms.hung import Hung, inertia_on
+from servotwin.physics.electronics import (
+    control_voltage_from_paper_pulse,
+    control_voltage_from_pulse,
+    control_voltage_from_voltage,
+    pulse_width_from_feedback,
+    pulse_width_from_voltage,
+)
+from servotwin.physics.potentiometer import feedback_voltage
+
+AVERAGED, BOUNDED, PULSED, DIGITAL = range(4)
+FAMILIES = {"AveragedServo": AVERAGED, "AveragedServoInductive": AVERAGED, "BoundedServo": BOUNDED,
+            "PulseServo": PULSED, "PulseServoInductive": PULSED, "DigitalServo": DIGITAL}
+"""Which models are made alike."""
+MADE, NO_INERTIA = 0, 1  # how it ends
+_GOALS = place("firmware.command_kind", "goal")
+_NONE = Follow(0.0, 0.0)
+
+
+class Weights(NamedTuple):
+    """What hangs on a shaft at a bench (SI); `torque` pushes towards smaller angles."""
+
+    inertia: float
+    viscous_friction: float
+    torque: float
+    coulomb_torque: float
+    mass: float  # at the end of an arm
+    arm: float  # length of it
+    hanging_angle: float
+
+
+given_in = record_reader("given_in", Given)
+weights_in = record_reader("weights_in", Weights)
+put_program = record_writer("put_program", Firmware)
+
+
+def make(post: Any, program: Any, family: int, given: Given, weights: Weights) -> int:
+    """Make a servo; return `MADE`, or what forbids it: then it is what it was."""
+    hung = hung_of(weights)
+    if (given.gear_backlash > 0.0 or given.gear_stiffness > 0.0) and not inertia_on(given, hung) > 0.0:
+        return NO_INERTIA
+    if family == PULSED:
+        put_numbers(post.numbers, packing.pulsed(given, hung, 0.0))
+    elif family == DIGITAL:
+        put_numbers(post.numbers, packing.digital(given, hung, 0.0))
+    elif family == BOUNDED:
+        put_numbers(post.numbers, packing.bounded(given, hung))
+    else:
+        put_numbers(post.numbers, packing.averaged(given, hung))
+    post.pulsed = 1 if family == PULSED or (family == DIGITAL and given.firmware_command_kind != _GOALS) else 0
+    put_chip(post.chip, chip.pack(given, math.nan) if family == PULSED else NO_CHIP)
+    put_program(program, firmware.pack(given, math.nan) if family == DIGITAL else NO_FIRMWARE)
+    _tell(post, family, given)
+    post.torque = weights.torque
+    return MADE
+
+
+def hung_of(weights: Weights) -> Hung:
+    """Return a load as servos are made of it."""
+    return Hung(weights.inertia + weights.mass * weights.arm * weights.arm, weights.viscous_friction,
+                weights.coulomb_torque, 0.0, 0.0, weights.mass * STANDARD_GRAVITY * weights.arm, weights.hanging_angle,
+                0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def _tell(post: Any, family: int, given: Given) -> None:
+    """Note how a servo follows commands, and where it may begin."""
+    angle = width = voltage = _NONE
+    post.lowest, post.highest = -math.inf, math.inf
+    if family == DIGITAL and given.firmware_command_kind == _GOALS:
+        angle = Follow(1.0, 0.0)
+    elif family == DIGITAL or family == PULSED:
+        told = family == PULSED or (is_given(given.electronics_one_shot_slope)
+                                    and is_given(given.potentiometer_feedback_gain))
+        width = Follow(1.0, 0.0) if told else _NONE
+        if told and not is_given(given.potentiometer_fixed_angle):
+            angle, voltage = _by_pulses(given)
+    else:
+        angle, width, voltage = _by_voltage(family, given)
+    if family != AVERAGED:
+        post.lowest, post.highest = either(given.stops_lower_angle, -math.inf), either(given.stops_upper_angle, math.inf)
+    if family == DIGITAL:
+        post.lowest = max(post.lowest, either(given.firmware_lower_goal, -math.inf))
+        post.highest = min(post.highest, either(given.firmware_upper_goal, math.inf))
+    put_follow(post.width, width)
+    put_follow(post.angle, angle)
+    put_follow(post.voltage, voltage)
+    put_lines(post.lines, Lines(_slope(voltage), _start(voltage), _slope(angle), _start(angle), _slope(width),
+                                _start(width), either(given.gear_gear_reduction, 1.0)))
+
+
+def _by_pulses(given: Given) -> tuple[Follow, Follow]:
+    """Return the pulse width of an angle, and of a voltage."""
+    p, b_o = _feedback(given)
+    slope, T_0 = given.electronics_one_shot_slope, either(given.electronics_one_shot_offset, 0.0)
+    angle = _NONE
+    if is_given(slope) and is_given(p):
+        angle = Follow(pulse_width_from_feedback(p, slope, 0.0), pulse_width_from_feedback(b_o, slope, T_0))
+    k_p1, t_0 = given.electronics_voltage_to_pulse_gain, either(given.electronics_command_pulse_offset, 0.0)
+    if not is_given(k_p1):
+        return angle, _NONE
+    return angle, Follow(pulse_width_from_voltage(1.0, k_p1, 0.0), pulse_width_from_voltage(0.0, k_p1, t_0))
+
+
+def _by_voltage(family: int, given: Given) -> tuple[Follow, Follow, Follow]:
+    """Return the control voltage of an angle, of a pulse width, and of a voltage."""
+    p, b_o = _feedback(given)
+    slope, k_p2 = given.electronics_one_shot_slope, given.electronics_pulse_to_voltage_gain
+    T_0, b_i = given.electronics_one_shot_offset, given.electronics_command_offset
+    t_0, k_p1 = either(given.electronics_command_pulse_offset, 0.0), given.electronics_voltage_to_pulse_gain
+    if family == AVERAGED:
+        b_i = either(b_i, 0.0)
+        width = Follow(control_voltage_from_paper_pulse(1.0, k_p2, 0.0, 0.0),
+                       control_voltage_from_paper_pulse(0.0, k_p2, t_0, b_i))
+    else:
+        slope = either(slope, 1.0 / k_p2)
+        k_p2 = either(k_p2, 1.0 / slope)
+        if is_given(T_0) or is_given(b_i):
+            T_0 = either(T_0, slope * (k_p2 * t_0 - b_i))
+            b_i = either(b_i, k_p2 * t_0 - T_0 / slope)
+        else:
+            T_0, b_i = 0.0, 0.0
+        width = Follow(control_voltage_from_pulse(1.0, slope, 0.0), control_voltage_from_pulse(0.0, slope, T_0))
+    if not is_given(k_p1):
+        return Follow(p, b_o), width, _NONE
+    return Follow(p, b_o), width, Follow(control_voltage_from_voltage(1.0, k_p1, k_p2, 0.0),
+                                         control_voltage_from_voltage(0.0, k_p1, k_p2, b_i))
+
+
+def _feedback(given: Given) -> tuple[float, float]:
+    """Return how the feedback voltage [V] follows the angle [rad]."""
+    p, b_o = given.potentiometer_feedback_gain, either(given.potentiometer_feedback_offset, 0.0)
+    return feedback_voltage(1.0, p, 0.0), feedback_voltage(0.0, p, b_o)
+
+
+def _slope(line: Follow) -> float:
+    """Return by how much a command changes with what the servo follows; 0 where it takes none."""
+    return 1.0 / line.gain if line.gain != 0.0 else 0.0
+
+
+def _start(line: Follow) -> float:
+    """Return the command where what the servo follows is 0."""
+    return -line.offset / line.gain if line.gain != 0.0 else 0.0
