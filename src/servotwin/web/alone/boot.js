@@ -7,12 +7,12 @@
     return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
   };
   try {
-    const [text, code, records] = await Promise.all(["text", "code", "records"].map(unpacked));
+    const [text, code] = await Promise.all(["text", "code"].map(unpacked));
     const { modules, css, world } = JSON.parse(new TextDecoder().decode(text));
     const style = document.createElement("style");
     style.textContent = css;
     document.head.append(style);
-    globalThis.servotwin = { world, module: await WebAssembly.compile(code), records: new Uint8Array(records) };
+    globalThis.servotwin = { world, module: await WebAssembly.compile(code) };
     const imports = {};
     for (const [name, own] of Object.entries(modules)) imports[name] = `data:text/javascript;charset=utf-8,${encodeURIComponent(own)}`;
     const map = document.createElement("script");

@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from servotwin.models.engine.live.posts import NEVER
+from servotwin.models.engine.memory import ACCURACY
+from servotwin.models.engine.live.screen import USED
 from servotwin.models.engine.live.shapes import PERIODS
 from servotwin.physics.pieces import Piece
-from servotwin.web.live.actions import RATES
-from servotwin.web.live.scene import FORMAT, MOST_ACTIONS, MOST_SERVOS
+from servotwin.web.live.said import FRAME_RATE, RATES
+from servotwin.web.live.scene import FORMAT, LONGEST_TEXT, MOST_ACTIONS, MOST_SERVOS, MOST_VIEW
 from servotwin.web.server import pace, room, stint
 
 _ROWS, _EVENTS, _PULSES, _TRAIN, _GIVEN = 4096, 512, 1024, 64, 8  # room for what shows, and what is told
@@ -23,9 +25,9 @@ def limits() -> dict[str, Any]:
     (1e-06, 10.0)
     """
     return {
-        "rows": _ROWS, "events": _EVENTS, "pulses": _PULSES, "train": _TRAIN, "given": _GIVEN,
+        "rows": _ROWS, "events": _EVENTS, "pulses": _PULSES, "train": _TRAIN, "used": USED, "given": _GIVEN,
         "piece": len(Piece._fields), "most_pieces": 2 * PERIODS + 1, "never": NEVER,
-        "frame_rate": 50.0, "rates": RATES, "format": FORMAT, "actions": MOST_ACTIONS, "servos": MOST_SERVOS,
+        "frame_rate": FRAME_RATE, "accuracy": ACCURACY, "rates": RATES, "format": FORMAT, "actions": MOST_ACTIONS, "servos": MOST_SERVOS, "text": LONGEST_TEXT, "view": MOST_VIEW,
         "speeds": pace.SPEEDS, "unpaced": pace.UNPACED, "over": pace.OVER, "late": pace.LATE,
         "rate": room.RATE, "points": room.POINTS, "coarsest": room.COARSEST, "frame_points": room.FRAME_POINTS,
         "tick": room.TICK, "rounding": room.ROUNDING, "far": room.FAR, "pause": 1e3 / room.RATE,

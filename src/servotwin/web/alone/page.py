@@ -35,11 +35,11 @@ def page(first: Scene) -> str:
     NoCompilerError
         If no compiler at hand makes WebAssembly.
     """
-    known, records = world(first)
+    known = world(first)
     code = kernel.module()
     text = {"modules": modules(), "css": _css(), "world": {**known, "layout": kernel.layout()}}
     pieces = {"text": json.dumps(text, ensure_ascii=False, separators=(",", ":"), allow_nan=False).encode(),
-              "code": code, "records": records}
+              "code": code}
     html = (_PAGE / "index.html").read_text("utf-8")
     icon = base64.b64encode((_PAGE / "icon.svg").read_bytes()).decode()
     head = (f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'

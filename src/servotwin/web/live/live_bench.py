@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from servotwin.parameters import Servo
 
 _AT_FIRST = 200  # actions at t = 0 that are done at once: what scenes have
-_WHOLE = ("command", "push", "torque")  # of these the last at an instant is all that counts
+WHOLE = ("command", "push", "torque")  # of these the last at an instant is all that counts
 
 
 class ServoPush(NamedTuple):
@@ -249,7 +249,7 @@ class LiveBench:
         for watch in self._watches:
             watch.begin(self.time)
         last = self._done[-1] if len(self._done) > self._begun else None
-        if last is not None and action.kind in _WHOLE and (last.time, last.kind, last.servo) == (
+        if last is not None and action.kind in WHOLE and (last.time, last.kind, last.servo) == (
                 action.time, action.kind, action.servo):
             self._done.pop()  # a slider that is dragged while time stands
         self._done.append(action)

@@ -23,9 +23,9 @@ FORMAT = 1
 MOST_SERVOS = 6
 LONGEST_TEXT = 16_000_000  # characters
 MOST_ACTIONS = 100_000
-_MOST_VIEW = 4000  # characters
-_TABLES = ("load", "supply", "control", "view", "lesson")
-_TOP = ("format", "name", "seed", "frame_rate", "end", "actions", "servo", *_TABLES)
+MOST_VIEW = 4000  # characters
+TABLES = ("load", "supply", "control", "view", "lesson")
+TOP = ("format", "name", "seed", "frame_rate", "end", "actions", "servo", *TABLES)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +84,7 @@ class Scene:
             lines += ["actions = [", *(f"  {toml_value(action.row())}," for action in self.actions), "]"]
         for servo in self.servos:
             lines += ["", "[[servo]]", *servo.lines()]
-        for key in _TABLES:
+        for key in TABLES:
             table = getattr(self, key)
             if table:
                 lines += ["", f"[{key}]", *(toml_line(name, value) for name, value in table.items())]
@@ -128,8 +128,8 @@ def read_scene(text: str) -> Scene:
         raise InputError("scene", got=f"{len(text)} characters", allowed=f"at most {LONGEST_TEXT}")
     content = _content(text)
     for key in content:
-        if key not in _TOP:
-            raise UnknownNameError("key of a scene", key, _TOP)
+        if key not in TOP:
+            raise UnknownNameError("key of a scene", key, TOP)
     if content.get("format") != FORMAT:
         raise InputError("format of a scene", got=content.get("format"), allowed=f"{FORMAT}")
     servos = content.get("servo")
@@ -163,8 +163,8 @@ def checked_view(view: Any) -> dict[str, Any]:
     {'window': 5.0}
     """
     found: dict[str, Any] = checked(VIEW, view)
-    if sum(len(name) + len(str(one)) for name, one in found.items()) > _MOST_VIEW:
-        raise InputError("view", got="more than that", allowed=f"{_MOST_VIEW} characters in all")
+    if sum(len(name) + len(str(one)) for name, one in found.items()) > MOST_VIEW:
+        raise InputError("view", got="more than that", allowed=f"{MOST_VIEW} characters in all")
     return found
 
 

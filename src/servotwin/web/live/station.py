@@ -11,7 +11,7 @@ import numpy as np
 from servotwin.errors import InputError
 from servotwin.models.engine.live import stretch
 from servotwin.models.engine.live.posts import NONE_BEFORE
-from servotwin.models.engine.live.screen import COLUMNS, SHOWN, Looks, Screen, first_look
+from servotwin.models.engine.live.screen import COLUMNS, SHOWN, USED, Looks, Screen, first_look
 from servotwin.models.engine.memory import time_of
 from servotwin.models.engine.step import COMPLETED, DIVERGED
 from servotwin.models.terms import control
@@ -140,7 +140,7 @@ class Station:
             If it cannot go on.
         """
         plan, now = self.plan, self.state
-        screen = Screen(Endless(self.tell), Endless(), np.zeros(2, np.int64))
+        screen = Screen(Endless(self.tell), Endless(), np.zeros(USED, np.int64))
         memory = now.memory
         if plan.digital:
             memory = memory._replace(firm=(control.thawed(memory.firm[0]),))

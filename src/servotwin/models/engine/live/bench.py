@@ -8,7 +8,7 @@ from servotwin.models.engine.live import making, stretch
 from servotwin.models.engine.live import posts as those
 from servotwin.models.engine.live import sender as transmitter
 from servotwin.models.engine.live.posts import Told
-from servotwin.models.engine.live.screen import Looks, Screen, first_look
+from servotwin.models.engine.live.screen import NEXT, USED, Looks, Screen, first_look
 from servotwin.models.engine.memory import Memories, memory_at, put_memory
 from servotwin.models.engine.step import COMPLETED
 from servotwin.physics.converter import counted
@@ -16,6 +16,7 @@ from servotwin.physics.converter import counted
 PAUSED = -1  # as a status: the room for what shows is half full
 _LONGEST = 0.1  # s, of a part of the way
 _FRAMES = 48  # of a part
+_REST = 1e-9  # s, of the way: no part of its own
 
 
 def make(posts: Any, programs: Any, k: int, family: int, givens: Any, weights: Any) -> int:
@@ -64,30 +65,30 @@ def advance(posts: Any, told: Told, programs: Any, memories: Memories, sender: A
             switches: int, rows: Any, events: Any, pulses: Any, used: Any) -> int:
     """Go on to a time [s]; return a status.
 
-    Each servo has tables `rows`, `events` and `pulses` for what shows, and how much of these is `used`: three numbers.
+    Each servo has tables `rows`, `events` and `pulses` for what shows, and how much of these is `used`, as `Screen` has it.
     The sender's time is how far the bench has come.
     """
     now = sender[0]
     k = first_look(now.time, rate)
-    for n in range(len(posts) * 3):
-        used[n] = 0
+    for n in range(len(posts)):
+        used[USED * n], used[USED * n + 1], used[USED * n + 2], used[USED * n + NEXT] = 0, 0, 0, k
     while transmitter.snapped(now, until) > now.time:
         for n in range(len(posts)):
-            if used[3 * n] * 2 > len(rows[n]) or used[3 * n + 1] * 2 > len(events[n]) or (
-                    used[3 * n + 2] * 2 > len(pulses[n])):
+            if used[USED * n] * 2 > len(rows[n]) or used[USED * n + 1] * 2 > len(events[n]) or (
+                    used[USED * n + 2] * 2 > len(pulses[n])):
                 return PAUSED
         end = min(transmitter.snapped(now, until), now.base + (now.count + _FRAMES) / now.rate, now.time + _LONGEST,
-                  (k + len(rows[0]) // 4) / rate)
+                  now.time + len(rows[0]) / (4.0 * rate))
+        end = transmitter.snapped(now, until) if until - end <= _REST else end
         those.hear(now, posts, told, pulses, used, end)
-        looks = Looks(k, rate, end, 1 if end == transmitter.snapped(now, until) else 0, switches)
+        last = 1 if end == transmitter.snapped(now, until) else 0
         for n in range(len(posts)):
+            looks = Looks(used[USED * n + NEXT], rate, end, last, switches)
             status = _advance_one(posts[n], n, told, programs, memories, looks,
-                                  Screen(rows[n], events[n], used[3 * n:3 * n + 2]))
+                                  Screen(rows[n], events[n], used[USED * n:USED * n + USED]))
             if status != COMPLETED:
                 return status
         now.time = end
-        while k / rate < end:
-            k += 1
     return COMPLETED
 
 

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.models.engine.live import shapes
-from servotwin.models.engine.live.screen import Lines, Switch
+from servotwin.models.engine.live.screen import USED, Lines, Switch
 from servotwin.models.engine.live.sender import is_lost, next_edge, pass_edge
 from servotwin.models.engine.memory import Inputs, Memories, in_force, memory_at, put_memory, put_started, with_bodies
 from servotwin.models.state.modes import INSIDE, RIGID, Vector
@@ -139,10 +139,10 @@ def hear(sender: Any, posts: Any, told: Told, pulses: Any, used: Any, until: flo
                 width = asked(posts[k], told, edge)
                 if not lost:
                     _take(posts[k], told.trains[k], told.edges[k], edge, width, fresh)
-                n = used[3 * k + 2]
+                n = used[USED * k + 2]
                 if n < len(pulses[k]):
                     pulses[k][n, 0], pulses[k][n, 1] = edge, 0.0 if lost else width
-                    used[3 * k + 2] = n + 1
+                    used[USED * k + 2] = n + 1
         fresh = fresh and lost
         pass_edge(sender)
         edge = next_edge(sender)

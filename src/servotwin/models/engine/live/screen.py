@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Indices = NDArray[np.int64]
 
+USED, NEXT = 4, 3  # numbers of what is used: rows, events, pulses, and the number of the next look
 COMMANDS = ("command_voltage", "command_angle", "pulse_width")
 COLUMNS = ("time", *Observed._fields, "output_angle", "output_speed", *COMMANDS)
 """What a row has, before one picks what a servo really shows (SI)."""
@@ -64,7 +65,7 @@ class Switch(NamedTuple):
 
 
 class Screen(NamedTuple):
-    """Room for what shows: rows of `COLUMNS`, events (time, code), and how much of each is used."""
+    """Room for what shows: rows of `COLUMNS`, events (time, code); how much of each is used, and at `NEXT` what comes."""
 
     rows: Floats
     events: Floats

@@ -7,6 +7,7 @@ from servotwin.models.engine.events import guards
 from servotwin.models.engine.legs.legs import MOST_SHORT
 from servotwin.models.engine.live.screen import (
     HELD,
+    NEXT,
     REFUSED,
     SILENCE,
     TRIPS,
@@ -87,13 +88,17 @@ def go_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, changed:
             memory, held = calmed(numbers, chip, inputs, memory)
             if held > 0:
                 note(screen, time_of(memory), HELD)
+    if m.kind == motion.IMPOSSIBLE:  # it had arrived before
+        screen.used[NEXT] = k
+        return memory, was, COMPLETED
     time = k / looks.rate
-    while time < looks.until:  # next to the end
+    while time < looks.until and (looks.at_end == 1 or not program):  # next to the end
         m = see(screen, lines, inputs, memory, told, m, wiper, time)
         k += 1
         time = k / looks.rate
     if looks.at_end == 1:
         see(screen, lines, inputs, memory, told, m, wiper, looks.until)
+    screen.used[NEXT] = k
     if program:
         controller.pause(inputs, memory)
     return memory, was, COMPLETED

@@ -1,39 +1,131 @@
-// What is known of the servos of a bench.
+// The servos of a bench: what is given of them, what the panels show of them, and between what commands may be.
 
-import { refuse } from "./check.js";
+import { Refused, filled, refuse, tidy, unknown, within, wrong } from "./check.js";
 
-export class Facts {
-  /** @param {any} world @param {any} scene */
-  constructor(world, scene) {
+/** @typedef {{time: number, kind: string, value: any, servo: number|null}} Action */
+
+export class Servo {
+  /**
+   * @param {any} world
+   * @param {any} one a servo of a scene
+   * @param {any} scene
+   */
+  constructor(world, one, scene) {
     this.world = world;
-    this.servos = scene.servos.map((/** @type {any} */ one) => {
-      if (!one.id) refuse("only_with_server");
-      if (!(one.id in world.servos)) refuse("unknown_servo", one.id);
-      return { ...one, ...world.servos[one.id], model: one.model || world.servos[one.id].model };
-    });
-    this.models = this.servos.map((/** @type {any} */ one) => one.of[one.model] ?? refuse("no_such_model", one.model));
+    if (!("id" in one) || Object.keys(one.registers).length) refuse("only_with_server");
+    const known = world.servos[one.id];
+    if (!known) unknown("servo", one.id, Object.keys(world.servos));
+    this.known = known;
+    this.id = one.id;
+    this.model = one.model || known.model;
+    this.own = known.of[this.model] ?? refuse("no_such_model", this.model, known);
+    const { reads, family } = world.models[this.model];
+    this.family = family;
+    this.reads = new Set(reads);
+    /** @type {Map<string, any>} */
+    this.values = new Map(world.parameters.map(([name], /** @type {number} */ n) => [name, known.values[n][world.of_each.indexOf("value")]]));
+    /** @type {Map<string, {value: any, source: string}>} values that are others than the catalog's */
+    this.changed = new Map();
+    this.load = { ...world.no_load, ...scene.load };
+    this.change(one.parameters);
+    if (Object.keys(scene.supply).length) {
+      if (!world.switched.includes(this.model)) refuse("only_with_server");
+      refuse("no_shared_supply");
+    }
   }
 
-  /** @param {number} k @returns {boolean} */
-  isDigital(k) { return this.models[k].columns.includes("duty"); }
+  get columns() { return this.own.columns; }
 
-  /** @returns {any[]} each servo as the page's panels know it */
-  all() {
-    const { world } = this;
-    return this.servos.map((/** @type {any} */ servo, /** @type {number} */ k) => {
-      const model = this.models[k];
-      const reads = new Set(world.reads[servo.model]);
-      return { servo: k, id: servo.id, title: servo.title, kind: servo.kind, model: servo.model, models: servo.models,
-        horn: servo.horn, registers: servo.registers, columns: model.columns, travel_deg: model.travel_deg,
-        pulse_us: model.pulse_us, voltage: model.voltage, loop: model.loop,
-        signals: Object.fromEntries(model.columns.slice(1).map((/** @type {string} */ name) => [name, world.signals[name]])),
-        parameters: world.parameters.map((/** @type {any[]} */ own, /** @type {number} */ n) => ({
-          ...joined(world.of_all, own), ...joined(world.of_each, servo.values[n]), read: reads.has(own[0]) })) };
+  /** @param {string} name @returns {any} a value, or the usual one */
+  value(name) { return this.values.get(name); }
+
+  /** @param {Record<string, any>} values by dotted names; nothing has changed where one is refused */
+  change(values) {
+    const next = new Map(this.values);
+    for (const [name, value] of Object.entries(values)) {
+      const place = this.world.parameters.findIndex((/** @type {any[]} */ own) => own[0] === name);
+      if (place < 0) unknown("parameter", name, this.world.parameters.map((/** @type {any[]} */ own) => own[0]));
+      this.looked(name, value, this.world.parameters[place]);
+      next.set(name, value);
+    }
+    for (const [low, high] of this.world.less) {
+      const [a, b] = [next.get(low), next.get(high)];
+      if (Number.isFinite(a) && Number.isFinite(b) && !(a < b)) wrong(low, a, `less than ${high} = ${b}`);
+    }
+    this.values = next;
+    for (const [name, value] of Object.entries(values)) this.changed.set(name, value);
+  }
+
+  /** @param {string} name @param {any} value @param {any[]} own what is alike of all servos */
+  looked(name, value, own) {
+    const { of_all: names, ranges } = this.world;
+    const [rule, choices, unit] = ["rule", "choices", "unit"].map((one) => own[names.indexOf(one)]);
+    if (choices) { if (!choices.includes(value)) wrong(name, value, choices.join(" or ")); }
+    else if (!(rule in ranges)) refuse("only_with_server");
+    else if (!Number.isFinite(value) || !within(ranges[rule], value)) wrong(name, value, `${rule} [${unit}]`);
+  }
+
+  /** @returns {[string, number][]} fields of what is given, as the kernel takes them */
+  given() {
+    const { given, parameters, of_all: names } = this.world;
+    return parameters.map((/** @type {any[]} */ own) => {
+      const value = this.reads.has(own[0]) ? this.values.get(own[0]) : null;
+      const choices = own[names.indexOf("choices")];
+      return [given[own[0]], value === null || value === undefined || Array.isArray(value) ? NaN : choices ? choices.indexOf(value) : value];
     });
   }
 
-  /** @param {any} live @param {any} action @returns {(() => void)[]} */
-  set(live, action) { return refuse("only_with_server", action.value); }
+  /**
+   * Refuse a command that goes beyond bounds.
+   * @param {any} command
+   * @param {number[]} ends lowest and highest of the command, and of what the servo follows
+   * @param {number} start [s]
+   */
+  bound(command, ends, start) {
+    const bounds = this.own.bounds[command.unit] ?? this.untold(this.world.kinds[command.unit]);
+    const end = (/** @type {any} */ one, /** @type {number} */ none) => {
+      const [name, usual] = Array.isArray(one) ? one : [null, one];
+      return (name && this.value(name)) ?? usual ?? none;
+    };
+    for (const one of bounds) {
+      const [lowest, highest] = one.of === "command" ? ends : ends.slice(2);
+      const [low, high] = [end(one.low, -Infinity), end(one.high, Infinity)];
+      const slack = one.slack ?? 0;
+      const below = one.open ? lowest <= low : lowest < low - slack;
+      if (!below && !(one.open ? highest >= high : highest > high + slack)) continue;
+      const [got, from, to] = [below ? lowest : highest, low, high].map((x) => tidy(x * one.factor));
+      throw new Refused(filled(one.words, { got, low: from, high: to, name: this.id, start }));
+    }
+  }
+
+  /** Refuse a kind of command that it does not take. @param {string} word @returns {never} */
+  untold(word) {
+    const goals = this.values.get("firmware.command_kind") === "goal" && this.reads.has("firmware.command_kind");
+    return refuse(goals ? "takes_goals" : "no_such_command", null, { name: this.id, word, kind: word.replaceAll("_", " ") });
+  }
+
+  /** @param {number} k @returns {any} what the panels know of it */
+  facts(k) {
+    const { world, known, own } = this;
+    return { servo: k, id: known.id, title: known.title, kind: known.kind, model: this.model, models: known.models,
+      horn: known.horn, registers: null, columns: own.columns, travel_deg: own.travel_deg, pulse_us: own.pulse_us,
+      voltage: own.voltage, loop: own.loop,
+      signals: Object.fromEntries(own.columns.slice(1).map((/** @type {string} */ name) => [name, world.signals[name]])),
+      parameters: world.parameters.map((/** @type {any[]} */ alike, /** @type {number} */ n) => {
+        const name = alike[0];
+        const set = this.changed.has(name) ? { value: this.changed.get(name), ...world.set } : {};
+        return { ...joined(world.of_all, alike), ...joined(world.of_each, known.values[n]), ...set, read: this.reads.has(name) };
+      }) };
+  }
+
+  /** @returns {Servo} the same, of which something may change */
+  copy() {
+    const copy = Object.assign(Object.create(Servo.prototype), this);
+    copy.load = { ...this.load };
+    copy.values = new Map(this.values);
+    copy.changed = new Map(this.changed);
+    return copy;
+  }
 }
 
 /** @param {string[]} names @param {any[]} values */

@@ -1,7 +1,9 @@
 // Servos that go on at a bench: what the kernel keeps of them, and what shows.
 
+import { refuse } from "./check.js";
+
 /** @typedef {import("./kernel.js").Kernel} Kernel */
-/** @typedef {{record: number, columns: string[], bounds: Record<string, any[]>}} Model */
+/** @typedef {import("./facts.js").Servo} Servo */
 /** @typedef {{shape: string, unit: string, [field: string]: any}} Command */
 
 const PAUSED = -1;
@@ -10,18 +12,17 @@ export class Going {
   /**
    * @param {Kernel} kernel
    * @param {any} world
-   * @param {Uint8Array} records
-   * @param {Model[]} models
+   * @param {Servo[]} servos
    * @param {{seed: number, frame_rate: number}} scene
    */
-  constructor(kernel, world, records, models, scene) {
+  constructor(kernel, world, servos, scene) {
     kernel.clear();
-    const n = models.length;
+    const n = servos.length;
     const { rows, events, pulses, train } = world.limits;
     const width = world.columns.length;
     this.kernel = kernel;
     this.world = world;
-    this.models = models;
+    this.columns = servos.map((one) => one.columns);
     this.posts = kernel.records("post", n);
     this.programs = kernel.records("program", n);
     this.memories = [kernel.records("memory", n), kernel.records("firm", n)];
@@ -29,8 +30,8 @@ export class Going {
     this.rows = kernel.take(n, rows, width);
     this.events = kernel.take(n, events, 2);
     this.pulses = kernel.take(n, pulses, 2);
-    this.used = kernel.take(3 * n);
-    this.ends = kernel.take(4);
+    this.used = kernel.take(n * world.limits.used);
+    this.ends = kernel.take(2, 2);
     this.given = kernel.take(world.limits.given);
     this.none = { address: this.ends.address, lengths: [0] };
     this.room = 2 * n * world.limits.most_pieces; // rows of the table of commands
@@ -38,16 +39,16 @@ export class Going {
     this.told = [this.commands, { ...this.none, lengths: [0, 2] }, kernel.take(n, train, world.limits.piece), kernel.take(n, train)];
     /** @type {number[][]} rows of the table of commands that are about to be followed: the first, and how many */
     this.pending = [];
-    const { post, program } = kernel.layout.records;
-    models.forEach((model, k) => {
-      const at = model.record * (post.size + program.size);
-      kernel.put("post", this.posts, k, records.subarray(at, at + post.size));
-      kernel.put("program", this.programs, k, records.subarray(at + post.size, at + post.size + program.size));
+    this.givens = kernel.records("given", n);
+    this.weights = kernel.records("weights", n);
+    servos.forEach((servo, k) => {
       kernel.set("post", this.posts, k, "seed", scene.seed + k);
+      kernel.set("post", this.posts, k, "accuracy", world.limits.accuracy);
+      this.make(k, servo);
     });
     kernel.set("sender", this.sender, 0, "rate", scene.frame_rate);
     kernel.set("sender", this.sender, 0, "seed", scene.seed);
-    this.picks = models.map((model) => model.columns.map((name) => world.columns.indexOf(name)));
+    this.picks = this.columns.map((names) => names.map((/** @type {string} */ name) => world.columns.indexOf(name)));
   }
 
   get time() { return this.kernel.get("sender", this.sender, 0, "time"); }
@@ -103,8 +104,8 @@ export class Going {
 
   /** @param {number} rows @returns {number} where so many rows stand that no servo follows */
   place(rows) {
-    const { kernel, models, world } = this;
-    const followed = models.map((_, k) => ["command_first", "command_count"].map((name) => kernel.get("post", this.posts, k, name)));
+    const { kernel, world } = this;
+    const followed = this.columns.map((_, k) => ["command_first", "command_count"].map((name) => kernel.get("post", this.posts, k, name)));
     const spans = [...followed, ...this.pending].filter(([, count]) => count).sort((a, b) => a[0] - b[0]);
     let at = 0;
     for (const [first, count] of spans) {
@@ -129,11 +130,30 @@ export class Going {
     return block;
   }
 
+  /**
+   * Make a servo of what is given of it.
+   * @param {number} k
+   * @param {Servo} servo
+   */
+  make(k, servo) {
+    const { kernel } = this;
+    for (const [field, value] of servo.given()) if (field) kernel.set("given", this.givens, k, field, value);
+    for (const [field, value] of Object.entries(servo.load)) kernel.set("weights", this.weights, k, field, value);
+    const how = kernel.call("make", this.posts, this.programs, k, servo.family, this.givens, this.weights);
+    if (how) refuse(this.world.made[how], servo.value("gear.backlash"));
+  }
+
+  /** Go on with a servo that was made anew. @param {number} k */
+  change(k) { this.kernel.call("change", this.posts, k, this.memories); }
+
   /** @param {number} k */
   begin(k) { this.kernel.call("begin", this.posts, k, this.told, this.memories); }
 
   /** @param {number} k @param {number} torque [N m] */
   push(k, torque) { this.kernel.set("post", this.posts, k, "push", torque); }
+
+  /** @param {number} k @returns {boolean} whether a servo hears pulses */
+  hears(k) { return this.kernel.get("post", this.posts, k, "pulsed") === 1; }
 
   /** @param {number} rate [Hz] */
   tune(rate) { this.kernel.call("tune", this.sender, rate); }
@@ -159,8 +179,8 @@ export class Going {
     const width = world.columns.length;
     /** @type {[number, string, number][]} */
     const said = [];
-    const parts = this.models.map((model, k) => {
-      const [seen, noted, heard] = used.slice(3 * k, 3 * k + 3);
+    const parts = this.columns.map((columns, k) => {
+      const [seen, noted, heard] = used.slice(k * world.limits.used, (k + 1) * world.limits.used);
       const all = kernel.numbers(this.rows, k * rows * width, seen * width);
       const picks = this.picks[k];
       const points = new Float64Array(seen * picks.length);
@@ -170,7 +190,7 @@ export class Going {
         const word = world.events[events_[2 * n + 1]];
         if (word) said.push([events_[2 * n], word, k]);
       }
-      return { columns: model.columns, points, pulses: kernel.numbers(this.pulses, k * pulses * 2, heard * 2).slice() };
+      return { columns, points, pulses: kernel.numbers(this.pulses, k * pulses * 2, heard * 2).slice() };
     });
     const wrong = status === 0 || status === PAUSED ? null : world.status[status];
     return { time: this.time, parts, events: said, wrong };

@@ -4,7 +4,7 @@ import { Refused, speak } from "./check.js";
 import { Kernel } from "./kernel.js";
 import { Room } from "./room.js";
 
-const { world, module, records } = /** @type {any} */ (globalThis).servotwin;
+const { world, module } = /** @type {any} */ (globalThis).servotwin;
 
 /**
  * @param {{told: (message: any) => void, pushed: (header: any, parts: any[]) => void}} page
@@ -17,7 +17,7 @@ export function connect(page) {
   const live = () => { room.turn(); setTimeout(live, world.limits.pause); };
   queueMicrotask(() => {
     page.told({ hello: { role: "own", alone: world.words.alone, lessons: world.lessons } });
-    room = new Room({ kernel: new Kernel(module, world.layout), world, records }, page);
+    room = new Room({ kernel: new Kernel(module, world.layout), world }, page);
     live();
   });
   return { open: true, say: async (message) => {

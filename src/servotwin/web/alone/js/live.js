@@ -1,8 +1,8 @@
 // The bench of the page as one file: what was done at it, and its servos that go on.
 
-import { Facts } from "./facts.js";
+import { Refused, checked, refuse, tidy, unknown, wrong } from "./check.js";
+import { Servo } from "./facts.js";
 import { Going } from "./going.js";
-import { Refused, bounded, refuse } from "./check.js";
 
 /** @typedef {{time: number, kind: string, value: any, servo: number|null}} Action */
 
@@ -10,24 +10,29 @@ export class Live {
   /**
    * @param {import("./kernel.js").Kernel} kernel
    * @param {any} world
-   * @param {Uint8Array} records
    * @param {any} scene as `read` returns it
    */
-  constructor(kernel, world, records, scene) {
+  constructor(kernel, world, scene) {
     this.world = world;
     this.scene = { ...scene };
-    this.facts = new Facts(world, scene);
-    this.going = new Going(kernel, world, records, this.facts.models, scene);
+    this.servos = scene.servos.map((/** @type {any} */ one) => new Servo(world, one, scene));
+    this.going = new Going(kernel, world, this.servos, scene);
+    /** @type {{command: any, time: number}[]} what each servo is told now */
+    this.told = [];
+    /** @type {Record<string, number>} what was changed of loads since the start, by dotted names */
+    this.loads = {};
+    this.lost = 0;
     /** @type {Action[]} */
     this.todo = [...this.firstOnes(), ...scene.actions];
     /** @type {Action[]} */
     this.done = [];
     this.begun = this.begins();
-    this.facts.models.forEach((_, k) => {
+    this.servos.forEach((/** @type {Servo} */ _, /** @type {number} */ k) => {
       const first = this.todo.find((one) => one.kind === "command" && (one.servo === null || one.servo === k));
-      this.going.follow(k, this.takes(k, /** @type {Action} */ (first).value, 0));
+      this.follow(k, this.takes(k, /** @type {Action} */ (first).value, 0));
       this.going.begin(k);
     });
+    this.fits(scene.frame_rate);
     this.catchUp();
   }
 
@@ -42,16 +47,16 @@ export class Live {
     const said = this.scene.actions.filter((/** @type {Action} */ one) => one.kind === "command" && one.time === 0);
     if (said.some((/** @type {Action} */ one) => one.servo === null)) return [];
     const told = new Set(said.map((/** @type {Action} */ one) => one.servo));
-    const found = this.facts.models.map((model, k) => ({ k, value: model.middle })).filter(({ k }) => !told.has(k));
+    const found = this.servos.map((/** @type {Servo} */ one, /** @type {number} */ k) => ({ k, value: one.own.middle })).filter((/** @type {any} */ one) => !told.has(one.k));
     const hold = (/** @type {number} */ value, /** @type {number|null} */ servo) => ({ time: 0, kind: "command", servo,
       value: { shape: this.world.hold, unit: this.world.degrees, value } });
-    if (!told.size && new Set(found.map((one) => one.value)).size === 1) return [hold(found[0].value, null)];
-    return found.map(({ k, value }) => hold(value, k));
+    if (!told.size && new Set(found.map((/** @type {any} */ one) => one.value)).size === 1) return [hold(found[0].value, null)];
+    return found.map((/** @type {any} */ one) => hold(one.value, one.k));
   }
 
   /** @returns {number} how many actions at the front say where all servos begin */
   begins() {
-    const left = new Set(this.facts.models.keys());
+    const left = new Set(this.servos.keys());
     for (const [n, one] of this.todo.entries()) {
       if (!left.size) return n;
       if (one.kind === "command" && one.servo === null) left.clear();
@@ -60,11 +65,22 @@ export class Live {
     return this.todo.length;
   }
 
-  /** @param {number} k @param {any} command @param {number} time */
-  takes(k, command, time) {
+  /** @param {number} k @param {any} command @param {number} time @param {Servo} [servo] that is to follow it */
+  takes(k, command, time, servo = this.servos[k]) {
     const taken = this.going.taken(k, command, time);
-    bounded(this.facts.models[k].bounds[command.unit], taken.ends, this.facts.servos[k]);
-    return taken;
+    servo.bound(command, taken.ends, time);
+    return { ...taken, command, time };
+  }
+
+  /** @param {number} k @param {{first: number, count: number, command: any, time: number, ends: number[]}} taken */
+  follow(k, taken) {
+    this.told[k] = taken;
+    this.going.follow(k, taken);
+  }
+
+  /** Refuse frames that some pulse does not fit into. @param {number} rate [Hz] */
+  fits(rate) {
+    if (this.told.some((one, k) => this.going.hears(k) && /** @type {any} */ (one).ends.at(-1) * rate >= 1)) refuse("frame_rate", `${tidy(rate)} Hz`);
   }
 
   /** Do what the scene says was done by now. */
@@ -86,13 +102,13 @@ export class Live {
   /** @param {string} kind @param {any} value @param {number|null} servo @returns {Action} */
   do(kind, value, servo) {
     if (this.done.length + this.todo.length >= this.world.limits.actions) refuse("too_many_actions");
-    const action = { time: this.time, kind, value, servo };
+    const action = said(this.world, this.servos.length, [this.time, kind, value, servo]);
     this.act(action);
     return action;
   }
 
   /** @param {Action} action @returns {number[]} */
-  those(action) { return action.servo === null ? [...this.facts.models.keys()] : [action.servo]; }
+  those(action) { return action.servo === null ? [...this.servos.keys()] : [action.servo]; }
 
   /**
    * Go on to a time, or to what is to be done before.
@@ -110,21 +126,72 @@ export class Live {
   }
 }
 
+/**
+ * Return an action that has been looked at.
+ * @param {any} world
+ * @param {number} servos how many there are
+ * @param {any[]} row time, kind, value and servo
+ * @returns {Action}
+ */
+export function said(world, servos, [time, kind, value, servo = null]) {
+  const { actions, for_all: all } = world.rules;
+  if (!Object.hasOwn(actions, kind)) wrong("kind of action", kind, Object.keys(actions).join(", "));
+  if (servo !== null && !(Number.isInteger(servo) && servo >= 0 && servo < servos)) wrong("servo of an action", servo, `a whole number from 0 to ${servos - 1}`);
+  if (servo !== null && all.includes(kind)) wrong("servo of an action", servo, "none: all servos hear one transmitter");
+  return { time, kind, value: checked(actions[kind], value), servo };
+}
+
+/** @param {Live} live @param {Action} action @returns {(() => void)[]} */
+function set(live, action) {
+  const { world } = live;
+  const names = Object.keys(action.value);
+  const isLoad = (/** @type {string} */ name) => name in world.load;
+  for (const name of names) if (!isLoad(name) && !(name in world.given)) unknown("parameter", name, Object.keys(world.given));
+  const those = live.those(action).map((k) => ({ k, own: names.filter((name) => isLoad(name) || live.servos[k].reads.has(name)) }))
+    .filter(({ own }) => own.length);
+  if (!those.length) wrong(names.join(", "), "no servo here reads it", "what a model here reads");
+  const made = [];
+  try {
+    for (const { k, own } of those) {
+      const servo = live.servos[k].copy();
+      for (const name of own.filter(isLoad)) servo.load[world.load[name]] = checked(world.rules.loads[name], action.value[name], name);
+      servo.change(Object.fromEntries(own.filter((name) => !isLoad(name)).map((name) => [name, action.value[name]])));
+      made.push({ k, servo });
+      live.going.make(k, servo);
+      const { command, time } = live.told[k];
+      Object.assign(made[made.length - 1], { taken: live.takes(k, command, time, servo) });
+    }
+  } catch (error) {
+    for (const { k } of made) live.going.make(k, live.servos[k]); // as before
+    throw error;
+  }
+  return [...made.map(({ k, servo, taken }) => () => {
+    live.servos[k] = servo;
+    live.follow(k, taken);
+    live.going.change(k);
+  }), () => Object.assign(live.loads, Object.fromEntries(names.filter(isLoad).map((name) => [name, action.value[name]])))];
+}
+
 /** @type {Record<string, (live: Live, action: Action) => (() => void)[]>} */
 const WAYS = {
   command: (live, action) => live.those(action).map((k) => ({ k, taken: live.takes(k, action.value, action.time) }))
-    .map(({ k, taken }) => () => live.going.follow(k, taken)),
+    .map(({ k, taken }) => () => live.follow(k, taken)),
   push: (live, action) => live.those(action).map((k) => () => live.going.push(k, action.value)),
   torque: (live, action) => {
-    const those = live.those(action).filter((k) => action.servo !== null || live.facts.isDigital(k));
-    if (!those.length || !those.every((k) => live.facts.isDigital(k))) refuse("no_torque_switch", action.value);
+    const digital = (/** @type {number} */ k) => live.servos[k].columns.includes("duty");
+    const those = live.those(action).filter((k) => action.servo !== null || digital(k));
+    if (!those.length) refuse("no_torque_switch", action.value);
+    for (const k of those) if (!digital(k)) refuse("no_torque", action.value, { model: live.servos[k].model });
     return those.map((k) => () => live.going.torque(k, action.value));
   },
-  frames: (live, action) => [() => {
-    if ("rate" in action.value) live.going.tune(action.value.rate);
-    if ("lost" in action.value) live.going.lose(action.value.lost);
-  }],
-  set: (live, action) => live.facts.set(live, action),
+  frames: (live, action) => {
+    if ("rate" in action.value) live.fits(action.value.rate);
+    return [() => {
+      if ("rate" in action.value) live.going.tune(action.value.rate);
+      if ("lost" in action.value) live.going.lose(action.value.lost);
+    }];
+  },
+  set,
   register: () => refuse("only_with_server"),
   control: () => refuse("only_with_server"),
 };

@@ -1,23 +1,21 @@
 // A room: a bench that goes on in real time, and the page that looks at it.
 
 import { Live } from "./live.js";
-import { Refused, refuse } from "./check.js";
+import { Refused, refuse, wrong } from "./check.js";
 import { Pace } from "./pace.js";
-import { fragment, read, unfragment, written } from "./scene.js";
+import { fragment, read, servo, unfragment, view, written } from "./scene.js";
 
 const now = () => performance.now() / 1000; // s
 
 export class Room {
   /**
-   * @param {any} parts kernel, world and records
+   * @param {any} parts kernel and world
    * @param {{told: (message: any) => void, pushed: (header: any, parts: any[]) => void}} page
    */
   constructor(parts, page) {
-    const { kernel, world, records } = parts;
-    Object.assign(this, parts);
+    const { kernel, world } = parts;
     this.kernel = kernel;
     this.world = world;
-    this.records = records;
     this.page = page;
     this.pace = new Pace(world.limits, now());
     /** @type {string|null} */
@@ -33,7 +31,7 @@ export class Room {
   put(scene) {
     const before = this.live;
     try {
-      this.live = new Live(this.kernel, this.world, this.records, { ...scene, end: 0 });
+      this.live = new Live(this.kernel, this.world, { ...scene, end: 0 });
     } catch (error) {
       if (before) this.live = this.again(before); // the kernel has one bench at a time
       throw error;
@@ -50,7 +48,7 @@ export class Room {
   /** @param {Live} before @returns {Live} the same bench once more, at the time that it had come to */
   again(before) {
     const scene = before.now();
-    const live = new Live(this.kernel, this.world, this.records, { ...scene, end: 0 });
+    const live = new Live(this.kernel, this.world, { ...scene, end: 0 });
     while (!live.going.reached(scene.end)) live.advance(scene.end, this.world.limits.coarsest);
     return live;
   }
@@ -58,10 +56,17 @@ export class Room {
   state() {
     const live = /** @type {Live} */ (this.live);
     const scene = live.now();
-    return { scene: written(this.world, scene), name: scene.name, servos: live.facts.all(), loads: this.world.loads,
+    return { scene: written(this.world, scene), name: scene.name, servos: live.servos.map((one, k) => one.facts(k)), loads: this.loads(),
       view: scene.view, lesson: scene.lesson, supply: filled(scene.supply), control: filled(scene.control),
       of_catalog: scene.servos.map((/** @type {any} */ one) => one.id ?? null), frame_rate: live.going.rate, unknowns: [],
       running: this.pace.running, speed: this.speed, end: this.end };
+  }
+
+  /** @returns {any[]} the controls of what hangs on the shafts */
+  loads() {
+    const live = /** @type {Live} */ (this.live);
+    return this.world.loads.map((/** @type {any} */ one) => ({ ...one,
+      value: live.loads[one.name] ?? live.scene.load[this.world.load[one.name]] ?? one.value }));
   }
 
   get speed() { return Number.isFinite(this.pace.speed) ? this.pace.speed : this.world.limits.unpaced; }
@@ -121,7 +126,7 @@ export class Room {
   /** @param {any[]} pushes */
   push(pushes) {
     const live = /** @type {Live} */ (this.live);
-    const parts = live.facts.models.map((model, k) => ({ columns: model.columns,
+    const parts = live.servos.map((one, k) => ({ columns: one.columns,
       points: joined(pushes.map((one) => one.parts[k].points)), pulses: joined(pushes.map((one) => one.parts[k].pulses)) }));
     parts.forEach((one, k) => {
       if (one.points.length) this.lcd[k] = this.reading(one.columns, one.points.slice(-one.columns.length));
@@ -136,8 +141,8 @@ export class Room {
   /** Show how all stands, without going on. */
   glance() {
     const live = /** @type {Live} */ (this.live);
-    this.lcd.length = live.facts.models.length;
-    live.facts.models.forEach((model, k) => { this.lcd[k] = this.lcd[k] ?? this.reading(model.columns, new Float64Array(0)); });
+    this.lcd.length = live.servos.length;
+    live.servos.forEach((one, k) => { this.lcd[k] = this.lcd[k] ?? this.reading(one.columns, new Float64Array(0)); });
     this.push([]);
   }
 
@@ -163,7 +168,7 @@ export class Room {
     this.pace.running = false;
     this.pace.begin(now(), live.time);
     let until = live.time + limits.tick;
-    if (live.facts.models.some((model) => model.columns.includes("pulse_width"))) {
+    if (live.servos.some((one) => one.columns.includes("pulse_width"))) {
       const edge = live.going.nextEdge;
       until = edge > live.time * (1 + limits.rounding) ? edge : edge + 1 / live.going.rate;
     }
@@ -192,13 +197,18 @@ export class Room {
     const { world } = this;
     if ("do" in message) {
       if (this.replaying) refuse("repeating");
-      const { time } = live.do(message.do, message.value, message.servo ?? null);
+      const { time, kind, servo } = live.do(message.do, message.value, message.servo ?? null);
+      if (kind === "set") {
+        this.step = world.limits.first_stretch;
+        const those = live.servos.map((one, k) => one.facts(k)).filter((one) => servo === null || one.servo === servo);
+        this.page.told({ changed: those, loads: this.loads() });
+      }
       return { time };
     }
     if ("run" in message) this.run(message.run);
     else if ("speed" in message) this.ask(message.speed);
     else if ("step" in message) this.frame();
-    else if ("view" in message) live.scene.view = message.view;
+    else if ("view" in message) live.scene.view = view(world, message.view);
     else if ("reset" in message) {
       const scene = live.now();
       this.put({ ...scene, end: 0, actions: scene.actions.filter((/** @type {any} */ one) => one.time === 0) });
@@ -219,9 +229,16 @@ export class Room {
     return found ? found.text : refuse("unknown_lesson", name);
   }
 
-  /** @param {any} scene @param {any[]} asked @param {any} supply */
+  /** @param {any} scene @param {any} asked @param {any} supply @returns {any} a bench with other servos */
   chosen(scene, asked, supply) {
-    const servos = asked.map((one) => ("keep" in one ? { ...scene.servos[one.keep], model: one.model ?? "" } : one));
+    const { world } = this;
+    const most = world.limits.servos;
+    if (!Array.isArray(asked) || !asked.length || asked.length > most) wrong("servos", Array.isArray(asked) ? asked.length : asked, `a list of 1 to ${most}`);
+    const servos = asked.map((one) => {
+      if (!one || !("keep" in one)) return servo(world, one);
+      if (!(one.keep in scene.servos)) wrong("servo to keep", one.keep, `a whole number from 0 to ${scene.servos.length - 1}`);
+      return { ...scene.servos[one.keep], model: one.model ?? "" };
+    });
     return { ...scene, servos, supply: supply ?? {}, name: "", end: 0, actions: [], control: {}, lesson: {} };
   }
 }

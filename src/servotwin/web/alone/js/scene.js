@@ -1,16 +1,69 @@
 // The text of a bench: read, written, and packed into a link.
 
+import { Refused, checked, unknown, wrong } from "./check.js";
+import { said } from "./live.js";
 import { parse } from "./toml_parse.js";
 
-/** @param {any} world @param {string} text @returns {any} */
+/** @param {any} world @param {string} text @returns {any} the scene that a text describes */
 export function read(world, text) {
-  const content = /** @type {any} */ (parse(text));
-  return {
-    name: content.name ?? "", seed: content.seed ?? 0, frame_rate: content.frame_rate ?? world.limits.frame_rate, end: content.end ?? 0,
-    servos: content.servo, load: content.load ?? {}, supply: content.supply ?? {}, control: content.control ?? {},
-    view: content.view ?? {}, lesson: content.lesson ?? {},
-    actions: (content.actions ?? []).map((/** @type {any[]} */ [time, kind, value, servo = null]) => ({ time, kind, value, servo })),
-  };
+  const { rules, limits, scene: keys } = world;
+  if (text.length > limits.text) wrong("scene", `${text.length} characters`, `at most ${limits.text}`);
+  const content = parsed(text.replace(/^\ufeff/, ""));
+  for (const key of Object.keys(content)) if (!keys.top.includes(key)) unknown("key of a scene", key, keys.top);
+  if (content.format !== limits.format) wrong("format of a scene", content.format, String(limits.format));
+  const servos = content.servo;
+  if (!Array.isArray(servos) || !servos.length || servos.length > limits.servos) {
+    wrong("servos of a scene", Array.isArray(servos) ? servos.length : servos, `1 to ${limits.servos} tables [[servo]]`);
+  }
+  const rows = content.actions ?? [];
+  if (!Array.isArray(rows) || rows.length > limits.actions) wrong("actions of a scene", Array.isArray(rows) ? rows.length : rows, `a list of at most ${limits.actions}`);
+  const actions = rows.map((row) => action(world, servos.length, row));
+  if (actions.some((one, k) => k > 0 && one.time < actions[k - 1].time)) wrong("actions of a scene", "times that go back", "the order of their times");
+  const own = Object.fromEntries(Object.entries(rules.scene).map(([key, rule]) => [key, key in content ? checked(rule, content[key]) : rule.usual ?? {}]));
+  return { ...own, servos: servos.map((one) => servo(world, one)), actions, view: view(world, content.view ?? {}), lesson: lesson(content.lesson ?? {}) };
+}
+
+/** @param {any} world @param {any} table @returns {any} */
+export function servo(world, table) {
+  const { sources } = world.scene;
+  const found = checked(world.rules.servo, table);
+  const given = sources.filter((/** @type {string} */ key) => key in found);
+  if (given.length !== 1) wrong("servo of a scene", given.join(", ") || "none of them", "one of id, file, mystery");
+  const models = Object.keys(world.models);
+  if (!["", ...models].includes(found.model)) unknown("model", found.model, models);
+  return found;
+}
+
+/** @param {any} world @param {any} table @returns {any} */
+export function view(world, table) {
+  const found = checked(world.rules.view, table);
+  const size = Object.entries(found).reduce((sum, [name, one]) => sum + name.length + String(one).length, 0);
+  if (size > world.limits.view) wrong("view", "more than that", `${world.limits.view} characters in all`);
+  return found;
+}
+
+/** @param {any} table @returns {any} */
+function lesson(table) {
+  if (!Object.values(table).flat().every((one) => typeof one === "string")) wrong("lesson of a scene", "other values", "texts and lists of texts");
+  return table;
+}
+
+/** @param {any} world @param {number} servos @param {any} row @returns {import("./live.js").Action} */
+function action(world, servos, row) {
+  if (!Array.isArray(row) || row.length < world.scene.row[0] || row.length > world.scene.row[1]) {
+    wrong("action", row, "[time in s, kind, value] or [time in s, kind, value, servo]");
+  }
+  if (!(Number.isFinite(row[0]) && row[0] >= 0)) wrong("time of an action", row[0], "a number of seconds of at least 0");
+  return said(world, servos, row);
+}
+
+/** @param {string} text @returns {any} */
+function parsed(text) {
+  try {
+    return parse(text);
+  } catch (error) {
+    throw new Refused(`scene: not valid TOML: ${(error instanceof Error ? error.message : String(error)).split("\n")[0]}`);
+  }
 }
 
 /** @param {any} world @param {any} scene @returns {string} */
@@ -69,11 +122,15 @@ export async function fragment(text) {
   return btoa(plain).replaceAll("+", "-").replaceAll("/", "_").replace(/=+$/, "");
 }
 
-/** @param {string} packed @returns {Promise<string>} */
+/** @param {string} packed @returns {Promise<string>} the text that a link carries */
 export async function unfragment(packed) {
-  const plain = atob(packed.replaceAll("-", "+").replaceAll("_", "/"));
-  const bytes = Uint8Array.from(plain, (one) => one.charCodeAt(0));
-  return new TextDecoder().decode(await through(bytes, new DecompressionStream("deflate")));
+  try {
+    const plain = atob(packed.replaceAll("-", "+").replaceAll("_", "/"));
+    const bytes = Uint8Array.from(plain, (one) => one.charCodeAt(0));
+    return new TextDecoder().decode(await through(bytes, new DecompressionStream("deflate")));
+  } catch {
+    return wrong("link", "something that does not unpack", "a whole link of a bench");
+  }
 }
 
 /** @param {Uint8Array} bytes @param {any} change @returns {Promise<ArrayBuffer>} */
