@@ -5,8 +5,8 @@ They check themselves; a field that is None is absent: the effect is off, or not
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar, NamedTuple
 

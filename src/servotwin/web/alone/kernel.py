@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 import subprocess
 import tempfile
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from servotwin.errors import ServotwinError
+from servotwin.errors import InputError
 from servotwin.models.engine.live.making import Weights
 from servotwin.models.engine.live.posts import Post
 from servotwin.models.engine.live.sender import Sender
@@ -24,6 +25,7 @@ from servotwin.simulation.compile.building import printed
 from servotwin.simulation.compile.compilers import Compiler, compilers
 from servotwin.simulation.compile.kinds import Kind, Scalar, Tuple
 from servotwin.simulation.compile.signatures import signatures
+from servotwin.simulation.compile.translate import Translation
 
 BENCH = Recipe("bench", tuple(f"servotwin.models.engine.live.bench:{name}" for name in (
     "make", "begin", "change", "take", "count", "tune", "snapped", "next_edge", "advance")))
@@ -39,10 +41,11 @@ _PAGE = 65536  # bytes of memory that WebAssembly adds at once
 _LONGEST = 600.0  # s that a compiler may take
 
 
-class NoCompilerError(ServotwinError):
+class NoCompilerError(InputError):
     """No compiler at hand makes WebAssembly."""
 
 
+@cache
 def module() -> bytes:
     """Return the kernel as a module of WebAssembly.
 
@@ -51,7 +54,7 @@ def module() -> bytes:
     NoCompilerError
         If no compiler at hand makes one.
     """
-    text = printed(BENCH).text + _NO_FMA
+    text = _printed().text + _NO_FMA
     with tempfile.TemporaryDirectory(prefix="servotwin-") as folder:
         source, made = Path(folder) / "bench.c", Path(folder) / "bench.wasm"
         source.write_text(text, encoding="utf-8")
@@ -61,6 +64,11 @@ def module() -> bytes:
     found = "; ".join(problems) or "no C compiler"
     raise NoCompilerError(f"no compiler makes WebAssembly ({found}): install clang and lld, or the package ziglang "
                           "(pip install 'servotwin[compile]')")
+
+
+@cache
+def _printed() -> Translation:
+    return printed(BENCH)
 
 
 def _compiled(compiler: Compiler, source: Path, made: Path) -> str:
@@ -86,12 +94,12 @@ def layout() -> dict[str, Any]:
     records = {name: {"size": record_of(kind).itemsize, "at": _places(record_of(kind))} for name, kind in kinds.items()}
     known = dict(signatures(BENCH))
     entries = {one.name: {"kinds": [_told(kind) for kind in known[one.name]], "result": one.result}
-               for one in printed(BENCH).entries}
+               for one in _printed().entries}
     return {"records": records, "entries": entries, "words": _WORDS, "page": _PAGE}
 
 
 def _places(kind: np.dtype[Any]) -> dict[str, Any]:
-    """Return the place of each field of a record in bytes, and whether it is a whole number; of those in it likewise."""
+    """Return the place of each field of a record in bytes, and whether it is a whole number; of records in it too."""
     found: dict[str, Any] = {}
     for name, (own, at, *_) in (kind.fields or {}).items():
         if own.subdtype is None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from servotwin.models.engine.live.posts import NEVER
-from servotwin.models.engine.memory import ACCURACY
 from servotwin.models.engine.live.screen import USED
 from servotwin.models.engine.live.shapes import PERIODS
+from servotwin.models.engine.memory import ACCURACY
 from servotwin.physics.pieces import Piece
 from servotwin.web.live.said import FRAME_RATE, RATES
 from servotwin.web.live.scene import FORMAT, LONGEST_TEXT, MOST_ACTIONS, MOST_SERVOS, MOST_VIEW
@@ -27,7 +27,9 @@ def limits() -> dict[str, Any]:
     return {
         "rows": _ROWS, "events": _EVENTS, "pulses": _PULSES, "train": _TRAIN, "used": USED, "given": _GIVEN,
         "piece": len(Piece._fields), "most_pieces": 2 * PERIODS + 1, "never": NEVER,
-        "frame_rate": FRAME_RATE, "accuracy": ACCURACY, "rates": RATES, "format": FORMAT, "actions": MOST_ACTIONS, "servos": MOST_SERVOS, "text": LONGEST_TEXT, "view": MOST_VIEW,
+        "frame_rate": FRAME_RATE, "accuracy": ACCURACY, "rates": RATES,
+        "format": FORMAT, "actions": MOST_ACTIONS, "servos": MOST_SERVOS,
+        "text": LONGEST_TEXT, "view": MOST_VIEW,
         "speeds": pace.SPEEDS, "unpaced": pace.UNPACED, "over": pace.OVER, "late": pace.LATE,
         "rate": room.RATE, "points": room.POINTS, "coarsest": room.COARSEST, "frame_points": room.FRAME_POINTS,
         "tick": room.TICK, "rounding": room.ROUNDING, "far": room.FAR, "pause": 1e3 / room.RATE,

@@ -22,7 +22,6 @@ from servotwin.signals.signal import KINDS
 from servotwin.simulation.bus_supply import OF_BUS
 from servotwin.simulation.engine import failure
 from servotwin.simulation.status import Status
-from servotwin.units import si_unit
 from servotwin.web.alone.bounds import bounds_of
 from servotwin.web.alone.limits import limits
 from servotwin.web.alone.words import WORDS
@@ -61,13 +60,15 @@ def world(first: Scene) -> dict[str, Any]:
         "columns": screen.COLUMNS, "events": {str(code): word for code, word in screen.SHOWN.items()},
         "rules": {"actions": said.ACTIONS, "for_all": said.FOR_ALL, "scene": said.SCENE, "view": said.VIEW,
                   "servo": said.SERVO, "loads": {name: _load_rule(name) for name in _LOADS}},
-        "no_load": _no_load(), "made": ["", "no_inertia"], "set": {"origin": "assumed", "source": SET_BY_USER,
-                                                                   "spread": ""},
+        "no_load": _no_load(), "made": ["", "no_inertia"],
+        "set": {"origin": "assumed", "source": SET_BY_USER, "spread": ""},
         "ranges": {name: _ends(one) for name, one in RULES.items()},
         "less": [[f"{title}.{name}" for name in pair] for title, group in GROUPS.items() for pair in group.less],
-        "limits": limits(), "words": WORDS, "shapes": FIELDS, "units": UNITS, "kinds": {unit: KINDS[unit][0] for unit in UNITS}, "lines": "linear", "hold": "hold",
+        "limits": limits(), "words": WORDS, "shapes": FIELDS, "units": UNITS,
+        "kinds": {unit: KINDS[unit][0] for unit in UNITS}, "lines": "linear", "hold": "hold",
         "degrees": "deg", "whole": WHOLE, "status": [_failed(one) for one in Status],
-        "scene": {"servo": [*said.SERVO["fields"]], "sources": said.SOURCES, "tables": TABLES, "top": TOP, "row": (3, 4)},
+        "scene": {"servo": [*said.SERVO["fields"]], "sources": said.SOURCES, "tables": TABLES, "top": TOP,
+                  "row": (3, 4)},
         "converters": [{"name": name, "of": of, "gain": one.gain, "offset": one.offset, "highest": one.highest}
                        for name, of, one in (("command_count", "command_voltage", INPUT_CONVERTER),
                                              ("feedback_count", "feedback_voltage", FEEDBACK_CONVERTER))]}

@@ -7,7 +7,7 @@ import gzip
 import json
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from servotwin.web.alone import kernel
 from servotwin.web.alone.pack import world
@@ -35,8 +35,8 @@ def page(first: Scene) -> str:
     NoCompilerError
         If no compiler at hand makes WebAssembly.
     """
-    known = world(first)
     code = kernel.module()
+    known = world(first)
     text = {"modules": modules(), "css": _css(), "world": {**known, "layout": kernel.layout()}}
     pieces = {"text": json.dumps(text, ensure_ascii=False, separators=(",", ":"), allow_nan=False).encode(),
               "code": code}
@@ -73,7 +73,7 @@ def _packed(data: bytes) -> str:
     return base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
 
 
-def facts_of_size(html: str) -> dict[str, Any]:
+def sizes(html: str) -> dict[str, int]:
     """Return how large a page is, and its packed parts [bytes]."""
     parts = dict(re.findall(r'<script type="application/gzip" id="(\w+)">([^<]*)</script>', html))
     return {"page": len(html.encode()), **{name: len(text) for name, text in parts.items()}}

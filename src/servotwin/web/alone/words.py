@@ -9,6 +9,7 @@ WORDS = {
     "alone": "This bench computes here, without a server. Only with one (servotwin web): fits, "
              "registers, servo files, supplies that servos share, mystery servos, logs, tables.",
     "only_with_server": ONLY_WITH_SERVER,
+    "types": {"number": "float", "whole": "int", "string": "str", "boolean": "bool", "array": "list", "object": "dict"},
     "digits": 6, "smallest": -4,
     "known": {"parameter": "GROUP.NAME, with a group of " + ", ".join(GROUPS)},
     "stands": "the bench stands: ",
@@ -22,7 +23,8 @@ WORDS = {
     "takes_goals": "{kind} command of {name}: got '{word}', allowed: angles: it takes goals on a bus "
                    "(firmware.command_kind)",
     "no_such_command": "command of {name}: allowed: none of this unit",
-    "no_shared_supply": "supply of a scene: got 'one that servos share', allowed: one of each servo's own; " + ONLY_WITH_SERVER,
+    "no_shared_supply": "supply of a scene: got 'one that servos share', allowed: one of each servo's own; "
+                        + ONLY_WITH_SERVER,
     "no_inertia": "gear.backlash: got {got}, allowed: play only with inertia behind it: gear.output_inertia, or a load "
                   "that has some",
     "frame_rate": "frame rate: got {got}, allowed: frames that a pulse fits into",

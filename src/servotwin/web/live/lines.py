@@ -23,9 +23,9 @@ def lines_of(model: Model) -> Lines:
     >>> lines.per_width, lines.width, lines.reduction
     (1.0, 0.0, 280.0)
     """
-    both = [_line(model, name) for name in KINDS]
+    volts, angles, widths = (_line(model, name) for name in KINDS)
     reduction = model.value("gear.gear_reduction") if "gear.gear_reduction" in model.requires else 1.0
-    return Lines(*(number for line in both for number in line), reduction)
+    return Lines(*volts, *angles, *widths, reduction)
 
 
 def _line(model: Model, name: str) -> tuple[float, float]:

@@ -16,7 +16,8 @@ from servotwin.units import is_finite
 from servotwin.web.live.actions import Action, checked
 from servotwin.web.live.beginning import first_commands, first_of, load_of, models_of
 from servotwin.web.live.rest_watch import RestWatch
-from servotwin.web.live.scene import LONGEST, MOST_ACTIONS, Scene
+from servotwin.web.live.said import LONGEST
+from servotwin.web.live.scene import MOST_ACTIONS, Scene
 from servotwin.web.live.scene_servo import family_of, with_registers
 from servotwin.web.live.shared_supply import SharedSupply
 from servotwin.web.live.station import Row, Seen, Station

@@ -41,7 +41,8 @@ def _field(shape: str, name: str) -> Rule:
                 "each": {"is": "number", "got": "something that is no finite number", "allowed": "finite numbers",
                          "what": what["what"]}}
     if name == "steps":
-        return {"is": "whole", "low": 1, "high": _MOST_STEPS, "allowed": f"a whole number from 1 to {_MOST_STEPS}", **what}
+        allowed = f"a whole number from 1 to {_MOST_STEPS}"
+        return {"is": "whole", "low": 1, "high": _MOST_STEPS, "allowed": allowed, **what}
     if name in _POSITIVE:
         return {**number("", "a positive number", 0.0, open=True), **what}
     if name == "period":
@@ -90,20 +91,22 @@ VIEW: Rule = {"is": "table", "names": r"[\w.-]{1,60}", "what": "view", "told": "
               "allowed": "a table of words, numbers, true and false",
               "each": {"is": "plain", "what": "view", "allowed": "a table of words, numbers, true and false"}}
 _OF_SERVO = "{name} of a servo of a scene"
-_WORDS_OF_SERVO: dict[str, Any] = {"is": "text", "most": 200_000, "what": _OF_SERVO, "told": "type", "allowed": "a text"}
+_WORDS_OF_SERVO: dict[str, Any] = {
+    "is": "text", "most": 200_000, "what": _OF_SERVO, "told": "type", "allowed": "a text"}
 SOURCES = ("id", "file", "mystery")
 """Where the numbers of a scene's servo come from: one of these."""
 SERVO: Rule = {
     "is": "table", "what": "servo of a scene", "allowed": "a table [[servo]]", "unknown": "key of a servo of a scene",
     "fields": {
         "id": _WORDS_OF_SERVO, "file": _WORDS_OF_SERVO,
-        "mystery": {"is": "whole", "low": 0, "high": _SEEDS, "what": _OF_SERVO, "allowed": "a whole number of at least 0"},
+        "mystery": {"is": "whole", "low": 0, "high": _SEEDS, "what": _OF_SERVO,
+                    "allowed": "a whole number of at least 0"},
         "model": {**_WORDS_OF_SERVO, "usual": ""},
         "parameters": {"is": "table", "what": _OF_SERVO, "allowed": "a table of names and values", "usual": {},
                        "each": {"is": "number or text", "what": "parameters: {name}",
                                 "allowed": "a finite number in SI, or a word"}},
         "registers": {"is": "table", "what": _OF_SERVO, "allowed": "a table of names and values", "usual": {},
-                      "each": {"is": "whole", "what": "registers: {name}", "allowed": "a finite number in SI, or a word"}}}}
+                      "each": {"is": "whole", "what": "registers: {name}", "allowed": "a whole number"}}}}
 SCENE: dict[str, Rule] = {
     "name": {"is": "text", "most": _MOST_NAME, "what": "name of a scene",
              "allowed": f"a text of at most {_MOST_NAME} characters", "usual": ""},

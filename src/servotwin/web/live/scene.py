@@ -13,9 +13,8 @@ from typing import Any
 
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.web.live.actions import Action, action_of
-from servotwin.web.live.control_circuit import checked_control
 from servotwin.web.live.rules import checked
-from servotwin.web.live.said import LONGEST, SCENE, SUPPLY_FIELDS, VIEW
+from servotwin.web.live.said import SCENE, VIEW
 from servotwin.web.live.scene_servo import SceneServo, read_scene_servo
 from servotwin.web.live.toml_text import toml_line, toml_value
 

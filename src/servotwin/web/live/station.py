@@ -132,7 +132,7 @@ class Station:
         self._picks = [COLUMNS.index(name) for name in self.columns]
 
     def advance(self, until: float, rate: float, *, switches: bool = True) -> Seen:
-        """Go on to a time [s]; return what shows at a rate [Hz] on the way, and, if asked for, where the bridge switches.
+        """Go on to a time [s]; return what shows at a rate [Hz], and, if asked for, where the bridge switches.
 
         Raises
         ------

@@ -65,8 +65,8 @@ def advance(posts: Any, told: Told, programs: Any, memories: Memories, sender: A
             switches: int, rows: Any, events: Any, pulses: Any, used: Any) -> int:
     """Go on to a time [s]; return a status.
 
-    Each servo has tables `rows`, `events` and `pulses` for what shows, and how much of these is `used`, as `Screen` has it.
-    The sender's time is how far the bench has come.
+    Each servo has tables `rows`, `events` and `pulses` for what shows; how much of these is `used` stands as in
+    `Screen`. The sender's time is how far the bench has come.
     """
     now = sender[0]
     k = first_look(now.time, rate)
@@ -77,7 +77,7 @@ def advance(posts: Any, told: Told, programs: Any, memories: Memories, sender: A
             if used[USED * n] * 2 > len(rows[n]) or used[USED * n + 1] * 2 > len(events[n]) or (
                     used[USED * n + 2] * 2 > len(pulses[n])):
                 return PAUSED
-        end = min(transmitter.snapped(now, until), now.base + (now.count + _FRAMES) / now.rate, now.time + _LONGEST,
+        end = min(transmitter.snapped(now, until), now.base + (now.passed + _FRAMES) / now.rate, now.time + _LONGEST,
                   now.time + len(rows[0]) / (4.0 * rate))
         end = transmitter.snapped(now, until) if until - end <= _REST else end
         those.hear(now, posts, told, pulses, used, end)

@@ -92,7 +92,8 @@ def _tell(post: Any, family: int, given: Given) -> None:
     else:
         angle, width, voltage = _by_voltage(family, given)
     if family != AVERAGED:
-        post.lowest, post.highest = either(given.stops_lower_angle, -math.inf), either(given.stops_upper_angle, math.inf)
+        post.lowest = either(given.stops_lower_angle, -math.inf)
+        post.highest = either(given.stops_upper_angle, math.inf)
     if family == DIGITAL:
         post.lowest = max(post.lowest, either(given.firmware_lower_goal, -math.inf))
         post.highest = min(post.highest, either(given.firmware_upper_goal, math.inf))

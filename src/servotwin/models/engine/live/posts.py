@@ -167,8 +167,8 @@ def inputs_of(post: Any, k: int, told: Told, programs: Any) -> Inputs:
     curve = told.curves[post.curve_first:post.curve_first + post.curve_count]
     none = told.curves[0:0]
     if post.pulsed == 1:
-        return Inputs(told.trains[k][:post.heard], none, post.torque + post.push, 0.0, told.edges[k][:post.heard], curve,
-                      post.seed, post.accuracy, programs[k:k + 1])
+        return Inputs(told.trains[k][:post.heard], none, post.torque + post.push, 0.0, told.edges[k][:post.heard],
+                      curve, post.seed, post.accuracy, programs[k:k + 1])
     return Inputs(told.commands[post.command_first:post.command_first + post.command_count], none,
                   post.torque + post.push, 0.0, told.edges[k][:0], curve, post.seed, post.accuracy,
                   programs[k:k + 1])

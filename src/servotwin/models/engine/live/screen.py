@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.models.engine.events import guards
 from servotwin.models.engine.memory import Inputs, Memory, in_force, origin_of
@@ -65,10 +65,10 @@ class Switch(NamedTuple):
 
 
 class Screen(NamedTuple):
-    """Room for what shows: rows of `COLUMNS`, events (time, code); how much of each is used, and at `NEXT` what comes."""
+    """Room for what shows: rows of `COLUMNS`, events (time, code); how much is used, and at `NEXT` what comes."""
 
-    rows: Floats
-    events: Floats
+    rows: Any
+    events: Any
     used: Indices
 
 
@@ -153,7 +153,7 @@ def write(screen: Screen, lines: Lines, inputs: Inputs, told: Told, numbers: Num
     screen.used[0] = n + 1
 
 
-def put_row(rows: Floats, n: int, time: float, shown: Observed, y: Vector, lines: Lines, command: float) -> None:
+def put_row(rows: Any, n: int, time: float, shown: Observed, y: Vector, lines: Lines, command: float) -> None:
     """Fill a row."""
     rows[n, 0] = time
     for k in range(len(shown)):

@@ -65,7 +65,7 @@ def go_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, changed:
         if idle > MOST_IDLE:
             return before, was, CHATTER
         if PLAIN:
-            screen.rows.tell(time_of(memory))  # type: ignore[attr-defined]
+            screen.rows.tell(time_of(memory))
         told = told_of(memory, program)
         _note_doings(chip, inputs, numbers, before, said, memory, told, screen)
         if memory.point.time > before.point.time:

@@ -72,6 +72,12 @@ export function within(rule, value) {
   return rule.open ? low < value && value <= high : low <= value && value <= high;
 }
 
+/** @param {any} value @returns {string} */
+function typeOf(value) {
+  if (Array.isArray(value)) return words.types.array;
+  return words.types[typeof value === "number" && Number.isInteger(value) ? "whole" : typeof value];
+}
+
 const isTable = (/** @type {any} */ value) => value !== null && typeof value === "object" && !Array.isArray(value);
 
 /** @type {Record<string, (rule: Rule, value: any, name: string, table: any) => any>} */
@@ -129,6 +135,6 @@ const KINDS = {
 export function checked(rule, value, name = "", table = {}) {
   const found = KINDS[rule.is](rule, value, name, table);
   if (found !== undefined) return found;
-  const got = rule.told === "type" ? typeof value : rule.told === "length" && Array.isArray(value) ? value.length : rule.got ?? value;
+  const got = rule.told === "type" ? typeOf(value) : rule.told === "length" && Array.isArray(value) ? value.length : rule.got ?? value;
   return wrong(filled(rule.what, { name }), got, filled(rule.allowed, { name }));
 }

@@ -11,7 +11,7 @@ from servotwin.web.alone.pack import world
 from servotwin.web.alone.page import modules
 from servotwin.web.server.first import first_scene
 
-HARNESS = Path(__file__).with_name("harness") / "bench.mjs"
+HARNESS = Path(__file__).parent / "web" / "alone" / "harness" / "bench.mjs"
 
 
 @cache

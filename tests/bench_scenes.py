@@ -74,8 +74,10 @@ def command(rng: random.Random) -> dict:
     low, high = middle - swing * rng.random(), middle + swing * rng.random()
     shape = rng.choice(("hold", "hold", "step", "sine", "sweep", "staircase", "recorded"))
     given = {
-        "hold": {"value": rng.choice((high, high, high if unit == "V" else 1e4))}, "step": {"low": low, "high": high, "period": rng.choice((0.0, 0.2))},
-        "sine": {"mean": middle, "amplitude": swing * rng.random(), "frequency": rng.choice((rng.uniform(0.5, 4.0), 0.0))},
+        "hold": {"value": rng.choice((high, high, high if unit == "V" else 1e4))},
+        "step": {"low": low, "high": high, "period": rng.choice((0.0, 0.2))},
+        "sine": {"mean": middle, "amplitude": swing * rng.random(),
+                 "frequency": rng.choice((rng.uniform(0.5, 4.0), 0.0))},
         "sweep": {"mean": middle, "amplitude": swing * rng.random(), "start_frequency": 0.5, "end_frequency": 4.0,
                   "duration": rng.uniform(0.2, 1.0)},
         "staircase": {"low": low, "high": high, "steps": rng.choice((1, 3, 5, 2000)), "dwell": 0.05},
