@@ -98,7 +98,7 @@ def test_texts_are_refused_in_the_same_words(folder):
               'format = 1\nservo = [{id = "a", model = "Servo"}]', 'format = 1\nservo = [{id = 3}]']
     found = benches(folder, [{"scene": text, "steps": [], "rate": 60.0, "switches": True} for text in texts])
     for text, one in zip(texts, found, strict=True):
-        with pytest.raises(ValueError, match=".") as error:
+        with pytest.raises(ValueError, match=r".") as error:
             read_scene(text)
         words = re.sub(r"; did you mean [^?]*\?", "", " ".join(str(error.value).split()))
         assert one["refused"] == [words], json.dumps(text)
