@@ -139,6 +139,11 @@ INLINED double two_power(double k) {
     memcpy(&x, &bits, sizeof x);
     return x;
 }
+/* x 2^k for a whole k of at most 2000, by two products. */
+SMALL double scaled(double x, double k) {
+    const double half = NEAREST(0.5 * k);
+    return x * two_power(half) * two_power(k - half);
+}
 INLINED float two_powerf(float k) {
     const float shifted = k + 12582912.0f;
     uint32_t bits;
