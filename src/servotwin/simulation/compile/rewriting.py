@@ -24,6 +24,7 @@ EVERYWHERE = "servotwin.physics.elementary"
 DOUBLE = ("servotwin.models.state.noise", "servotwin.physics.pieces", EVERYWHERE)  # in float64 throughout
 _REPLACED = ("exp", "log", "log1p", "sin", "floor")  # in the vector form, by those of `engine.elementary`
 _OF_C = {"power": "pow"}  # by another name
+_PRIMITIVE = ("binary_exponent", "scaled")  # of `physics.elementary`, in any form
 _PACKAGE = "servotwin."
 _MODELS = "servotwin.models."
 
@@ -227,7 +228,7 @@ class Rewriting(ast.NodeTransformer):
         if isinstance(value, FunctionType) and value.__module__ == EVERYWHERE and self._module not in DOUBLE:
             if self._work.recipe.vector and name in _REPLACED:
                 return self._of_vectors(name, node)
-            if self._work.recipe.single:
+            if self._work.recipe.single and name not in _PRIMITIVE:
                 return ast.parse(f"math.{_OF_C.get(name, name)}", mode="eval").body
         return ast.copy_location(ast.Name(self._work.value(*_home(self._module, name, value)), node.ctx), node)
 
