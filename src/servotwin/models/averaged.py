@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, cast, final
 
 import numpy as np
 
-from servotwin import physics
-from servotwin.models.base import KINDS, Line, Model, check_accepted, check_sent, check_travel, feedback_line, solved
-from servotwin.models.terms import packing
+from servotwin.models.base import KINDS, Model, check_accepted, check_sent, check_travel, feedback_line, solved
+from servotwin.models.terms import packing, wiring
+from servotwin.models.terms.wiring import Line
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -46,14 +46,8 @@ class _Averaged(Model):
         """Return how the control voltage [V] follows a command of this kind."""
         if kind == "angle":
             return feedback_line(self)
-        k_p1, k_p2 = self.value("electronics.voltage_to_pulse_gain"), self.value("electronics.pulse_to_voltage_gain")
-        b_i = self.value_or("electronics.command_offset", 0.0)
-        if kind == "voltage":
-            return (physics.control_voltage_from_voltage(1.0, k_p1, k_p2),
-                    physics.control_voltage_from_voltage(0.0, k_p1, k_p2, b_i))
-        t_0 = self.value_or("electronics.command_pulse_offset", 0.0)
-        return (physics.control_voltage_from_paper_pulse(1.0, k_p2),
-                physics.control_voltage_from_paper_pulse(0.0, k_p2, t_0, b_i))
+        law = wiring.averaged_by_voltage if kind == "voltage" else wiring.averaged_by_pulse
+        return cast("Line", self.made_of(law))
 
     def command(self, signal: Signal) -> Pieces:
         """Return v_c [V]: k_p v_i + b_i of a voltage, k_p2 (t_a − t_0) + b_i of a pulse, p q* + b_o of an angle.

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, final
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, cast, final
 
 import numpy as np
 
-from servotwin import physics
 from servotwin.errors import CommandError, InputError, LoadError, MissingParameterError, UnknownNameError
 from servotwin.models import outputs
 from servotwin.models.columns import LanePieces, LaneServo, LaneSignal
 from servotwin.models.state.modes import Vector
+from servotwin.models.terms import wiring
 from servotwin.models.terms.given import Given, given_of
 from servotwin.models.terms.hung import Hung, hung_of
+from servotwin.models.terms.wiring import PULSE_RANGE, TRAVEL_SLACK, Line
 from servotwin.parameters import Servo
 from servotwin.physics.laws import array_form
 
@@ -35,8 +36,6 @@ if TYPE_CHECKING:
 KINDS = {"command_voltage": "voltage", "command_angle": "angle", "pulse_width": "pulse_width"}
 """The kind of command that a signal stands for."""
 
-TRAVEL_SLACK = 1e-9  # rad: so far beyond a stop a command may be, for rounding
-PULSE_RANGE = (3e-4, 2.7e-3)  # s, of what chips accept where the servo does not say; no source
 
 
 class Place(NamedTuple):
@@ -271,14 +270,9 @@ class Model(ABC):
         raise UnknownNameError(f"signal of {type(self).__name__}", name, ("time", *self.available))
 
 
-Line = tuple[float, float]
-"""Gain and offset of a law that is a straight line."""
-
-
 def feedback_line(model: Model) -> Line:
     """Return how the feedback voltage [V] follows the angle [rad]."""
-    p, b_o = model.value("potentiometer.feedback_gain"), model.value_or("potentiometer.feedback_offset", 0.0)
-    return physics.feedback_voltage(1.0, p), physics.feedback_voltage(0.0, p, b_o)
+    return cast("Line", model.made_of(wiring.feedback_line))
 
 
 def solved(line: Line, y: Any) -> Any:

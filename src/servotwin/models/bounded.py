@@ -12,7 +12,6 @@ from servotwin import physics
 from servotwin.errors import MissingParameterError
 from servotwin.models.base import (
     KINDS,
-    Line,
     Model,
     check_accepted,
     check_sent,
@@ -21,7 +20,8 @@ from servotwin.models.base import (
     feedback_line,
     solved,
 )
-from servotwin.models.terms import packing
+from servotwin.models.terms import packing, wiring
+from servotwin.models.terms.wiring import Line
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -78,28 +78,15 @@ class BoundedServo(Model):
         if slope is None and k_p2 is None:
             raise MissingParameterError(type(self).__name__, self.servo.name, [
                 "electronics.one_shot_slope (or electronics.pulse_to_voltage_gain)"])
-        if slope is None:
-            self._k_p2 = self.value("electronics.pulse_to_voltage_gain")
-            self._slope = 1.0 / self._k_p2
-        else:
-            self._slope = self.value("electronics.one_shot_slope")
-            self._k_p2 = self.value_or("electronics.pulse_to_voltage_gain", 1.0 / self._slope)
-        self._t_0 = self.value_or("electronics.command_pulse_offset", 0.0)
-        if given("electronics.one_shot_offset") is None and given("electronics.command_offset") is None:
-            self._T_0 = self._b_i = 0.0
-        else:
-            b_i = self.value_or("electronics.command_offset", math.nan)
-            self._T_0 = self.value_or("electronics.one_shot_offset", self._slope * (self._k_p2 * self._t_0 - b_i))
-            self._b_i = self.value_or("electronics.command_offset",
-                                      self._k_p2 * self._t_0 - self._T_0 / self._slope)
 
     def _warn(self) -> None:
         given = self.servo.get
         if given("electronics.one_shot_offset") is None and given("electronics.command_offset") is None:
             return
+        own = wiring.calibration(self.given)
         for width in (0.5e-3, 2.5e-3):  # s, the range of Table I; between them both are straight
-            of_pulse = physics.control_voltage_from_pulse(width, self._slope, self._T_0)
-            of_voltage = physics.control_voltage_from_paper_pulse(width, self._k_p2, self._t_0, self._b_i)
+            of_pulse = physics.control_voltage_from_pulse(width, own.slope, own.T_0)
+            of_voltage = physics.control_voltage_from_paper_pulse(width, own.k_p2, own.t_0, own.b_i)
             if abs(of_pulse - of_voltage) <= 0.01 * self.value("supply.open_circuit_voltage"):
                 continue
             warnings.warn(
@@ -123,12 +110,8 @@ class BoundedServo(Model):
         """Return how the control voltage [V] follows a command of this kind."""
         if kind == "angle":
             return feedback_line(self)
-        if kind == "pulse_width":
-            return (physics.control_voltage_from_pulse(1.0, self._slope),
-                    physics.control_voltage_from_pulse(0.0, self._slope, self._T_0))
-        k_p1 = self.value("electronics.voltage_to_pulse_gain")
-        return (physics.control_voltage_from_voltage(1.0, k_p1, self._k_p2),
-                physics.control_voltage_from_voltage(0.0, k_p1, self._k_p2, self._b_i))
+        law = wiring.bounded_by_pulse if kind == "pulse_width" else wiring.bounded_by_voltage
+        return cast("Line", self.made_of(law))
 
     def command(self, signal: Signal) -> Pieces:
         """Return v_c [V]: k_p v_i + b_i of a voltage, (t_a − T_0)/one_shot_slope of a pulse, p q* + b_o of an angle.

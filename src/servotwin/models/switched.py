@@ -11,10 +11,11 @@ import numpy as np
 
 from servotwin import physics
 from servotwin.errors import CommandError, InputError
-from servotwin.models.base import Line, Model, Place, check_travel, check_widths, clipped, feedback_line, solved
-from servotwin.models.terms import elastic, play, sensor
+from servotwin.models.base import Model, Place, check_travel, check_widths, clipped, solved
+from servotwin.models.terms import elastic, play, sensor, wiring
 from servotwin.models.terms.chip import FRAME
 from servotwin.models.terms.hung import inertia_on
+from servotwin.models.terms.wiring import Line
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -146,10 +147,7 @@ class SwitchedServo(Model):
             pieces = signal.pieces.scaled(*self._voltage_line())
         elif signal.kind == "angle":
             check_travel(signal, self.servo)
-            slope, T_0 = self.value("electronics.one_shot_slope"), self.value_or("electronics.one_shot_offset", 0.0)
-            p, b_o = feedback_line(self)
-            pieces = signal.pieces.scaled(physics.pulse_width_from_feedback(p, slope),
-                                          physics.pulse_width_from_feedback(b_o, slope, T_0))
+            pieces = signal.pieces.scaled(*self.made_of(wiring.pulse_of_angle))
         else:
             pieces = signal.pieces
         check_widths(signal, pieces, self._period(signal) if signal.edges is None else math.inf)
@@ -165,9 +163,8 @@ class SwitchedServo(Model):
 
     def _voltage_line(self) -> Line:
         """Return how the pulse width [s] follows a voltage command [V]."""
-        k_p1, t_0 = (self.value("electronics.voltage_to_pulse_gain"),
-                     self.value_or("electronics.command_pulse_offset", 0.0))
-        return physics.pulse_width_from_voltage(1.0, k_p1), physics.pulse_width_from_voltage(0.0, k_p1, t_0)
+        self.value("electronics.voltage_to_pulse_gain")  # has to be there
+        return cast("Line", self.made_of(wiring.pulse_of_voltage))
 
     def _angle_of(self, pulse_width: Any) -> Any:
         """Return the angle [rad] at which the one-shot is as long as this pulse."""

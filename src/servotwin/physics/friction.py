@@ -5,12 +5,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.physics._typing import Real
+from servotwin.physics.elementary import tanh
 
 _MAX_STEPS = 200  # Newton's method ends after about ten; this is a stop for NaN only
 
@@ -47,7 +46,7 @@ def smoothed_coulomb_torque(
     [-3.0, 0.0, 2.0]
     """
     w, k = motor_speed, zero_crossing_slope
-    return (coulomb_torque_forward if w >= 0.0 else coulomb_torque_backward) * math.tanh(k * w)
+    return (coulomb_torque_forward if w >= 0.0 else coulomb_torque_backward) * tanh(k * w)
 
 
 def smoothed_coulomb_slope(motor_speed: float, coulomb_torque_forward: float, coulomb_torque_backward: float,
@@ -78,7 +77,7 @@ def smoothed_coulomb_slope(motor_speed: float, coulomb_torque_forward: float, co
     200.0
     """
     w, k = motor_speed, zero_crossing_slope
-    x = math.tanh(k * w)
+    x = tanh(k * w)
     return (coulomb_torque_forward if w >= 0.0 else coulomb_torque_backward) * k * (1.0 - x * x)
 
 

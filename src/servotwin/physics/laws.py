@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 _RENAMED = {"atanh": "arctanh", "asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2",
             "pow": "power", "fabs": "abs"}
+_ELEMENTARY = "servotwin.physics.elementary"  # whose functions NumPy has too
 _BUILTINS = {"abs": "np.abs", "min": "np.minimum", "max": "np.maximum"}
 _PLAIN = {float, int, bool, np.float64}
 _NO_ARGUMENTS = ast.arguments([], [], None, [], [], None, [])
@@ -215,6 +216,8 @@ class _Derivation(ast.NodeTransformer):
         called = self._value(node.func)
         arguments = [self.visit(argument) for argument in node.args]
         keywords = [ast.keyword(word.arg, self.visit(word.value)) for word in node.keywords]
+        if isinstance(called, FunctionType) and called.__module__ == _ELEMENTARY:
+            return _call(f"np.{_RENAMED.get(called.__name__, called.__name__)}", *arguments)
         if isinstance(called, FunctionType):
             alias = f"law_{called.__module__.replace('.', '_')}_{called.__name__}"
             self._space[alias] = derived(called)

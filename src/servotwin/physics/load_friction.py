@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+from servotwin.physics.elementary import exp, log
 from servotwin.physics.friction import breakaway_torque, sticks
 
 _NOTHING_LEFT = 7.0  # exp(−exp(7)) is 0, and a trial step may be far too fast for a power
@@ -44,8 +45,8 @@ def stribeck_factor(speed: float, stribeck_speed: float = 0.0, stribeck_exponent
         return 1.0
     if stribeck_speed == 0.0:
         return 0.0
-    log_power = stribeck_exponent * math.log(abs(speed) / stribeck_speed)
-    return math.exp(-math.exp(log_power)) if log_power < _NOTHING_LEFT else 0.0
+    log_power = stribeck_exponent * log(abs(speed) / stribeck_speed)
+    return exp(-exp(log_power)) if log_power < _NOTHING_LEFT else 0.0
 
 
 def torque_on_gear(external_torque: float, output_speed: float, load_viscous_friction: float) -> float:

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from servotwin.errors import InputError
+from servotwin.physics.elementary import cos, sin
 from servotwin.physics.laws import array_form
 
 _FEW = 16  # pieces, for which plain Python is faster than arrays
@@ -55,7 +56,7 @@ def piece_value(piece: Piece, time: float) -> float:
     s = time - start
     y = value + slope * s
     if amplitude != 0.0:
-        y += amplitude * math.sin(phase + (frequency + 0.5 * sweep * s) * s)
+        y += amplitude * sin(phase + (frequency + 0.5 * sweep * s) * s)
     return y
 
 
@@ -71,7 +72,7 @@ def piece_rate(piece: Piece, time: float) -> float:
     s = time - start
     rate = slope
     if amplitude != 0.0:
-        rate += amplitude * (frequency + sweep * s) * math.cos(phase + (frequency + 0.5 * sweep * s) * s)
+        rate += amplitude * (frequency + sweep * s) * cos(phase + (frequency + 0.5 * sweep * s) * s)
     return rate
 
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from servotwin.physics._typing import Real
 from servotwin.physics.laws import array_form
 
-_HALVINGS = 100  # from any table of volts to the last bit of an angle
+HALVINGS = 100  # from any table of volts to the last bit of an angle
 
 
 def feedback_voltage(output_angle: float, feedback_gain: float, feedback_offset: float = 0.0) -> float:
@@ -215,7 +215,7 @@ def angle_from_sensed_voltage(sensed_voltage: Real, feedback_gain: Real, feedbac
     """
     ideal: Real = array_form(angle_from_voltage)(sensed_voltage, feedback_gain, feedback_offset)
     low, high = (np.asarray(ideal - bound / feedback_gain) for bound in (np.max(errors), np.min(errors)))
-    for _ in range(_HALVINGS):
+    for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         reached = middle + linearity_error(middle, angles, errors) / feedback_gain <= ideal
         low, high = np.where(reached, middle, low), np.where(reached, high, middle)

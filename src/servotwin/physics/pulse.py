@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
 from servotwin.physics.electronics import pulse_width_from_feedback
+from servotwin.physics.elementary import expm1, log1p
 
 
 def one_shot_width(feedback_voltage: float, one_shot_slope: float, one_shot_offset: float = 0.0) -> float:
@@ -140,7 +139,7 @@ def drive_time(error_time: float, stretcher_gain: float, deadband: float = 0.0, 
     if u <= 0.0:
         return 0.0
     if tau_s > 0.0:
-        return t_min + tau_s * math.log1p(K * u / tau_s)
+        return t_min + tau_s * log1p(K * u / tau_s)
     return t_min + K * u
 
 
@@ -167,7 +166,7 @@ def full_drive_error(frame_period: float, stretcher_gain: float, deadband: float
     """
     rest = frame_period - minimum_drive_time
     if stretcher_time_constant > 0.0:
-        rest = stretcher_time_constant * math.expm1(rest / stretcher_time_constant)
+        rest = stretcher_time_constant * expm1(rest / stretcher_time_constant)
     return 0.5 * deadband + rest / stretcher_gain
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from servotwin.physics.elementary import cos, sin
 
 
 def shaft_acceleration(driving_torque: float, speed: float, dry_friction: float, external_torque: float,
@@ -147,7 +147,7 @@ def pendulum_torque(angle: float, gravity_torque: float, hanging_angle: float = 
     >>> pendulum_torque(1.0, 0.5, 1.0)
     0.0
     """
-    return gravity_torque * math.sin(angle - hanging_angle)
+    return gravity_torque * sin(angle - hanging_angle)
 
 
 def pendulum_stiffness(angle: float, gravity_torque: float, hanging_angle: float = 0.0) -> float:
@@ -172,7 +172,7 @@ def pendulum_stiffness(angle: float, gravity_torque: float, hanging_angle: float
     >>> pendulum_stiffness(1.0, 0.5, 1.0)
     0.5
     """
-    return gravity_torque * math.cos(angle - hanging_angle)
+    return gravity_torque * cos(angle - hanging_angle)
 
 
 def twist_torque(twist: float, twist_rate: float, stiffness: float, damping: float) -> float:

@@ -11,6 +11,7 @@ import math
 from typing import NamedTuple
 
 from servotwin.physics._typing import Real
+from servotwin.physics.elementary import exp
 
 COPPER_COEFFICIENT = 0.00385
 """Relative change of the resistance of copper, at the reference temperature [1/K]."""
@@ -258,7 +259,7 @@ def two_mass_temperatures(
     gap = math.sqrt((a - b - c) ** 2 + 4.0 * a * b)
     l_1 = 0.5 * (a + b + c + gap)
     l_2 = a * c / l_1
-    e_1, e_2 = math.exp(-l_1 * time), math.exp(-l_2 * time)
+    e_1, e_2 = exp(-l_1 * time), exp(-l_2 * time)
     share, rest = (e_2 - e_1) / gap, (l_1 * e_2 - l_2 * e_1) / gap
     T_w = end.winding + rest * y_w + share * (-a * y_w + a * y_h)
     T_h = end.housing + rest * y_h + share * (b * y_w - (b + c) * y_h)

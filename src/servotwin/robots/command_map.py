@@ -11,7 +11,7 @@ import numpy as np
 
 from servotwin.datasheet.turning import is_pulsed
 from servotwin.errors import InputError, UnknownNameError
-from servotwin.models.base import PULSE_RANGE
+from servotwin.models.terms.wiring import PULSE_RANGE
 from servotwin.robots.model_file import joint_names
 from servotwin.robots.mount import Joint, Mount, joints_of
 from servotwin.robots.places import load_mujoco

@@ -14,7 +14,7 @@ from typing import NamedTuple
 from servotwin.errors import SimulationError
 from servotwin.models.base import Place
 from servotwin.models.engine import controller
-from servotwin.models.engine.events import guards
+from servotwin.models.engine.events import kinds
 from servotwin.models.engine.legs.legs import MOST_SHORT
 from servotwin.models.engine.memory import (
     ACCURACY,
@@ -31,15 +31,7 @@ from servotwin.models.engine.motions import motion
 from servotwin.models.engine.motions.motion import Motion
 from servotwin.models.engine.runs import calmed, is_short
 from servotwin.models.engine.step import COMPLETED, MOST_IDLE, pulse_width, step
-from servotwin.models.state.modes import (
-    CONDUCTING,
-    CORE,
-    LIMITED_BACKWARD,
-    LIMITED_FORWARD,
-    NO_CURRENT,
-    Mode,
-    at_rest,
-)
+from servotwin.models.state.modes import Mode
 from servotwin.models.terms import control, duty, firmware, frame
 from servotwin.models.terms.bridge import heeds_silence
 from servotwin.models.terms.chip import NO_CHIP, Chip
@@ -254,7 +246,7 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
     return State(until, state.places, memory, numbers, state.changes)
 
 
-HELD = "gear held"
+HELD = kinds.NAMES[kinds.HELD]
 """What an event is called after which motor and output, that parted and met in no time, stay together for a while."""
 
 
@@ -271,7 +263,7 @@ def _keep(record: Record, plan: Plan, before: Memory, trip: int, memory: Memory,
         keep_switch(record, before.chip, memory.chip, start, angle, plan.heeds_silence)
         if (plan.refuses and memory.chip.number > before.chip.number
                 and not frame.accepted(plan.chip, pulse_width(plan.inputs, before))):
-            record.events.append(Event(start, "pulse refused", angle))
+            record.events.append(Event(start, kinds.NAMES[kinds.REFUSED], angle))
     if plan.digital and memory.firm[0].trip != trip:
         record.events.append(Event(start, TRIPS[memory.firm[0].trip], angle))
     if now > start or not record.segments:
@@ -280,16 +272,16 @@ def _keep(record: Record, plan: Plan, before: Memory, trip: int, memory: Memory,
                                        memory.chip.silent, origin, *told_by(plan, memory)))
     if record.tell is not None:
         record.tell(now)
-    if event >= 0 and event not in guards.KINKS:
+    if kinds.kind_of(event, point.mode) != kinds.NO_EVENT:
         record.events.append(Event(now, event_name(event, point.mode), point.y.q))
 
 
 def keep_switch(record: Record, before: Frame, after: Frame, time: float, angle: float, heeds: bool) -> None:
     """Add to a record that the bridge has switched at `time` [s], where the shaft is at `angle` [rad]."""
     if after.drive != before.drive:
-        record.events.append(Event(time, _DRIVES[int(after.drive)], angle))
+        record.events.append(Event(time, kinds.NAMES[kinds.DRIVE_ENDS + int(after.drive)], angle))
     if heeds and after.silent != before.silent:
-        record.events.append(Event(time, "silence begins" if after.silent else "silence ends", angle))
+        record.events.append(Event(time, kinds.NAMES[kinds.SILENCE_ENDS + after.silent], angle))
 
 
 def sign_of(now: float) -> float:
@@ -304,18 +296,9 @@ def told_by(plan: Plan, memory: Memory) -> tuple[float, float, float, int]:
     return control.told_by(memory.firm[0])
 
 
-TRIPS = ("trip ends", "trips by overload", "trips by current", "trips by heat", "trips by undervoltage")
-_DRIVES = {1: "drive forward", -1: "drive backward", 0: "drive ends"}
+TRIPS = kinds.NAMES[kinds.TRIP_ENDS:]
 
 
 def event_name(kind: int, after: Mode) -> str:
     """Return what to call an event after which this mode holds."""
-    if kind == guards.SPEED and at_rest(after.contact):
-        return "stick"
-    if kind == guards.SPEED and after.contact != CORE:
-        return "reversal"
-    if after.zone >= CONDUCTING and kind in (guards.ZONE_UP, guards.ZONE_DOWN):
-        if after.zone in (LIMITED_BACKWARD, LIMITED_FORWARD):
-            return "current limited"
-        return "current stops" if after.zone == NO_CURRENT else "current starts"
-    return guards.EVENT_NAMES[kind]
+    return kinds.NAMES[kinds.kind_of(kind, after)]

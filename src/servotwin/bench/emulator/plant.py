@@ -9,9 +9,9 @@ import numpy as np
 
 from servotwin.bench.recording.wiring import Wiring
 from servotwin.errors import InputError
-from servotwin.models.base import PULSE_RANGE
 from servotwin.models.digital import DigitalServo
 from servotwin.models.switched import SwitchedServo
+from servotwin.models.terms.wiring import PULSE_RANGE
 from servotwin.physics.pieces import Piece, Pieces
 from servotwin.signals import Signal
 from servotwin.simulation import Simulator, State

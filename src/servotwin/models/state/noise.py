@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 
+from servotwin.physics.elementary import cos, log
+
 _MASK = 0xFFFFFFFF
 _UNIT = 2.3283064365386963e-10  # 2^-32
 _TURN = 6.283185307179586
@@ -43,8 +45,8 @@ def gaussian(seed: int, frame: int) -> float:
     """
     a = scrambled(frame + scrambled(seed + scrambled(seed >> 32)))
     b = scrambled(a ^ 0x5BD1E995)
-    radius = math.sqrt(-2.0 * math.log((a + 0.5) * _UNIT))
-    return radius * math.cos(_TURN * ((b + 0.5) * _UNIT))
+    radius = math.sqrt(-2.0 * log((a + 0.5) * _UNIT))
+    return radius * cos(_TURN * ((b + 0.5) * _UNIT))
 
 
 def uniform(seed: int, number: int) -> float:

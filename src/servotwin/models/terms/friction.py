@@ -12,6 +12,7 @@ from typing import NamedTuple
 from servotwin.models.state.modes import CORE, at_rest
 from servotwin.models.terms.dependence import BY_SHARE, CURVED_W, DRY, FADING, STEEP_W
 from servotwin.models.terms.given import Given, either
+from servotwin.physics.elementary import exp, log
 from servotwin.physics.friction import breakaway_torque, coulomb_torque
 from servotwin.physics.gear import motor_from_output, output_torque
 from servotwin.physics.load_friction import (
@@ -111,7 +112,7 @@ def frozen(friction: Friction, w: float, tau_m: float, tau_e: float) -> Friction
 
 def creeping_speed(friction: Friction) -> float:
     """Return the output speed [rad/s] up to which a shaft creeps: from there on no static friction is left."""
-    return friction.w_s * math.exp(math.log(_FADED) / friction.alpha) if fades(friction) else 0.0
+    return friction.w_s * exp(log(_FADED) / friction.alpha) if fades(friction) else 0.0
 
 
 def static_share(friction: Friction, tau_m: float, tau_e: float) -> float:

@@ -9,7 +9,7 @@ from servotwin.models.terms.given import Given, either, is_given
 from servotwin.models.terms.source import Source
 from servotwin.physics.backlash import play
 from servotwin.physics.electronics import feedback_error
-from servotwin.physics.potentiometer import error_between, feedback_voltage, quantised
+from servotwin.physics.potentiometer import HALVINGS, angle_from_voltage, error_between, feedback_voltage, quantised
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -85,6 +85,24 @@ def _interpolated(curve: Sequence[Sequence[float]] | NDArray[np.float64], q: flo
         if q < curve[k][0]:
             return error_between(q, curve[k - 1][0], curve[k - 1][1], curve[k][0], curve[k][1])
     return curve[len(curve) - 1][1]
+
+
+def angle_at(p: float, b_o: float, curve: Sequence[Sequence[float]] | NDArray[np.float64], v_o: float) -> float:
+    """Return the angle [rad] at which a potentiometer with a table gives v_o [V], quantisation apart, by bisection.
+
+    Where its errors fall faster than p rises it is one of several, at which the voltage rises.
+    """
+    ideal, most, least = angle_from_voltage(v_o, p, b_o), curve[0][1], curve[0][1]
+    for k in range(1, len(curve)):
+        most, least = max(most, curve[k][1]), min(least, curve[k][1])
+    low, high = ideal - most / p, ideal - least / p
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if middle + _interpolated(curve, middle) / p <= ideal:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
 
 
 def wiper_at(sensor: Sensor, wiper: float, q: float) -> float:

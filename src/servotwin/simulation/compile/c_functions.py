@@ -21,7 +21,8 @@ class Primitive(NamedTuple):
 
 PRIMITIVES = {
     "fma": Primitive("FMA{s}({0}, {1}, {2})"), "two_power": Primitive("two_power{s}({0})"),
-    "binary_exponent": Primitive("binary_exponent{s}({0})"), "nearest": Primitive("NEAREST{s}({0})"),
+    "binary_exponent": Primitive("binary_exponent{s}({0})"), "scaled": Primitive("scaled({0}, {1})"),
+    "nearest": Primitive("NEAREST{s}({0})"),
     "floor": Primitive("FLOOR{s}({0})"),
     "words": Primitive("words({0}, {1})", Array(INT64, 1)),
     "numbers": Primitive("numbers({0}, {1})", Array(FLOAT64, 1)),
@@ -33,7 +34,8 @@ PRIMITIVES = {
     "copied": Primitive("copied({0}, {1}, {2})", None, True),
     "activate": Primitive("activate({0})", None, True), "active": Primitive("active()", INT64),
 }
-"""Of `models.engine.elementary`, single instructions in the vector form, and of `compile.addresses`."""
+"""Of `models.engine.motions.elementary` and `physics.elementary`, single instructions in the vector form, and of
+`compile.addresses`."""
 VOID = ("copied", "activate")
 MATH = {name: name for name in (
     "sqrt", "exp", "expm1", "log", "log1p", "sin", "cos", "tan", "tanh", "atan", "atan2", "atanh", "asin", "acos",

@@ -35,7 +35,7 @@ _TAKEN = frozenset(
     "INFINITY NULL EXPORTED SMALL INLINED ASIDE PACKED FMA FMAf NEAREST NEARESTf FLOOR FLOORf CEIL CEILf AS_TEXT "
     "PRAGMA SUM_IN_ANY_ORDER CHECKED_SIZE TOLD told_1 told_2 told_3 told_4 told_5 told_6 told_7 floor_div floor_mod "
     "mod_float floor_div_float whole_power moved_left moved_right whole clamped words numbers rows bytes_at halves "
-    "copied activate active active_word float_of word_of two_power two_powerf binary_exponent binary_exponentf "
+    "copied activate active active_word float_of word_of two_power two_powerf binary_exponent binary_exponentf scaled "
     "isfinite isnan isinf floor fabs fabsf llabs memcpy memmove".split()) | {
         name + end for name in MATH for end in ("", "f")}
 _OURS = re.compile(r"\w+_(\d+|end|given|)|(as|equal|slice_of|array|min|max)_\w+|in_order|is_in|record|table")
@@ -58,6 +58,7 @@ class Types:
         self.tables: list[str] = []
         self.helpers: list[str] = []
         self._names: dict[Any, str] = {}
+        self._wanted: dict[Any, str] = {}
         self._used = set(_TAKEN)
 
     def fresh(self, name: str) -> str:
@@ -68,6 +69,14 @@ class Types:
             free = f"{name}_{number}"
         self._used.add(free)
         return free
+
+    def call(self, kind: Kind, name: str) -> None:
+        """Define the struct of a tuple or a record now, under a name that is not taken."""
+        self._wanted[kind] = name
+        if isinstance(kind, Record):
+            self.record(kind)
+        else:
+            self.of(kind)
 
     # --- types --------------------------------------------------------------------------------------------------------
 
@@ -110,7 +119,7 @@ class Types:
                 body = f"{self.declared(kind.elements[0], 'v')}[{len(elements)}];"
             else:
                 body = " ".join(f"{each};" for each in elements)
-            self._names[kind] = name = self.fresh(kind.name or f"tuple_{len(elements)}")
+            self._names[kind] = name = self.fresh(self._wanted.get(kind) or kind.name or f"tuple_{len(elements)}")
             self.structs.append(f"typedef struct {{ {body} }} {name};")
         return self._names[kind]
 
@@ -128,7 +137,7 @@ class Types:
                 length = f"[{own.count}]" if isinstance(own, Fixed) else ""
                 element = own.element if isinstance(own, Fixed) else own
                 body.append(f"{self.element(element)} {identifier(name)}{length};")
-            self._names[kind] = name = self.fresh("record")
+            self._names[kind] = name = self.fresh(self._wanted.get(kind, "record"))
             if sum(dtype[name].itemsize for name in dtype.names or ()) != dtype.itemsize:
                 raise TranslationError("", str(dtype), "a record has no gaps between its fields")
             attribute = "" if _aligned(dtype) else "PACKED "
@@ -214,6 +223,10 @@ class Types:
             lengths = ", ".join(map(str, value.shape))
             return f"(({self.of(kind)}){{({self.element(kind.element)} *){name}, {{{lengths}}}}})"
         return name
+
+    def initial(self, kind: Kind | None, value: Any) -> str:
+        """Return what a constant of a kind is initialised with, its type apart."""
+        return self._initial(kind, value)
 
     def _table(self, name: str, kind: Kind | None, value: Any) -> str:
         if isinstance(kind, Array):

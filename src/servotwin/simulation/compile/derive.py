@@ -22,13 +22,14 @@ from servotwin.simulation.compile.recipe import Recipe
 from servotwin.simulation.compile.rewriting import (
     DOUBLE,
     ELEMENTARY,
+    EVERYWHERE,
     Rewriting,
     definition,
     flat_name,
     local_names,
 )
 
-_PRIMITIVES = ("fma", "two_power", "binary_exponent", "nearest", "floor")  # single instructions
+_PRIMITIVES = ("fma", "two_power", "binary_exponent", "scaled", "nearest", "floor")  # single instructions
 _ADDRESSES = "servotwin.simulation.compile.addresses"
 _LONG = 12  # a tuple of more numbers is a table
 
@@ -136,7 +137,7 @@ class Derivation:
         module, name = function.__module__, function.__name__
         if hasattr(function, "text"):
             return self._generated(function)
-        if module == _ADDRESSES or (module == ELEMENTARY and name in _PRIMITIVES):
+        if module == _ADDRESSES or (module in (ELEMENTARY, EVERYWHERE) and name in _PRIMITIVES):
             flat = flat_name(module, name)
             self.imports[flat], self.primitives[flat] = (module, name), name
             return flat

@@ -20,8 +20,11 @@ if TYPE_CHECKING:
     from servotwin.simulation.compile.derive import Derivation
 
 ELEMENTARY = "servotwin.models.engine.motions.elementary"
-DOUBLE = ("servotwin.models.state.noise", "servotwin.physics.pieces")  # in float64 throughout
+EVERYWHERE = "servotwin.physics.elementary"
+DOUBLE = ("servotwin.models.state.noise", "servotwin.physics.pieces", EVERYWHERE)  # in float64 throughout
 _REPLACED = ("exp", "log", "log1p", "sin", "floor")  # in the vector form, by those of `engine.elementary`
+_OF_C = {"power": "pow"}  # by another name
+_PRIMITIVE = ("binary_exponent", "scaled")  # of `physics.elementary`, in any form
 _PACKAGE = "servotwin."
 _MODELS = "servotwin.models."
 
@@ -222,6 +225,11 @@ class Rewriting(ast.NodeTransformer):
         value = self._space[name]
         if isinstance(value, ModuleType):
             return node
+        if isinstance(value, FunctionType) and value.__module__ == EVERYWHERE and self._module not in DOUBLE:
+            if self._work.recipe.vector and name in _REPLACED:
+                return self._of_vectors(name, node)
+            if self._work.recipe.single and name not in _PRIMITIVE:
+                return ast.parse(f"math.{_OF_C.get(name, name)}", mode="eval").body
         return ast.copy_location(ast.Name(self._work.value(*_home(self._module, name, value)), node.ctx), node)
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
@@ -240,14 +248,18 @@ class Rewriting(ast.NodeTransformer):
     def _of_module(self, module: ModuleType, node: ast.Attribute) -> ast.AST:
         if module is math:
             if self._work.recipe.vector and node.attr in _REPLACED and self._module not in DOUBLE:
-                flat = self._work.value(ELEMENTARY, node.attr, getattr(import_module(ELEMENTARY), node.attr))
-                return ast.copy_location(ast.Name(flat, node.ctx), node)
+                return self._of_vectors(node.attr, node)
             if isinstance(getattr(math, node.attr), float):
                 return self._typed(node)
             return node
         if not module.__name__.startswith(_PACKAGE):
             raise NameError(f"{self._module}: {module.__name__} is out of a kernel's reach")
         flat = self._work.value(*_home(module.__name__, node.attr, getattr(module, node.attr)))
+        return ast.copy_location(ast.Name(flat, node.ctx), node)
+
+    def _of_vectors(self, name: str, node: ast.Name | ast.Attribute) -> ast.AST:
+        """Return the name of a function that a compiler can run in many lanes side by side."""
+        flat = self._work.value(ELEMENTARY, name, getattr(import_module(ELEMENTARY), name))
         return ast.copy_location(ast.Name(flat, node.ctx), node)
 
     def visit_Constant(self, node: ast.Constant) -> ast.AST:

@@ -208,9 +208,14 @@ def _hinted(function: str, name: str, hint: Any) -> Kind:
     if hint in numbers:
         return numbers[hint]
     if hasattr(hint, "_fields"):
-        return _named(function, hint)
+        return named(hint, function)
     raise TranslationError(function, name, "an entry with records, or arrays of several dimensions, has a line in "
                                            "`signatures`")
+
+
+def named(kind: Any, function: str = "") -> Tuple:
+    """Return the kind of a named tuple of numbers, and of those in it."""
+    return _named(function, kind)
 
 
 @cache

@@ -87,7 +87,13 @@ def translated(derived: Derived, signatures: Sequence[tuple[str, tuple[Kind, ...
 @cache
 def header() -> str:
     """Return the text on which all others stand."""
-    return Path(__file__).with_name("kernels.h").read_text(encoding="utf-8")
+    return "\n".join(map(part_of_header, ("kernels.h", "arithmetic.h", "addresses.h")))
+
+
+@cache
+def part_of_header(name: str) -> str:
+    """Return a part of it."""
+    return Path(__file__).with_name(name).read_text(encoding="utf-8")
 
 
 def _letters(kind: Kind | None) -> str:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from servotwin.errors import CommandError, InputError
 from servotwin.models import AveragedServo, AveragedServoInductive, BoundedServo, DigitalServo
-from servotwin.models.base import PULSE_RANGE, TRAVEL_SLACK
 from servotwin.models.columns import LanePieces, LaneSignal
+from servotwin.models.terms.wiring import PULSE_RANGE, TRAVEL_SLACK
 from servotwin.simulation.lanes.packing import Chunk, flat
 from servotwin.units import is_masked
 

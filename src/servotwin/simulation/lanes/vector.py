@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from servotwin import physics
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models import DigitalServo
-from servotwin.models.base import KINDS, PULSE_RANGE, Model
+from servotwin.models.base import KINDS, Model
 from servotwin.models.engine.cosim.cosim_calls import LONGEST
 from servotwin.models.engine.memory import ACCURACY
 from servotwin.models.engine.observe import Observed
+from servotwin.models.terms.wiring import PULSE_RANGE
 from servotwin.signals import Signal, constant
 from servotwin.simulation.bus_supply import supplies_of
 from servotwin.simulation.lanes.batch import Failure

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from servotwin.datasheet.loop import loop_of
 from servotwin.errors import ServotwinError
 from servotwin.models import DigitalServo
-from servotwin.models.base import PULSE_RANGE
 from servotwin.models.outputs import SIGNALS
+from servotwin.models.terms.wiring import PULSE_RANGE
 from servotwin.parameters import GROUPS
 from servotwin.simulation.sight import names_of
 from servotwin.units import factor, si_unit

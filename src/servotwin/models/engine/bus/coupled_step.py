@@ -26,6 +26,7 @@ from servotwin.models.engine.motions.dormand_prince import STAGES, rates_in
 from servotwin.models.engine.motions.motion import LONG_STEP
 from servotwin.models.state.modes import INSIDE, NO_CURRENT, Vector, at_rest, sign_of
 from servotwin.models.terms.source import Source
+from servotwin.physics.elementary import power
 from servotwin.physics.pieces import piece_value
 
 BY_SERIES = -1  # how mates move: beside LONG_STEP, which a recipe may leave out
@@ -220,7 +221,7 @@ def joint_step(source: Source, state: int, mates: Any, count: int, time: float, 
             size = max(size, error if error == error else math.inf)
             part = min(part, stribeck.part_before(numbers_of(mates[j].numbers), mode_of(mates[j].mode), start, end))
         size = min(size / _TOLERANCE, 1e12)
-        factor = min(6.0, max(0.15, 0.9 * size**-0.125)) if size > 0.0 else 6.0
+        factor = min(6.0, max(0.15, 0.9 * power(size, -0.125))) if size > 0.0 else 6.0
         if size <= 1.0 and part == 1.0:
             for k in range(STAGES, 16):
                 _stage(source, state, mates, count, time, h, k)

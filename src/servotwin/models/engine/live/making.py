@@ -9,26 +9,18 @@ from servotwin.loads.parts import STANDARD_GRAVITY
 from servotwin.models.engine.live.posts import Follow, put_chip, put_follow, put_lines, put_numbers
 from servotwin.models.engine.live.screen import Lines
 from servotwin.models.state.records import record_reader, record_writer
-from servotwin.models.terms import chip, firmware, packing
+from servotwin.models.terms import chip, firmware, packing, wiring
 from servotwin.models.terms.chip import NO_CHIP
-from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
-from servotwin.models.terms.given import Given, either, is_given, place
+from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware, takes_goals
+from servotwin.models.terms.given import Given, either, is_given
 from servotwin.models.terms.hung import Hung, inertia_on
-from servotwin.physics.electronics import (
-    control_voltage_from_paper_pulse,
-    control_voltage_from_pulse,
-    control_voltage_from_voltage,
-    pulse_width_from_feedback,
-    pulse_width_from_voltage,
-)
-from servotwin.physics.potentiometer import feedback_voltage
+from servotwin.models.terms.sensor import stands
 
 AVERAGED, BOUNDED, PULSED, DIGITAL = range(4)
 FAMILIES = {"AveragedServo": AVERAGED, "AveragedServoInductive": AVERAGED, "BoundedServo": BOUNDED,
             "PulseServo": PULSED, "PulseServoInductive": PULSED, "DigitalServo": DIGITAL}
 """Which models are made alike."""
 MADE, NO_INERTIA = 0, 1  # how it ends
-_GOALS = place("firmware.command_kind", "goal")
 _NONE = Follow(0.0, 0.0)
 
 
@@ -62,7 +54,7 @@ def make(post: Any, program: Any, family: int, given: Given, weights: Weights) -
         put_numbers(post.numbers, packing.bounded(given, hung))
     else:
         put_numbers(post.numbers, packing.averaged(given, hung))
-    post.pulsed = 1 if family == PULSED or (family == DIGITAL and given.firmware_command_kind != _GOALS) else 0
+    post.pulsed = 1 if family == PULSED or (family == DIGITAL and not takes_goals(given)) else 0
     put_chip(post.chip, chip.pack(given, math.nan) if family == PULSED else NO_CHIP)
     put_program(program, firmware.pack(given, math.nan) if family == DIGITAL else NO_FIRMWARE)
     _tell(post, family, given)
@@ -79,18 +71,24 @@ def hung_of(weights: Weights) -> Hung:
 
 def _tell(post: Any, family: int, given: Given) -> None:
     """Note how a servo follows commands, and where it may begin."""
-    angle = width = voltage = _NONE
+    angle, width, voltage = _NONE, _NONE, _NONE
+    has_gain = is_given(given.electronics_voltage_to_pulse_gain)
     post.lowest, post.highest = -math.inf, math.inf
-    if family == DIGITAL and given.firmware_command_kind == _GOALS:
+    if family == DIGITAL and takes_goals(given):
         angle = Follow(1.0, 0.0)
     elif family == DIGITAL or family == PULSED:
         told = family == PULSED or (is_given(given.electronics_one_shot_slope)
                                     and is_given(given.potentiometer_feedback_gain))
         width = Follow(1.0, 0.0) if told else _NONE
-        if told and not is_given(given.potentiometer_fixed_angle):
-            angle, voltage = _by_pulses(given)
+        if told and not stands(given):
+            angle = _line(wiring.pulse_of_angle(given))
+            voltage = _line(wiring.pulse_of_voltage(given)) if has_gain else _NONE
     else:
-        angle, width, voltage = _by_voltage(family, given)
+        averaged = family == AVERAGED
+        angle = _line(wiring.feedback_line(given))
+        width = _line(wiring.averaged_by_pulse(given) if averaged else wiring.bounded_by_pulse(given))
+        if has_gain:
+            voltage = _line(wiring.averaged_by_voltage(given) if averaged else wiring.bounded_by_voltage(given))
     if family != AVERAGED:
         post.lowest = either(given.stops_lower_angle, -math.inf)
         post.highest = either(given.stops_upper_angle, math.inf)
@@ -104,48 +102,8 @@ def _tell(post: Any, family: int, given: Given) -> None:
                                 _start(width), either(given.gear_gear_reduction, 1.0)))
 
 
-def _by_pulses(given: Given) -> tuple[Follow, Follow]:
-    """Return the pulse width of an angle, and of a voltage."""
-    p, b_o = _feedback(given)
-    slope, T_0 = given.electronics_one_shot_slope, either(given.electronics_one_shot_offset, 0.0)
-    angle = _NONE
-    if is_given(slope) and is_given(p):
-        angle = Follow(pulse_width_from_feedback(p, slope, 0.0), pulse_width_from_feedback(b_o, slope, T_0))
-    k_p1, t_0 = given.electronics_voltage_to_pulse_gain, either(given.electronics_command_pulse_offset, 0.0)
-    if not is_given(k_p1):
-        return angle, _NONE
-    return angle, Follow(pulse_width_from_voltage(1.0, k_p1, 0.0), pulse_width_from_voltage(0.0, k_p1, t_0))
-
-
-def _by_voltage(family: int, given: Given) -> tuple[Follow, Follow, Follow]:
-    """Return the control voltage of an angle, of a pulse width, and of a voltage."""
-    p, b_o = _feedback(given)
-    slope, k_p2 = given.electronics_one_shot_slope, given.electronics_pulse_to_voltage_gain
-    T_0, b_i = given.electronics_one_shot_offset, given.electronics_command_offset
-    t_0, k_p1 = either(given.electronics_command_pulse_offset, 0.0), given.electronics_voltage_to_pulse_gain
-    if family == AVERAGED:
-        b_i = either(b_i, 0.0)
-        width = Follow(control_voltage_from_paper_pulse(1.0, k_p2, 0.0, 0.0),
-                       control_voltage_from_paper_pulse(0.0, k_p2, t_0, b_i))
-    else:
-        slope = either(slope, 1.0 / k_p2)
-        k_p2 = either(k_p2, 1.0 / slope)
-        if is_given(T_0) or is_given(b_i):
-            T_0 = either(T_0, slope * (k_p2 * t_0 - b_i))
-            b_i = either(b_i, k_p2 * t_0 - T_0 / slope)
-        else:
-            T_0, b_i = 0.0, 0.0
-        width = Follow(control_voltage_from_pulse(1.0, slope, 0.0), control_voltage_from_pulse(0.0, slope, T_0))
-    if not is_given(k_p1):
-        return Follow(p, b_o), width, _NONE
-    return Follow(p, b_o), width, Follow(control_voltage_from_voltage(1.0, k_p1, k_p2, 0.0),
-                                         control_voltage_from_voltage(0.0, k_p1, k_p2, b_i))
-
-
-def _feedback(given: Given) -> tuple[float, float]:
-    """Return how the feedback voltage [V] follows the angle [rad]."""
-    p, b_o = given.potentiometer_feedback_gain, either(given.potentiometer_feedback_offset, 0.0)
-    return feedback_voltage(1.0, p, 0.0), feedback_voltage(0.0, p, b_o)
+def _line(gain_and_offset: tuple[float, float]) -> Follow:
+    return Follow(gain_and_offset[0], gain_and_offset[1])
 
 
 def _slope(line: Follow) -> float:

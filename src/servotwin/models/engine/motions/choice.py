@@ -76,6 +76,7 @@ from servotwin.models.terms.dependence import (
     TWO_BODIES,
 )
 from servotwin.models.terms.numbers import Numbers
+from servotwin.physics.elementary import power
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
 
 _WITH_HEAT = ON_HEAT | ON_I | BY_SHARE | TWO_BODIES | FADING  # what may be asked of a step beside the straight law
@@ -165,7 +166,7 @@ def _integrated(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y
                    abs(error[2]) / (1.0 + abs(y1.i))) / (_TOLERANCE * accuracy)
         if not size < 1e6:
             size = 1e6
-        factor = min(5.0, max(0.1, 0.85 * size**-0.2)) if size > 0.0 else 5.0
+        factor = min(5.0, max(0.1, 0.85 * power(size, -0.2))) if size > 0.0 else 5.0
         if size <= 1.0:
             return Motion(STEP, numbers, mode, u, tau, t0, y, h, NO_COEFFICIENTS, (0.0, 0.0), y1, h * factor, -1,
                           False, stages, NO_DENSE, NO_LONG_DENSE)
@@ -187,7 +188,7 @@ def _long_step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y:
         size = error / (FINE * accuracy)
         if not size < 1e12:
             size = 1e12
-        factor = min(6.0, max(0.15, 0.9 * size**-0.125)) if size > 0.0 else 6.0
+        factor = min(6.0, max(0.15, 0.9 * power(size, -0.125))) if size > 0.0 else 6.0
         part = stribeck.part_before(numbers, mode, y, y1) if size <= 1.0 else factor
         if part == 1.0:
             following = max(step, h * factor) if h == most else h * factor  # a step that was cut short tells little

@@ -1,6 +1,6 @@
 """Exponentials and logarithms as polynomials, so that a compiler can run them on many servos side by side.
 
-Everything is made of +, ·, /, comparisons and the three primitives at the top, which the compiler replaces by single
+Everything is made of +, ·, /, comparisons and the primitives at the top, which the compiler replaces by single
 instructions. The result is right to one or two units in the last place, and the same in every lane.
 """
 
@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 
+from servotwin.physics.elementary import binary_exponent
+
 SINGLE = False  # the compiler derives the float32 form with True
 
 _PER_LN2 = 1.4426950408889634
-_ROOT_HALF = 0.7071067811865476
 _SPLIT = 0.34657359027997264  # ln 2 / 2
 _LARGEST = 700.0  # e^-x is 1e-304
 _LARGEST_SINGLE = 80.0
@@ -31,18 +32,6 @@ def two_power(k: float) -> float:
     0.25
     """
     return math.ldexp(1.0, int(k)) if abs(k) < 1022.0 else math.inf
-
-
-def binary_exponent(x: float) -> float:
-    """Return the whole e for which x / 2^e lies in [√½, √2), for x > 0.
-
-    Examples
-    --------
-    >>> binary_exponent(1.0), binary_exponent(1.5), binary_exponent(6.0)
-    (0.0, 1.0, 3.0)
-    """
-    mantissa, exponent = math.frexp(x)
-    return exponent - 1.0 if mantissa < _ROOT_HALF else float(exponent)
 
 
 def nearest(x: float) -> float:

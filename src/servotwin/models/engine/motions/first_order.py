@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import math
 
+from servotwin.physics.elementary import expm1, log1p
+
 
 def response(rate: float, s: float) -> tuple[float, float, float]:
     """Return e^(−λ s), g = (1 − e^(−λ s))/λ and its integral (s − g)/λ, for λ ≥ 0 and s ≥ 0."""
@@ -18,7 +20,7 @@ def response(rate: float, s: float) -> tuple[float, float, float]:
                 1 / 6227020800 - x / 87178291200)))))))))))
         phi = 1.0 - x * G
         return 1.0 - x * phi, phi * s, G * s * s
-    decay = -math.expm1(-x)
+    decay = -expm1(-x)
     g = decay / rate
     return 1.0 - decay, g, (s - g) / rate
 
@@ -40,5 +42,5 @@ def time_to(rate: float, f: float, w0: float, w1: float) -> float:
     time = gap / there
     y = rate * time
     if y > 1e-8:
-        return time * (math.log1p(y) / y)
+        return time * (log1p(y) / y)
     return time * (1.0 - 0.5 * y)

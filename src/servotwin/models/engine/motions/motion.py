@@ -34,6 +34,7 @@ from servotwin.models.state.modes import (
 )
 from servotwin.models.terms import elastic, play
 from servotwin.models.terms.numbers import Numbers
+from servotwin.physics.elementary import expm1
 from servotwin.physics.pieces import Piece, piece_value
 
 # Kinds of motion. IMPOSSIBLE: no step is short enough for the tolerance.
@@ -159,7 +160,7 @@ def state(motion: Motion, s: float) -> Vector:
         return moved(motion, start.q + way, w, current_of(motion.numbers, motion.mode, dw, w, against))
     if kind == HELD:
         rate, final = motion.coefficients[0], motion.coefficients[1]
-        return moved(motion, start.q, start.w, start.i + (start.i - final) * math.expm1(-rate * s))
+        return moved(motion, start.q, start.w, start.i + (start.i - final) * expm1(-rate * s))
     if kind == SERIES:
         q = w = i = 0.0
         for n in range(len(motion.coefficients) - 1, -1, -1):

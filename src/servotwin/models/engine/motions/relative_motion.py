@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from servotwin.models.engine.motions import first_order
 from servotwin.models.state.modes import Vector
+from servotwin.physics.elementary import log
 
 _BEYOND = 1e-13  # rad: so little is rounding
 _STEPS, _FEW = 200, 8  # after a few it is rounding that decides
@@ -68,7 +69,7 @@ def alike(one: Course, other: Course) -> float:
     dw, dw_other = one.pull - one.rate * one.w, other.pull - other.rate * other.w
     if dw * dw_other <= 0.0 or one.rate == other.rate:
         return math.inf
-    return math.log(dw_other / dw) / (other.rate - one.rate)
+    return log(dw_other / dw) / (other.rate - one.rate)
 
 
 def leaves(one: Course, other: Course, low: float, high: float, s0: float, s1: float, last: Lead) -> Leaving:

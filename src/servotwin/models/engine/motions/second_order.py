@@ -14,6 +14,8 @@ from __future__ import annotations
 
 import math
 
+from servotwin.physics.elementary import atan2, atanh, cos, exp, expm1, sin
+
 FAR = 0.01  # roots are far apart where their distance is a tenth of their mean
 
 
@@ -67,8 +69,8 @@ def _distinct(a: float, c: float, beta: float, s: float) -> tuple[float, float, 
     k = 0.5 / beta
     x1 = l1 * s
     x2 = l2 * s
-    m1 = math.expm1(x1)
-    m2 = math.expm1(x2)
+    m1 = expm1(x1)
+    m2 = expm1(x2)
     dg = (l1 * (m1 + 1.0) - l2 * (m2 + 1.0)) * k
     g = (m1 - m2) * k
     # integrals of exp(l s): s phi1(l s), s² phi2(l s), s³ phi3(l s)
@@ -95,18 +97,18 @@ def _phi2_phi3(x: float, phi1: float) -> tuple[float, float]:
 def _close(a: float, c: float, d: float, root: float, s: float) -> tuple[float, float, float, float, float]:
     # Complex roots, or real ones close together; here c s² is not small.
     z = d * s * s
-    decay = math.exp(-a * s)
+    decay = exp(-a * s)
     if -0.1 < z < 0.1:
         sh = decay * s * (1.0 + z * (1 / 6 + z * (1 / 120 + z * (1 / 5040 + z * (1 / 362880 + z / 39916800)))))
         ch = decay * (1.0 + z * (1 / 2 + z * (1 / 24 + z * (1 / 720 + z * (1 / 40320 + z / 3628800)))))
     elif d > 0.0:
-        slow = math.exp((root - a) * s)
-        fast = math.exp(-(root + a) * s)
+        slow = exp((root - a) * s)
+        fast = exp(-(root + a) * s)
         ch = 0.5 * (slow + fast)
         sh = 0.5 * (slow - fast) / root
     else:
-        ch = decay * math.cos(root * s)
-        sh = decay * math.sin(root * s) / root
+        ch = decay * cos(root * s)
+        sh = decay * sin(root * s) / root
     g = sh
     dg = ch - a * sh
     G1 = (1.0 - dg - 2.0 * a * g) / c
@@ -135,12 +137,12 @@ def propagate_with_integral(coefficients: tuple[float, ...], s: float) -> tuple[
         re = c - omega * omega
         im = 2.0 * a * omega
         scale = fs / (re * re + im * im)
-        qp = scale * (re * math.sin(phase) - im * math.cos(phase))
-        wp = scale * omega * (re * math.cos(phase) + im * math.sin(phase))
+        qp = scale * (re * sin(phase) - im * cos(phase))
+        wp = scale * omega * (re * cos(phase) + im * sin(phase))
         half = 0.5 * omega * s
-        chord = 2.0 * scale * math.sin(half)
-        ds = chord * math.cos(phase + half)
-        dc = -chord * math.sin(phase + half)
+        chord = 2.0 * scale * sin(half)
+        ds = chord * cos(phase + half)
+        dc = -chord * sin(phase + half)
         q += re * ds - im * dc + qp * c * G1 - wp * g
         w += omega * (re * dc + im * ds) + wp * (2.0 * a * g + c * G1) + c * qp * g
         integral += -(re * dc + im * ds) / omega - qp * (s - c * G2) - wp * G1
@@ -152,7 +154,7 @@ def acceleration(coefficients: tuple[float, ...], s: float, q: float, w: float) 
     a, c, f0, f1, fs, omega, phase, _, _ = coefficients
     qdd = f0 + f1 * s - c * q - 2.0 * a * w
     if fs != 0.0:
-        qdd += fs * math.sin(phase + omega * s)
+        qdd += fs * sin(phase + omega * s)
     return qdd
 
 
@@ -175,9 +177,9 @@ def first_zero_of(a: float, d: float, root: float, h0: float, h1: float) -> tupl
         x = -h0 / slope
         if x <= 0.0 or root * x >= 1.0:
             return math.inf, math.inf
-        return (math.atanh(root * x) / root if root * x > 1e-8 else x), math.inf
+        return (atanh(root * x) / root if root * x > 1e-8 else x), math.inf
     # h ~ h0 cos(root s) + (slope/root) sin(root s)
-    angle = math.atan2(-h0, slope / root)
+    angle = atan2(-h0, slope / root)
     if angle <= 0.0:
         angle += math.pi
     return angle / root, math.pi / root

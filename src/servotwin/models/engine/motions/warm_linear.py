@@ -21,6 +21,7 @@ from servotwin.models.state.modes import INSIDE, RIGID, Mode, Vector
 from servotwin.models.terms import play
 from servotwin.models.terms.heat import Heat, warming_rates
 from servotwin.models.terms.numbers import Numbers
+from servotwin.physics.elementary import power
 from servotwin.physics.motor import steady_armature_current
 
 POINTS = 5
@@ -72,18 +73,20 @@ def length(law: Law, heat: Heat, y: Vector, limit: float, tolerance: float) -> f
     rate = abs(_rate(law, heat, y))
     most: float = min(limit, _PART / rate) if rate > 0.0 else limit
     if law.slow > 0.0:
-        most = min(most, min(_LONGEST, 0.5 * (tolerance / (_RULE * _USUAL)) ** _NINTH) / law.slow)
+        most = min(most, min(_LONGEST, 0.5 * power(tolerance / (_RULE * _USUAL), _NINTH)) / law.slow)
     if law.fast == 0.0:
         return most
     F = abs(law.F)
     warms = law.copper * F * (F + 2.0 * abs(y.i - law.F)) / (heat.C_w * law.fast)
     part = abs(law.per_kelvin / law.copper) * warms
-    left = part * (abs(law.P) / law.fast + part * F) + 6.0 * abs(law.c_ff) * (law.slow + rate) / law.fast**4  # [A]
+    squared = law.fast * law.fast
+    left = part * (abs(law.P) / law.fast + part * F) + 6.0 * abs(law.c_ff) * (law.slow + rate) / (
+        squared * squared)  # [A]
     ends = left * law.per_ampere / law.fast + part * warms
     if left > _NONE:
-        most = min(most, (_SEEN * tolerance / left) ** 0.25 / law.fast)
+        most = min(most, math.sqrt(math.sqrt(_SEEN * tolerance / left)) / law.fast)
     if ends > _NONE:
-        most = min(most, (_STAYS * tolerance / ends) ** _SEVENTH / law.fast)
+        most = min(most, power(_STAYS * tolerance / ends, _SEVENTH) / law.fast)
     return most
 
 
@@ -170,7 +173,7 @@ def follow(law: Law, own: Heat, y: Vector, limit: float, tolerance: float) -> tu
         size = found.error / (tolerance * (1.0 + abs(y.w_m)))
         if size <= 1.0:
             return h, found
-        h *= max(_LEAST, _LESS * size**-_SIXTH) if size < math.inf else _LEAST
+        h *= max(_LEAST, _LESS * power(size, -_SIXTH)) if size < math.inf else _LEAST
         found = step(law, own, y, h)
     return 0.0, found
 

@@ -1,0 +1,284 @@
+"""A servo as C: a header and a source that need nothing but a compiler."""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from servotwin import __version__
+from servotwin.errors import InputError, OutputError, OutputExistsError
+from servotwin.export.c_header import HEADER, events_of, signals_of
+from servotwin.export.c_source import SOURCE
+from servotwin.export.features import features_of, left_out, recipe_of
+from servotwin.loads import as_load
+from servotwin.models import (
+    AveragedServo,
+    AveragedServoInductive,
+    BoundedServo,
+    DigitalServo,
+    Model,
+    PulseServo,
+    PulseServoInductive,
+)
+from servotwin.models.engine.alone import Alone, Happened, Seen
+from servotwin.models.engine.memory import ACCURACY, Inputs, Memories, Memory
+from servotwin.models.outputs import SIGNALS
+from servotwin.models.state.records import record_of
+from servotwin.models.terms import wiring
+from servotwin.models.terms.chip import NO_CHIP, Chip
+from servotwin.models.terms.control import Firm
+from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
+from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.sensor import table_of
+from servotwin.models.terms.wiring import Wiring
+from servotwin.simulation.compile.kinds import FLOAT64, INT64, Array, Kind, Record, Tuple
+from servotwin.simulation.compile.signatures import named
+from servotwin.simulation.compile.standalone import Standalone
+from servotwin.simulation.start import accuracy_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from servotwin.loads import Load, Part
+
+_COMMANDS = ("command_voltage", "command_angle", "pulse_width")  # are what the caller says
+_NAME = re.compile(r"[a-z][a-z0-9_]*")
+_KNOWN = (AveragedServo, AveragedServoInductive, BoundedServo, PulseServo, PulseServoInductive, DigitalServo)
+_TABLE = Array(FLOAT64, 2)
+_PROGRAM, _FIRM, _MEMORY, _EVENT = (Record(record_of(kind)) for kind in (Firmware, Firm, Memory, Happened))
+
+
+@dataclass(frozen=True)
+class CCode:
+    """A servo as C99.
+
+    Attributes
+    ----------
+    name : str
+        Begins the names of the files, types and functions.
+    header, source : str
+        The two texts.
+    left_out : str
+        What the numbers of the servo have no use for, and the code does not follow.
+    """
+
+    name: str
+    header: str
+    source: str
+    left_out: str
+
+    def write(self, folder: str | Path, *, overwrite: bool = False) -> tuple[Path, Path]:
+        """Write `name.h` and `name.c` into a folder, which is made where there is none; return their paths.
+
+        Raises
+        ------
+        OutputExistsError
+            If a file is there and `overwrite` is not given; then nothing has changed.
+        OutputError
+            If they cannot be written.
+        """
+        paths = Path(folder) / f"{self.name}.h", Path(folder) / f"{self.name}.c"
+        for path in paths:
+            if path.exists() and not overwrite:
+                raise OutputExistsError(path)
+        try:
+            Path(folder).mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(prefix=".servotwin-", dir=folder) as aside:
+                for path, text in zip(paths, (self.header, self.source), strict=True):
+                    (Path(aside) / path.name).write_text(text, encoding="utf-8")
+                for path in paths:
+                    os.replace(Path(aside) / path.name, path)
+        except OSError as error:
+            raise OutputError(f"{folder} cannot be written ({error.strerror or error})") from None
+        return paths
+
+
+def c(model: Model, load: Load | Part | None = None, *, name: str | None = None, accuracy: float = ACCURACY) -> CCode:
+    """Return a servo as C: a header and a source of functions that start it, let it go on, and look at it.
+
+    What they compute is what `Simulator` computes, of the same kernels. The numbers of servo and load stand in a table;
+    what these numbers have no use for is left out of the code.
+
+    Parameters
+    ----------
+    model : Model
+        Any but the two motors.
+    load : Load, optional
+        What hangs on the shaft; nothing unless given. A recorded torque is told at each call instead.
+    name : str, optional
+        Of the files, and the beginning of all names in them; that of the servo unless given.
+    accuracy : float
+        What angles may be off by where motions are integrated [rad].
+
+    Returns
+    -------
+    CCode
+
+    Raises
+    ------
+    InputError
+        If there is no C for the model or the load, or the name is none that C can have.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> code = c(st.PulseServo(st.load_servo("hitec-hs-755hb")))
+    >>> code.name
+    'hitec_hs_755hb'
+    >>> "int hitec_hs_755hb_advance(" in code.header
+    True
+    """
+    if not isinstance(model, _KNOWN):
+        got = type(model).__name__
+        raise InputError("export c", got=got, allowed="one of " + ", ".join(kind.__name__ for kind in _KNOWN))
+    hung = as_load(load)
+    if hung.recorded:
+        raise InputError("export c", got="a recorded torque", allowed="loads without one: torque is told at each call")
+    name = re.sub(r"\W", "_", model.servo.name.lower()) if name is None else name
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        raise InputError("export c: name", got=name, allowed="small letters, digits and _, a letter first")
+    return _Writing(model, hung, name, accuracy_of(accuracy)).code()
+
+
+class _Writing:
+    """The numbers of one servo on their way into C."""
+
+    def __init__(self, model: Any, load: Load, name: str, accuracy: float) -> None:
+        self._model, self._load, self._name = model, load, name
+        self._program: Firmware = model.firmware() or NO_FIRMWARE
+        self._chip: Chip = model.chip() or NO_CHIP
+        self._curve = table_of(model.curve())
+        self._numbers: Numbers = model.pack(load)
+        N = model.value("gear.gear_reduction")
+        self._alone = Alone(self._numbers, self._chip, wiring_of(model), N, load.torque, self._numbers.heat.T_amb,
+                            accuracy)
+        self._digital = isinstance(model, DigitalServo)
+
+    def code(self) -> CCode:
+        """Return header and source."""
+        flags = features_of(self._numbers, self._chip, self._program, len(self._curve) > 0)
+        text = Standalone(dict(self._public()))
+        names = text.add(recipe_of(flags), _signatures())
+        shared = {
+            "name": self._name, "guard": self._name.upper(), "version": __version__, "id": self._model.servo.name,
+            "title": f"{self._name}: {self._model.servo.name} as a {type(self._model).__name__}."}
+        return CCode(self._name, HEADER.substitute(shared | self._of_header(text, flags)),
+                     SOURCE.substitute(shared | names | self._of_source(text)), left_out(flags))
+
+    def _public(self) -> Iterator[tuple[str, Kind]]:
+        """Return the structs of the header, each after those in it."""
+        name, seen = self._name, set[Kind]()
+        roots: list[tuple[str, Kind]] = [("numbers", named(Alone)), ("memory", _MEMORY), ("event", _EVENT)]
+        if self._digital:
+            roots += [("program", _PROGRAM), ("firm", _FIRM)]
+        for own, root in roots:
+            for inner, kind in (*_within(root), (own, root)):
+                if kind not in seen:
+                    seen.add(kind)
+                    yield f"{name}_{inner}", kind
+
+    def _of_header(self, text: Standalone, flags: int) -> dict[str, str]:
+        name, structs = self._name, text.public
+        event = next(each for each in structs if each.endswith(f" {name}_event;"))
+        goals = self._alone.wiring.per_angle == 1.0
+        return {
+            "structs": "\n".join(map(_laid_out, (each for each in structs if each is not event))),
+            "event": _laid_out(event), "events": events_of(name.upper()),
+            "command": "a goal [rad]" if goals else "the width of a pulse [s]",
+            "example": f"{self._alone.wiring.at_zero + self._alone.wiring.per_angle:.6g}",
+            "absent": left_out(flags), "signals": signals_of(self._signals()),
+            "more": self._members((f"    {name}_program program;\n", self._digital),
+                                  ("    const double *curve; /* of the potentiometer: angle [rad] and error [V] */\n"
+                                   "    int64_t curve_rows;\n", len(self._curve) > 0)),
+            "remembered": self._members((f"    {name}_firm firm; /* of its program */\n", self._digital))}
+
+    @staticmethod
+    def _members(*parts: tuple[str, bool]) -> str:
+        return "".join(line for line, there in parts if there)
+
+    def _of_source(self, text: Standalone) -> dict[str, str]:
+        name, types = self._name, text.types
+        table = [f"    {types.initial(named(Alone), self._alone)}"]
+        kernels = text.private
+        if self._digital:
+            table.append(f"    {{{', '.join(types.initial(FLOAT64, float(x)) for x in self._program)}}}")
+        if self._curve:
+            rows = ", ".join(repr(float(x)) for row in self._curve for x in row)
+            kernels += f"\nstatic const double {name}_curve[] = {{{rows}}};\n"
+            table.append(f"    {name}_curve, {len(self._curve)}")
+        return {
+            "kernels": kernels, "table": ",\n".join(table).replace(", (-", ", (-") + "\n",
+            "memories": types.of(_MEMORIES), "inputs": types.of(_INPUTS), "seen": types.of(named(Seen)),
+            "rows": types.of(Array(_EVENT, 1)), "firms": "{&state->firm, {1}}" if self._digital else "{NULL, {0}}",
+            "period": ("servo->program.T_f" if self._digital else
+                       "servo->numbers.chip.frame_period" if self._chip.frame_period > 0.0 else "0.0"),
+            "curve": ("{(double *)(uintptr_t)servo->curve, {servo->curve_rows, 2}}" if self._curve
+                      else "{NULL, {0, 2}}"),
+            "program": (f"{{({name}_program *)(uintptr_t)&servo->program, {{1}}}}" if self._digital
+                        else "{NULL, {0}}"),
+            "signals": "\n".join(f"    signals->{signal} = {self._read(signal)};" for signal, *_ in self._signals())}
+
+    def _signals(self) -> list[tuple[str, str, str]]:
+        """Return names, units and meanings of the signals that the servo has."""
+        names = self._model.signals_with(self._load)
+        return [(name, SIGNALS[name].unit, SIGNALS[name].meaning) for name in names if name not in _COMMANDS]
+
+    @staticmethod
+    def _read(signal: str) -> str:
+        return f"seen.{signal}" if signal in ("output_angle", "output_speed") else f"seen.shown.{signal}"
+
+
+def wiring_of(model: Any) -> Wiring:
+    """Return how a model is told."""
+    if isinstance(model, BoundedServo):
+        return wiring.bounded(model.given)
+    if isinstance(model, AveragedServo | AveragedServoInductive):
+        return wiring.averaged(model.given)
+    return (wiring.digital if isinstance(model, DigitalServo) else wiring.pulsed)(model.given, np.nan)
+
+
+def _tuple(kind: Any, **fields: Kind) -> Tuple:
+    return Tuple(tuple(fields[name] for name in kind._fields), kind.__name__, kind._fields)
+
+
+_MEMORIES = _tuple(Memories, rows=Array(_MEMORY, 1), firms=Array(_FIRM, 1))
+_INPUTS = _tuple(Inputs, command=_TABLE, torque=_TABLE, constant_torque=FLOAT64, period=FLOAT64,
+                 edges=Array(FLOAT64, 1), curve=_TABLE, seed=INT64, accuracy=FLOAT64, firmware=Array(_PROGRAM, 1))
+
+
+@cache
+def _signatures() -> dict[str, tuple[Kind, ...]]:
+    """Return what the entries are called with."""
+    alone = named(Alone)
+    return {"start": (alone, _TABLE, _MEMORIES, FLOAT64),
+            "advance": (alone, _INPUTS, _MEMORIES, FLOAT64, FLOAT64, Array(_EVENT, 1), Array(INT64, 1)),
+            "answer": (alone, FLOAT64, FLOAT64), "observe": (alone, _INPUTS, _MEMORIES)}
+
+
+def _within(kind: Kind) -> Iterator[tuple[str, Kind]]:
+    """Return the structs within a struct, each after those in it, with the names of their places."""
+    if isinstance(kind, Tuple):
+        for place, inner in zip(kind.fields, kind.elements, strict=True):
+            if isinstance(inner, Tuple):
+                yield from _within(inner)
+                yield place, inner
+    elif isinstance(kind, Record):
+        for place in kind.dtype.names or ():
+            inner_type = kind.dtype[place]
+            if inner_type.names:
+                yield from _within(Record(inner_type))
+                yield place, Record(inner_type)
+
+
+def _laid_out(struct: str) -> str:
+    """Return a struct with a member on each line."""
+    head, _, rest = struct.partition("{ ")
+    body, _, name = rest.rpartition(" }")
+    return "\n".join([f"{head}{{", *(f"    {each.strip()};" for each in body.split(";") if each.strip()), f"}}{name}"])

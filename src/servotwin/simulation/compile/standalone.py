@@ -1,0 +1,74 @@
+"""Kernels as a text that stands alone: structs with names of their own and functions over them.
+
+It has no globals, allocates nothing, and says the same digits wherever doubles are those of IEEE 754. All functions are
+`static`; who writes the text adds those that others call.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from servotwin.simulation.compile.derive import derive
+from servotwin.simulation.compile.inference import Module
+from servotwin.simulation.compile.kinds import Kind
+from servotwin.simulation.compile.printing import Printer
+from servotwin.simulation.compile.translate import part_of_header
+
+if TYPE_CHECKING:
+    from servotwin.simulation.compile.c_types import Types
+    from servotwin.simulation.compile.recipe import Recipe
+
+_ONCE = frozenset({  # called at one place, with structs of a kilobyte that would be copied: a third of the time
+    "engine_alone__advance", "engine_alone__run", "engine_memory__resumed", "engine_step__step", "engine_step__onward",
+    "engine_step__follow", "motions_choice__begin", "motions_motion__nothing", "motions_motion__closed"})
+_SIZES = re.compile(r"\nCHECKED_SIZE\(.*?\);")
+
+
+class Standalone:
+    """A text in C that grows by the entries of recipes.
+
+    Parameters
+    ----------
+    public : mapping of str to kind
+        Structs that others see, by their names, each after those in it.
+    """
+
+    def __init__(self, public: Mapping[str, Kind]) -> None:
+        self._printer = Printer(False, frozenset(), frozenset(), _ONCE)
+        for name, kind in public.items():
+            self.types.call(kind, name)
+        self._public = len(self.types.structs)
+
+    @property
+    def types(self) -> Types:
+        """What values are called in the text."""
+        return self._printer.types
+
+    def add(self, recipe: Recipe, signatures: Mapping[str, Sequence[Kind]]) -> dict[str, str]:
+        """Print the entries of a recipe, called with arguments of these kinds; return their names in C.
+
+        Raises
+        ------
+        TranslationError
+            If a kernel contains what has no form in C.
+        """
+        derived = derive(recipe)
+        module = Module(derived)
+        return {entry: self._printer.name_of(module.specialised(derived.entries[entry], tuple(kinds)))
+                for entry, kinds in signatures.items()}
+
+    @property
+    def public(self) -> list[str]:
+        """The structs that others see."""
+        return [_SIZES.sub("", each) for each in self.types.structs[:self._public]]
+
+    @property
+    def private(self) -> str:
+        """All else: what the functions stand on, and the functions."""
+        types = self.types
+        sizes = [size[1:] for each in types.structs[:self._public] for size in _SIZES.findall(each)]
+        parts = (part_of_header(name) for name in ("standalone.h", "arithmetic.h"))
+        return "\n".join([*parts, *sizes, *types.structs[self._public:], *types.tables, *types.helpers, "",
+                          *self._printer.functions])
