@@ -232,7 +232,7 @@ class LiveBench:
 
     def _seen(self, until: float, rate: float, switches: bool) -> list[Seen]:
         if self._supply is not None:
-            return self._supply.advance(until, looks(self.time, until, rate), switches=switches)
+            return self._supply.advance(until, rate, switches=switches)
         return [station.advance(until, rate, switches=switches) for station in self._stations]
 
     def _catch_up(self, most: float = math.inf) -> None:
@@ -334,18 +334,6 @@ _WAYS: dict[str, Callable[[LiveBench, Action], list[Callable[[], object]]]] = {
     "command": LiveBench._command, "set": LiveBench._set, "push": LiveBench._push, "frames": LiveBench._frames,
     "register": LiveBench._register, "torque": LiveBench._torque,
     "control": LiveBench._control}
-
-
-def looks(start: float, until: float, rate: float) -> list[float]:
-    """Return the times of a regular grid after `start`, and `until` itself [s]; `rate` is in Hz.
-
-    Examples
-    --------
-    >>> looks(0.0, 0.25, 10.0)
-    [0.1, 0.2, 0.25]
-    """
-    first, last = math.floor(start * rate) + 1, math.ceil(until * rate)
-    return [k / rate for k in range(first, last) if start < k / rate < until] + [until]
 
 
 def numbers_for(model: Model, values: dict[str, Any]) -> dict[str, Any]:

@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from typing import Any
 
-from servotwin.models.engine.live import making, stretch
+from servotwin.models.engine import controller
+from servotwin.models.engine.batch.tiles import Lanes
+from servotwin.models.engine.bus import bus_inputs, bus_unit
+from servotwin.models.engine.bus.bus_inputs import Tables
+from servotwin.models.engine.bus.bus_records import put_shared
+from servotwin.models.engine.bus.coupled_motion import at_start
+from servotwin.models.engine.bus.event_log import Tape
+from servotwin.models.engine.live import making, stretch, together
 from servotwin.models.engine.live import posts as those
 from servotwin.models.engine.live import sender as transmitter
 from servotwin.models.engine.live.posts import Told
 from servotwin.models.engine.live.screen import NEXT, USED, Looks, Screen, first_look
-from servotwin.models.engine.memory import Memories, memory_at, put_memory
+from servotwin.models.engine.memory import Memories, memory_at, put_memory, resumed
 from servotwin.models.engine.step import COMPLETED
+from servotwin.models.terms import duty
+from servotwin.models.terms.source import Source
 from servotwin.physics.converter import counted
 
 PAUSED = -1  # as a status: the room for what shows is half full
@@ -63,40 +72,113 @@ def next_edge(sender: Any) -> float:
 
 def advance(posts: Any, told: Told, programs: Any, memories: Memories, sender: Any, until: float, rate: float,
             switches: int, rows: Any, events: Any, pulses: Any, used: Any) -> int:
-    """Go on to a time [s]; return a status.
+    """Go on to a time [s], each servo on its own supply; return a status.
 
     Each servo has tables `rows`, `events` and `pulses` for what shows; how much of these is `used` stands as in
     `Screen`. The sender's time is how far the bench has come.
     """
-    now = sender[0]
-    k = first_look(now.time, rate)
-    for n in range(len(posts)):
-        used[USED * n], used[USED * n + 1], used[USED * n + 2], used[USED * n + NEXT] = 0, 0, 0, k
-    while transmitter.snapped(now, until) > now.time:
-        for n in range(len(posts)):
-            if used[USED * n] * 2 > len(rows[n]) or used[USED * n + 1] * 2 > len(events[n]) or (
-                    used[USED * n + 2] * 2 > len(pulses[n])):
-                return PAUSED
-        end = min(transmitter.snapped(now, until), now.base + (now.passed + _FRAMES) / now.rate, now.time + _LONGEST,
-                  now.time + len(rows[0]) / (4.0 * rate))
-        end = transmitter.snapped(now, until) if until - end <= _REST else end
+    now, status = sender[0], COMPLETED
+    _begin_looks(posts, first_look(now.time, rate), used)
+    while status == COMPLETED and transmitter.snapped(now, until) > now.time:
+        if _is_full(rows, events, pulses, used):
+            return PAUSED
+        end = _end_of_part(now, until, rate, len(rows[0]))
         those.hear(now, posts, told, pulses, used, end)
         last = 1 if end == transmitter.snapped(now, until) else 0
         for n in range(len(posts)):
             looks = Looks(used[USED * n + NEXT], rate, end, last, switches)
-            status = _advance_one(posts[n], n, told, programs, memories, looks,
-                                  Screen(rows[n], events[n], used[USED * n:USED * n + USED]))
-            if status != COMPLETED:
-                return status
-        now.time = end
-    return COMPLETED
+            how = _advance_one(posts[n], n, len(posts), told, programs, memories, looks,
+                               Screen(rows[n], events[n], used[USED * n:USED * n + USED]))
+            status = how if how != COMPLETED else status
+        if status == COMPLETED:
+            now.time = end
+    return status
 
 
-def _advance_one(post: Any, k: int, told: Told, programs: Any, memories: Memories, looks: Looks,
+def advance_together(posts: Any, told: Told, programs: Any, memories: Memories, sender: Any, lanes: Lanes,
+                     tables: Tables, shared: Any, seats: Any, mates: Any, tape: Tape, until: float, rate: float,
+                     switches: int, rows: Any, events: Any, pulses: Any, used: Any) -> int:
+    """Go on to a time [s], all servos on one supply; return a status.
+
+    Pieces and edges of the lanes are those of `told`; there are twice as many mates as servos.
+    """
+    now, status = sender[0], COMPLETED
+    _begin_looks(posts, first_look(now.time, rate), used)
+    while status == COMPLETED and transmitter.snapped(now, until) > now.time:
+        if _is_full(rows, events, pulses, used):
+            return PAUSED
+        end = _end_of_part(now, until, rate, len(rows[0]))
+        those.hear(now, posts, told, pulses, used, end)
+        looks = Looks(used[NEXT], rate, end, 1 if end == transmitter.snapped(now, until) else 0, switches)
+        _take_seats(posts, told, memories, lanes, bus_inputs.Told(lanes, tables), shared[0], seats)
+        status = together.go_on(bus_inputs.Told(lanes, tables), posts, memories.firms, shared[0], seats, mates, looks,
+                                tape, rows, events, used)
+        for n in range(len(posts)):
+            memory = bus_unit.memory_in(seats[n], memories.firms)
+            if duty.present(posts[n].numbers.bridge):
+                controller.pause(bus_inputs.inputs_at(bus_inputs.Told(lanes, tables), seats[n]), memory)
+            put_memory(memories.rows[n], memory)
+        if status == COMPLETED:
+            now.time = end
+    return status
+
+
+def _begin_looks(posts: Any, k: int, used: Any) -> None:
+    for n in range(len(posts)):
+        used[USED * n], used[USED * n + 1], used[USED * n + 2], used[USED * n + NEXT] = 0, 0, 0, k
+
+
+def _is_full(rows: Any, events: Any, pulses: Any, used: Any) -> bool:
+    """Tell whether the room for what shows is half full."""
+    for n in range(len(rows)):
+        if used[USED * n] * 2 > len(rows[n]) or used[USED * n + 1] * 2 > len(events[n]) or (
+                used[USED * n + 2] * 2 > len(pulses[n])):
+            return True
+    return False
+
+
+def _end_of_part(now: Any, until: float, rate: float, room: int) -> float:
+    """Return how far to go at once: so that pulses and looks have room [s]."""
+    whole = transmitter.snapped(now, until)
+    end = min(whole, now.base + (now.passed + _FRAMES) / now.rate, now.time + _LONGEST, now.time + room / (4.0 * rate))
+    return whole if until - end <= _REST else end
+
+
+def _take_seats(posts: Any, told: Told, memories: Memories, lanes: Lanes, on_bus: Any, shared: Any, seats: Any) -> None:
+    """Let all servos take their seats on the bus, told what they are told now."""
+    others = False
+    for n in range(len(posts)):
+        post = posts[n]
+        lanes.piece_first[n], lanes.piece_count[n] = those.pieces_of(post, n, len(posts), told)
+        lanes.edge_first[n] = those.train_of(told, len(posts), n)[0]
+        lanes.edge_count[n] = post.heard if post.pulsed == 1 else -1
+        lanes.torque[n], lanes.seeds[n] = post.torque + post.push, post.seed
+        seats[n].place, seats[n].lane = n, n
+        others = others or post.changed == 1
+    for n in range(len(posts)):
+        post, seat, inputs = posts[n], seats[n], bus_inputs.inputs_at(on_bus, seats[n])
+        memory = memory_at(memories, n)
+        if duty.present(post.numbers.bridge):
+            beat = memory.beat
+            memory = resumed(True, inputs, memory, False)
+            controller.resume(inputs, memory)
+            others = others or memory.beat != beat
+        bus_unit.sit(seat, those.numbers_of(post.numbers), those.chip_of(post.chip), inputs)
+        bus_unit.remember(seat, memory)
+        post.changed = 0
+    if others:
+        for n in range(len(posts)):
+            bus_unit.forget(seats[n])
+            seats[n].joined = -1
+        source = posts[0].numbers.source
+        put_shared(shared, at_start(Source(source.V, source.R_b, source.I_max)))
+
+
+def _advance_one(post: Any, k: int, servos: int, told: Told, programs: Any, memories: Memories, looks: Looks,
                  screen: Screen) -> int:
     """Let one servo go on by itself; return a status."""
     memory, was, status = stretch.go_on(
-        those.numbers_of(post.numbers), those.chip_of(post.chip), those.inputs_of(post, k, told, programs),
+        those.numbers_of(post.numbers), those.chip_of(post.chip), those.inputs_of(post, k, servos, told, programs),
         memory_at(memories, k), post.changed == 1, those.was_of(post.was), looks, those.lines_of(post.lines), screen)
     if status == COMPLETED:
         put_memory(memories.rows[k], memory)

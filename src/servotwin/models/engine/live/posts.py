@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.models.engine.live import shapes
-from servotwin.models.engine.live.screen import USED, Lines, Switch
+from servotwin.models.engine.live.screen import USED, Lines, Said, Switch
 from servotwin.models.engine.live.sender import is_lost, next_edge, pass_edge
 from servotwin.models.engine.memory import Inputs, Memories, in_force, memory_at, put_memory, put_started, with_bodies
 from servotwin.models.state.modes import INSIDE, RIGID, Vector
@@ -24,6 +24,7 @@ UNITS = ("us", "deg", "V")
 _SI = (1e-6, math.pi / 180.0, 1.0)
 NEVER = 1e9  # s: when the pulse begins that stands for those before the first
 NONE_BEFORE = Switch(0.0, 0.0, -1)
+NOTHING_SAID = Said(0.0, 0.0, -1, 0.0, 0.0, 0.0, 0)
 
 
 class Follow(NamedTuple):
@@ -42,6 +43,7 @@ class Post(NamedTuple):
     width: Follow  # in the order of `UNITS`
     angle: Follow
     voltage: Follow
+    said: Said  # what showed of chip or program at the end of the latest stretch, on a shared supply
     was: Switch  # how its bridge drove at the end of the latest stretch
     lowest: float  # where it may begin [rad]
     highest: float
@@ -56,21 +58,27 @@ class Post(NamedTuple):
     curve_first: int  # in that of potentiometers
     curve_count: int
     heard: int  # rows of its train of pulses
+    zone: int  # its mode before its bridge switches, on a shared supply
+    contact: int
+    mesh: int
+    motor: int
+    share: int
 
 
 class Told(NamedTuple):
-    """What servos at a bench are told: tables of pieces, of potentiometers, and trains of pulses with their edges."""
+    """What servos at a bench are told: a table of pieces, one of potentiometers, and edges of pulses [s]."""
 
-    commands: Floats
+    commands: Floats  # the first rows are for trains, as many for each servo as there are edges
     curves: Floats
-    trains: Any  # shape (servos, pulses, 7)
-    edges: Any  # shape (servos, pulses)
+    edges: Floats
 
 
 numbers_of = record_reader("numbers_of", Numbers)
 chip_of = record_reader("chip_of", Chip)
 lines_of = record_reader("lines_of", Lines)
 was_of = record_reader("was_of", Switch)
+said_of = record_reader("said_of", Said)
+put_said = record_writer("put_said", Said)
 put_was = record_writer("put_was", Switch)
 put_numbers = record_writer("put_numbers", Numbers)
 put_chip = record_writer("put_chip", Chip)
@@ -95,6 +103,12 @@ def take(post: Any, unit: int, shape: int, given: Floats, time: Floats, value: F
     return count
 
 
+def train_of(told: Told, servos: int, k: int) -> tuple[int, int]:
+    """Return where the train of a servo begins among commands and edges, and where it ends."""
+    room = len(told.edges) // servos
+    return k * room, (k + 1) * room
+
+
 def asked(post: Any, told: Told, time: float) -> float:
     """Return what a command asks for at a time [s]."""
     rows = told.commands[post.command_first:post.command_first + post.command_count]
@@ -106,14 +120,15 @@ def begin(posts: Any, k: int, told: Told, memories: Memories) -> None:
     """Let a servo stand, without drive, where its first command asks for."""
     post = posts[k]
     first = asked(post, told, 0.0)
-    told.trains[k][0, 0], told.trains[k][0, 1], told.edges[k, 0], post.heard = NEVER, first, NEVER, 1
-    for n in range(2, 7):
-        told.trains[k][0, n] = 0.0
+    at, _ = train_of(told, len(posts), k)
+    _put_pulse(told, at, NEVER, first)
+    post.heard = 1
     angle = min(max(post.lines.per_angle * first + post.lines.angle, post.lowest), post.highest)
     warm = post.numbers.heat.T_amb
     put_started(memories, k, Vector(angle, 0.0, 0.0, warm, warm, angle, 0.0),
                 INSIDE if play.present(numbers_of(post.numbers).play) else RIGID)
     put_was(post.was, NONE_BEFORE)
+    put_said(post.said, NOTHING_SAID)
     post.changed = 1
 
 
@@ -138,7 +153,7 @@ def hear(sender: Any, posts: Any, told: Told, pulses: Any, used: Any, until: flo
             if posts[k].pulsed == 1:
                 width = asked(posts[k], told, edge)
                 if not lost:
-                    _take(posts[k], told.trains[k], told.edges[k], edge, width, fresh)
+                    _take(posts[k], told, train_of(told, len(posts), k)[0], edge, width, fresh)
                 n = used[USED * k + 2]
                 if n < len(pulses[k]):
                     pulses[k][n, 0], pulses[k][n, 1] = edge, 0.0 if lost else width
@@ -148,27 +163,36 @@ def hear(sender: Any, posts: Any, told: Told, pulses: Any, used: Any, until: flo
         edge = next_edge(sender)
 
 
-def _take(post: Any, train: Floats, edges: Floats, edge: float, width: float, fresh: bool) -> None:
+def _take(post: Any, told: Told, at: int, edge: float, width: float, fresh: bool) -> None:
     """Put a pulse behind those of a stretch; the first of it comes behind the latest of the stretch before."""
     if fresh:
-        last = post.heard - 1
+        last = at + post.heard - 1
         post.heard = 0
-        if train[last, 0] < edge:
-            train[0, 0], train[0, 1], edges[0], post.heard = train[last, 0], train[last, 1], edges[last], 1
-    n = post.heard
-    train[n, 0], train[n, 1], edges[n] = edge, width, edge
+        if told.edges[last] < edge:
+            _put_pulse(told, at, told.edges[last], told.commands[last, 1])
+            post.heard = 1
+    _put_pulse(told, at + post.heard, edge, width)
+    post.heard += 1
+
+
+def _put_pulse(told: Told, n: int, edge: float, width: float) -> None:
+    told.commands[n, 0], told.commands[n, 1], told.edges[n] = edge, width, edge
     for place in range(2, 7):
-        train[n, place] = 0.0
-    post.heard = n + 1
+        told.commands[n, place] = 0.0
 
 
-def inputs_of(post: Any, k: int, told: Told, programs: Any) -> Inputs:
+def pieces_of(post: Any, k: int, servos: int, told: Told) -> tuple[int, int]:
+    """Return where the pieces that a servo follows begin in the table, and how many there are."""
+    if post.pulsed == 1:
+        return train_of(told, servos, k)[0], post.heard
+    return post.command_first, post.command_count
+
+
+def inputs_of(post: Any, k: int, servos: int, told: Told, programs: Any) -> Inputs:
     """Return what a servo is told now."""
     curve = told.curves[post.curve_first:post.curve_first + post.curve_count]
-    none = told.curves[0:0]
-    if post.pulsed == 1:
-        return Inputs(told.trains[k][:post.heard], none, post.torque + post.push, 0.0, told.edges[k][:post.heard],
-                      curve, post.seed, post.accuracy, programs[k:k + 1])
-    return Inputs(told.commands[post.command_first:post.command_first + post.command_count], none,
-                  post.torque + post.push, 0.0, told.edges[k][:0], curve, post.seed, post.accuracy,
-                  programs[k:k + 1])
+    first, count = pieces_of(post, k, servos, told)
+    at = train_of(told, servos, k)[0]
+    edges = told.edges[at:at + (post.heard if post.pulsed == 1 else 0)]
+    return Inputs(told.commands[first:first + count], told.curves[0:0], post.torque + post.push, 0.0, edges, curve,
+                  post.seed, post.accuracy, programs[k:k + 1])

@@ -88,7 +88,7 @@ def first_look(start: float, rate: float) -> int:
     return k + 1 if k / rate <= start else k
 
 
-class Told(NamedTuple):
+class Said(NamedTuple):
     """What shows of a chip or a program, by the names of what it remembers."""
 
     drive: float
@@ -100,22 +100,22 @@ class Told(NamedTuple):
     trip: int
 
 
-def told_of(memory: Memory, program: bool) -> Told:
+def told_of(memory: Memory, program: bool) -> Said:
     """Return what shows of a chip or a program now; it may change in place."""
     chip = memory.chip
     if not program:
-        return Told(chip.drive, chip.error, chip.silent, 0.0, 0.0, 0.0, 0)
+        return Said(chip.drive, chip.error, chip.silent, 0.0, 0.0, 0.0, 0)
     firm = memory.firm[0]
     drive = math.copysign(1.0, firm.duty) if duty.drives(firm.duty) else 0.0
-    return Told(drive, chip.error, chip.silent, firm.duty, firm.goal, firm.r, firm.trip)
+    return Said(drive, chip.error, chip.silent, firm.duty, firm.goal, firm.r, firm.trip)
 
 
-def switch_of(told: Told) -> Switch:
+def switch_of(told: Said) -> Switch:
     """Return how a bridge drives now."""
     return Switch(told.drive, told.duty if abs(told.duty) > 1.0 else 0.0, told.silent)
 
 
-def see(screen: Screen, lines: Lines, inputs: Inputs, memory: Memory, told: Told, m: Motion, wiper: float,
+def see(screen: Screen, lines: Lines, inputs: Inputs, memory: Memory, told: Said, m: Motion, wiper: float,
         time: float) -> Motion:
     """Write a row of a time [s] on a motion that began with a wiper there [rad]; return the motion, prepared for it."""
     if screen.used[0] >= len(screen.rows):
@@ -125,27 +125,27 @@ def see(screen: Screen, lines: Lines, inputs: Inputs, memory: Memory, told: Told
     if motion.is_step(m) and 0.0 < age < m.length:
         m = motion.prepared(m)
     y = motion.state(m, age)
-    write(screen, lines, inputs, told, m.numbers, m.mode, piece_value(m.u, local), piece_value(m.tau, local), y,
-          wiper_at(m.numbers.sensor, wiper, y.q), time)
+    write(screen, lines, inputs, told, warm(m.numbers, y), m.mode, piece_value(m.u, local), piece_value(m.tau, local),
+          y, wiper_at(m.numbers.sensor, wiper, y.q), time)
     return m
 
 
-def see_before(screen: Screen, lines: Lines, inputs: Inputs, numbers: Numbers, before: Memory, told: Told) -> None:
+def see_before(screen: Screen, lines: Lines, inputs: Inputs, numbers: Numbers, before: Memory, told: Said) -> None:
     """Write a row of a servo as it stood at the end of a motion, before its bridge switches."""
     if screen.used[0] >= len(screen.rows):
         return
     point = before.point
     time = origin_of(before) + point.time
     now = duty.at_duty(numbers, told.duty) if duty.present(numbers.bridge) else at_pulses(numbers, told.silent)
-    write(screen, lines, inputs, told, now, point.mode, piece_value(before.u, time), piece_value(before.tau, time),
-          point.y, point.wiper, time)
+    write(screen, lines, inputs, told, warm(now, point.y), point.mode, piece_value(before.u, time),
+          piece_value(before.tau, time), point.y, point.wiper, time)
 
 
-def write(screen: Screen, lines: Lines, inputs: Inputs, told: Told, numbers: Numbers, mode: Mode, u: float, tau: float,
+def write(screen: Screen, lines: Lines, inputs: Inputs, told: Said, numbers: Numbers, mode: Mode, u: float, tau: float,
           y: Vector, wiper: float, time: float) -> None:
-    """Write a row of a servo that stands at y, whose numbers are those of this instant but for its temperatures."""
+    """Write a row of a servo that stands at y, whose numbers are those of this instant."""
     n = screen.used[0]
-    shown = observed(warm(numbers, y), inputs.curve, mode, u, tau, y, wiper, told.drive, told.error)
+    shown = observed(numbers, inputs.curve, mode, u, tau, y, wiper, told.drive, told.error)
     if duty.present(numbers.bridge):
         shown = told_by(numbers.bridge, told, shown)
     piece, _ = in_force(inputs.command, 0.0, time, 0.0)

@@ -13,9 +13,9 @@ from servotwin.models.engine.live.screen import (
     TRIPS,
     Lines,
     Looks,
+    Said,
     Screen,
     Switch,
-    Told,
     code_of,
     note,
     reached,
@@ -104,7 +104,7 @@ def go_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, changed:
     return memory, was, COMPLETED
 
 
-def _note_doings(chip: Chip, inputs: Inputs, numbers: Numbers, before: Memory, said: Told, memory: Memory, told: Told,
+def _note_doings(chip: Chip, inputs: Inputs, numbers: Numbers, before: Memory, said: Said, memory: Memory, told: Said,
                  screen: Screen) -> None:
     """Note what a chip or a program has done in a step that people are told of."""
     time = time_of(before)
