@@ -21,16 +21,23 @@ def drawn(seed: int, servos: int = 0) -> dict:
     """Return a bench and what is done at it, as the harness takes it."""
     rng = random.Random(seed)
     found = []
-    while len(found) < (servos or rng.choice((1, 1, 2, 3))):
-        servo = SceneServo(id=rng.choice(catalog_names()), model=rng.choice(SERVO_MODELS))
+    count, kinds = servos or rng.choice((1, 1, 2, 3)), rng.choice((SERVO_MODELS, SERVO_MODELS[3:5], SERVO_MODELS[5:]))
+    while len(found) < count:
+        servo = SceneServo(id=rng.choice(catalog_names()), model=rng.choice(kinds))
         try:
             models_of(Scene(servos=(servo,)))
         except ServotwinError:
             continue
         found.append(servo)
+    kinds = {servo.model for servo in found}
+    pulsed = kinds <= {"PulseServo", "PulseServoInductive"}
+    supply: dict[str, float] = {}
+    if (pulsed or kinds == {"DigitalServo"}) and rng.random() < 0.5:
+        supply = {"open_circuit_voltage": rng.uniform(5.0, 7.0), "internal_resistance": rng.uniform(0.1, 1.0)}
+        supply |= {"current_limit": rng.uniform(1.0, 4.0)} if rng.random() < 0.3 else {}
     load = {name: rng.uniform(*ends) for name, ends in LOADS.items() if rng.random() < 0.4}
     scene = Scene(servos=tuple(found), seed=rng.randrange(1000), frame_rate=rng.choice((50.0, 50.0, 100.0, 31.7)),
-                  load={"inertia": 1e-4} | load)
+                  load={"inertia": 1e-4} | load, supply=supply)
     until, steps = 0.0, []
     for _ in range(rng.randint(3, 8)):
         until += rng.choice((0.0, 0.013, 0.02, 0.1, 0.25))

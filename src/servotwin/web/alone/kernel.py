@@ -12,11 +12,16 @@ from typing import Any
 import numpy as np
 
 from servotwin.errors import InputError
+from servotwin.models.engine.batch.tiles import Lanes
+from servotwin.models.engine.bus import event_log
+from servotwin.models.engine.bus.bus_inputs import Tables
+from servotwin.models.engine.bus.bus_records import ROOM, Mate, Seat, Shared
 from servotwin.models.engine.live.making import Weights
 from servotwin.models.engine.live.posts import Post
 from servotwin.models.engine.live.sender import Sender
 from servotwin.models.engine.memory import Memory
-from servotwin.models.state.records import record_of
+from servotwin.models.state.records import record_of, rows_of
+from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.control import Firm
 from servotwin.models.terms.firmware import Firmware
 from servotwin.models.terms.given import Given
@@ -89,13 +94,16 @@ def _compiled(compiler: Compiler, source: Path, made: Path) -> str:
 
 def layout() -> dict[str, Any]:
     """Return where a page finds what it writes and reads: fields of records, and arguments of entries."""
-    kinds = {"post": Post, "sender": Sender, "memory": Memory, "firm": Firm, "program": Firmware,
+    kinds = {"shared": Shared, "seat": Seat, "mate": Mate, "post": Post, "sender": Sender, "memory": Memory, "firm": Firm, "program": Firmware,
              "given": Given, "weights": Weights}
     records = {name: {"size": record_of(kind).itemsize, "at": _places(record_of(kind))} for name, kind in kinds.items()}
     known = dict(signatures(BENCH))
     entries = {one.name: {"kinds": [_told(kind) for kind in known[one.name]], "result": one.result}
                for one in _printed().entries}
-    return {"records": records, "entries": entries, "words": _WORDS, "page": _PAGE}
+    tiles = {"size": rows_of(Chip, np.float64).itemsize, "at": {}}
+    return {"records": {**records, "chips": tiles}, "entries": entries, "words": _WORDS, "page": _PAGE,
+            "lanes": Lanes._fields, "tables": Tables._fields, "event": event_log.EVENT, "row": event_log.ROW,
+            "series": 2 * ROOM}
 
 
 def _places(kind: np.dtype[Any]) -> dict[str, Any]:

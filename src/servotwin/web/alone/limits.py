@@ -13,6 +13,7 @@ from servotwin.web.live.said import FRAME_RATE, RATES
 from servotwin.web.live.scene import FORMAT, LONGEST_TEXT, MOST_ACTIONS, MOST_SERVOS, MOST_VIEW
 from servotwin.web.server import pace, room, stint
 
+_AT_ONCE = 16  # rows of what each servo on a shared supply does at once
 _ROWS, _EVENTS, _PULSES, _TRAIN, _GIVEN = 4096, 512, 1024, 64, 8  # room for what shows, and what is told
 
 
@@ -26,6 +27,7 @@ def limits() -> dict[str, Any]:
     """
     return {
         "rows": _ROWS, "events": _EVENTS, "pulses": _PULSES, "train": _TRAIN, "used": USED, "given": _GIVEN,
+        "at_once": _AT_ONCE,
         "piece": len(Piece._fields), "most_pieces": 2 * PERIODS + 1, "never": NEVER,
         "frame_rate": FRAME_RATE, "accuracy": ACCURACY, "rates": RATES,
         "format": FORMAT, "actions": MOST_ACTIONS, "servos": MOST_SERVOS,

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from servotwin.parameters import GROUPS
+from servotwin.simulation.bus_supply import MODEL_NAMES
 
 ONLY_WITH_SERVER = "only with the server: servotwin web"
 WORDS = {
     "alone": "This bench computes here, without a server. Only with one (servotwin web): fits, "
-             "registers, servo files, supplies that servos share, mystery servos, logs, tables.",
+             "registers, servo files, mystery servos, logs, tables.",
     "only_with_server": ONLY_WITH_SERVER,
     "types": {"number": "float", "whole": "int", "string": "str", "boolean": "bool", "array": "list", "object": "dict"},
     "digits": 6, "smallest": -4,
@@ -23,8 +24,12 @@ WORDS = {
     "takes_goals": "{kind} command of {name}: got '{word}', allowed: angles: it takes goals on a bus "
                    "(firmware.command_kind)",
     "no_such_command": "command of {name}: allowed: none of this unit",
-    "no_shared_supply": "supply of a scene: got 'one that servos share', allowed: one of each servo's own; "
-                        + ONLY_WITH_SERVER,
+    "no_supply": "supply of a scene: allowed: a Supply with open_circuit_voltage, such as "
+                 "Supply(open_circuit_voltage=6.0, internal_resistance=0.5)",
+    "bus_models": MODEL_NAMES,
+    "rigid": "a stiff gear and shaft: on a shared supply there are no springs between two bodies",
+    "mixed": "servos on a shared supply: got 'some with programs, some without', allowed: one kind; "
+             "both " + ONLY_WITH_SERVER,
     "no_inertia": "gear.backlash: got {got}, allowed: play only with inertia behind it: gear.output_inertia, or a load "
                   "that has some",
     "frame_rate": "frame rate: got {got}, allowed: frames that a pulse fits into",

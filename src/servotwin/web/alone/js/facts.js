@@ -28,10 +28,22 @@ export class Servo {
     this.changed = new Map();
     this.load = { ...world.no_load, ...scene.load };
     this.change(one.parameters);
-    if (Object.keys(scene.supply).length) {
-      if (!world.switched.includes(this.model)) refuse("only_with_server");
-      refuse("no_shared_supply");
-    }
+  }
+
+  /**
+   * Take a supply that several servos share in the place of its own.
+   * @param {Record<string, number>} supply
+   * @param {number} number of the servo, from 1 on
+   */
+  hang(supply, number) {
+    const { world } = this;
+    const [volts] = world.of_bus;
+    const given = Object.fromEntries(Object.entries(supply).map(([name, value]) => [`supply.${name}`, value]));
+    for (const name of world.of_bus) this.values.set(name, null);
+    this.change(given);
+    if (!(volts in given)) refuse("no_supply");
+    if (!world.switched.includes(this.model)) wrong(`model of servo ${number} on a shared supply`, this.model, world.words.bus_models);
+    if (this.reads.has("gear.stiffness") && Number.isFinite(this.value("gear.stiffness"))) wrong(`servo ${number} on a shared supply`, "gear.stiffness", world.words.rigid);
   }
 
   get columns() { return this.own.columns; }

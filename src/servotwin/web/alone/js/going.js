@@ -13,7 +13,7 @@ export class Going {
    * @param {Kernel} kernel
    * @param {any} world
    * @param {Servo[]} servos
-   * @param {{seed: number, frame_rate: number}} scene
+   * @param {{seed: number, frame_rate: number, supply: any}} scene
    */
   constructor(kernel, world, servos, scene) {
     kernel.clear();
@@ -34,9 +34,10 @@ export class Going {
     this.ends = kernel.take(2, 2);
     this.given = kernel.take(world.limits.given);
     this.none = { address: this.ends.address, lengths: [0] };
-    this.room = 2 * n * world.limits.most_pieces; // rows of the table of commands
+    this.trains = n * train; // rows of the table of commands that trains of pulses have
+    this.room = this.trains + 2 * n * world.limits.most_pieces; // rows of it in all
     this.commands = kernel.take(this.room, world.limits.piece);
-    this.told = [this.commands, { ...this.none, lengths: [0, 2] }, kernel.take(n, train, world.limits.piece), kernel.take(n, train)];
+    this.told = [this.commands, { ...this.none, lengths: [0, 2] }, kernel.take(this.trains)];
     /** @type {number[][]} rows of the table of commands that are about to be followed: the first, and how many */
     this.pending = [];
     this.givens = kernel.records("given", n);
@@ -46,9 +47,30 @@ export class Going {
       kernel.set("post", this.posts, k, "accuracy", world.limits.accuracy);
       this.make(k, servo);
     });
+    this.bus = Object.keys(scene.supply).length ? this.onBus(n) : null;
     kernel.set("sender", this.sender, 0, "rate", scene.frame_rate);
     kernel.set("sender", this.sender, 0, "seed", scene.seed);
     this.picks = this.columns.map((names) => names.map((/** @type {string} */ name) => world.columns.indexOf(name)));
+  }
+
+  /**
+   * Return what servos on one supply have together.
+   * @param {number} n
+   * @returns {any}
+   */
+  onBus(n) {
+    const { kernel } = this;
+    const { row, event, series } = kernel.layout;
+    const whole = () => kernel.take(n);
+    const room = this.world.limits.at_once * n;
+    const lanes = { numbers: this.none, chips: kernel.records("chips", 1), start: { ...this.none, lengths: [0, 0] }, torque: whole(),
+      seeds: whole(), piece_first: whole(), piece_count: whole(), edge_first: whole(), edge_count: whole(),
+      accuracy: this.world.limits.accuracy, firmware: this.programs, edges: this.told[2] };
+    const tables = { torques: { ...this.none, lengths: [0, 0] }, curves: this.told[1], torque_first: whole(), torque_count: whole(),
+      curve_first: whole(), curve_count: whole() };
+    const tape = [kernel.take(room, row), kernel.take(room, event), kernel.take(room * series), kernel.take(3)];
+    return { lanes, rest: [kernel.layout.tables.map((/** @type {string} */ name) => /** @type {any} */ (tables)[name]),
+      kernel.records("shared", 1), kernel.records("seat", n), kernel.records("mate", 2 * n), tape] };
   }
 
   get time() { return this.kernel.get("sender", this.sender, 0, "time"); }
@@ -107,7 +129,7 @@ export class Going {
     const { kernel, world } = this;
     const followed = this.columns.map((_, k) => ["command_first", "command_count"].map((name) => kernel.get("post", this.posts, k, name)));
     const spans = [...followed, ...this.pending].filter(([, count]) => count).sort((a, b) => a[0] - b[0]);
-    let at = 0;
+    let at = this.trains;
     for (const [first, count] of spans) {
       if (at + rows <= first) break;
       at = Math.max(at, first + count);
@@ -172,8 +194,10 @@ export class Going {
    */
   advance(until, rate, switches) {
     const { kernel, world } = this;
-    const status = kernel.call("advance", this.posts, this.told, this.programs, this.memories, this.sender, until, rate,
-      Number(switches), this.rows, this.events, this.pulses, this.used);
+    const together = this.bus ? [kernel.layout.lanes.map((/** @type {string} */ name) => (
+      name === "pieces" ? this.commands : this.bus.lanes[name])), ...this.bus.rest] : [];
+    const status = kernel.call(this.bus ? "advance_together" : "advance", this.posts, this.told, this.programs, this.memories,
+      this.sender, ...together, until, rate, Number(switches), this.rows, this.events, this.pulses, this.used);
     const used = [...kernel.wholes(this.used)].map(Number);
     const { rows, events, pulses } = world.limits;
     const width = world.columns.length;

@@ -16,6 +16,11 @@ export class Live {
     this.world = world;
     this.scene = { ...scene };
     this.servos = scene.servos.map((/** @type {any} */ one) => new Servo(world, one, scene));
+    this.shared = Object.keys(scene.supply).length > 0;
+    if (this.shared) {
+      this.servos.forEach((/** @type {Servo} */ one, /** @type {number} */ k) => one.hang(scene.supply, k + 1));
+      if (new Set(this.servos.map((/** @type {Servo} */ one) => one.columns.includes("duty"))).size > 1) refuse("mixed");
+    }
     this.going = new Going(kernel, world, this.servos, scene);
     /** @type {{command: any, time: number}[]} what each servo is told now */
     this.told = [];
@@ -147,7 +152,8 @@ function set(live, action) {
   const names = Object.keys(action.value);
   const isLoad = (/** @type {string} */ name) => name in world.load;
   for (const name of names) if (!isLoad(name) && !(name in world.given)) unknown("parameter", name, Object.keys(world.given));
-  const those = live.those(action).map((k) => ({ k, own: names.filter((name) => isLoad(name) || live.servos[k].reads.has(name)) }))
+  const all = live.shared && names.some((name) => world.of_bus.includes(name));
+  const those = live.those(all ? { ...action, servo: null } : action).map((k) => ({ k, own: names.filter((name) => isLoad(name) || live.servos[k].reads.has(name)) }))
     .filter(({ own }) => own.length);
   if (!those.length) wrong(names.join(", "), "no servo here reads it", "what a model here reads");
   const made = [];
