@@ -145,7 +145,7 @@ def test_a_held_arm_does_not_creep(kind, integrator):
 
 @pytest.mark.parametrize("goals", [[0.2] * 6, [0.1, -0.59, -0.14, -0.01, -0.23, 0.52]])
 def test_an_arm_whose_gears_play_falls_onto_its_teeth_and_rests(goals):
-    """Links of an SO-101 are light beside rotors: teeth that met within a tick were apart again, at some steps for ever."""
+    """Links of an SO-101 are light beside rotors: teeth that met within a tick were apart again, and the arm crept."""
     drives = st.DigitalServo(st.feetech_sts("lerobot", servo="feetech-sts3215-12v"))
     ends, steps = [], (5e-4, 1e-3, 1.9e-3, 2e-3, 2.1e-3)
     for step in steps:
