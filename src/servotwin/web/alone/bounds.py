@@ -6,9 +6,9 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from servotwin.models import DigitalServo
-from servotwin.models.base import PULSE_RANGE, TRAVEL_SLACK
 from servotwin.models.switched import SwitchedServo
 from servotwin.models.terms.chip import FRAME
+from servotwin.models.terms.wiring import PULSE_RANGE, TRAVEL_SLACK
 
 if TYPE_CHECKING:
     from servotwin.models import Model

@@ -94,7 +94,8 @@ def _compiled(compiler: Compiler, source: Path, made: Path) -> str:
 
 def layout() -> dict[str, Any]:
     """Return where a page finds what it writes and reads: fields of records, and arguments of entries."""
-    kinds = {"shared": Shared, "seat": Seat, "mate": Mate, "post": Post, "sender": Sender, "memory": Memory, "firm": Firm, "program": Firmware,
+    kinds = {"shared": Shared, "seat": Seat, "mate": Mate, "post": Post,
+             "sender": Sender, "memory": Memory, "firm": Firm, "program": Firmware,
              "given": Given, "weights": Weights}
     records = {name: {"size": record_of(kind).itemsize, "at": _places(record_of(kind))} for name, kind in kinds.items()}
     known = dict(signatures(BENCH))
