@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from servotwin.physics.elementary import cos, log
+from servotwin.physics.elementary import cos, log, power
 
 _MASK = 0xFFFFFFFF
 _UNIT = 2.3283064365386963e-10  # 2^-32
@@ -59,3 +59,14 @@ def uniform(seed: int, number: int) -> float:
     """
     a = scrambled(number + scrambled(seed + scrambled(seed >> 32)))
     return (scrambled(a ^ 0x2545F491) + 0.5) * _UNIT
+
+
+def drawn(seed: int, number: int, low: float, high: float) -> float:
+    """Return a draw from low to high, both positive, evenly over their logarithm.
+
+    Examples
+    --------
+    >>> 2.0 < drawn(7, 0, 2.0, 8.0) < 8.0
+    True
+    """
+    return low * power(high / low, uniform(seed, number))

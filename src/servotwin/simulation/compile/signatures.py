@@ -131,12 +131,15 @@ def _of_the_bench() -> Mapping[str, tuple[Kind, ...]]:
             "bench:begin": (posts, INT64, told, _MEMORIES), "bench:change": (posts, INT64, _MEMORIES),
             "bench:take": (posts, INT64, INT64, INT64, _FLOATS, _FLOATS, _FLOATS, FLOAT64, _TABLE, _FLOATS),
             "bench:count": (FLOAT64, FLOAT64, INT64, FLOAT64),
+            "bench:draw": (INT64, INT64, FLOAT64, FLOAT64),
+            "bench:look": (posts, INT64, told, programs, _MEMORIES, _CUBE, _INDICES),
             "bench:tune": (sender, FLOAT64), "bench:snapped": (sender, FLOAT64), "bench:next_edge": (sender,),
             "bench:advance": (posts, told, programs, _MEMORIES, sender, *going),
             "bench:advance_together": (posts, told, programs, _MEMORIES, sender, *bus, *going)}
 
 
-_OF_BENCH = ("make", "begin", "change", "take", "count", "tune", "snapped", "next_edge", "advance", "advance_together")
+_OF_BENCH = ("make", "begin", "change", "take", "count", "draw", "look", "tune", "snapped", "next_edge", "advance",
+             "advance_together")
 _ELSEWHERE: Mapping[str, Callable[[], Mapping[str, tuple[Kind, ...]]]] = {  # where kinds take more than lanes have
     "digital_batch:go_on": _of_ticks, "leg_runs:go_on": _of_ticks, "leg_runs:go_on_nearly": _of_ticks,
     "coupled_runs:go_on": _of_ticks, **{f"bench:{name}": _of_the_bench for name in _OF_BENCH},

@@ -33,7 +33,8 @@ from servotwin.simulation.compile.signatures import signatures
 from servotwin.simulation.compile.translate import Translation
 
 BENCH = Recipe("bench", tuple(f"servotwin.models.engine.live.bench:{name}" for name in (
-    "make", "begin", "change", "take", "count", "tune", "snapped", "next_edge", "advance", "advance_together")))
+    "make", "begin", "change", "take", "count", "draw", "look",
+    "tune", "snapped", "next_edge", "advance", "advance_together")))
 _INCLUDE = Path(__file__).parent / "include"
 _FLAGS = ("-std=c99", "-Os", "-w", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv",
           "-fno-strict-aliasing", "-mbulk-memory", "-mnontrapping-fptoint", "-nostdlib", f"-I{_INCLUDE}",

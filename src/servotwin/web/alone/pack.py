@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 import warnings
 from typing import Any
+
+import numpy as np
 
 from servotwin.bench import FEEDBACK_CONVERTER, INPUT_CONVERTER
 from servotwin.errors import ServotwinError
@@ -21,13 +24,17 @@ from servotwin.parameters.quantity import SET_BY_USER
 from servotwin.signals.signal import KINDS
 from servotwin.simulation.bus_supply import OF_BUS
 from servotwin.simulation.engine import failure
+from servotwin.simulation.files import shown_columns
 from servotwin.simulation.status import Status
 from servotwin.web.alone.bounds import bounds_of
 from servotwin.web.alone.limits import limits
 from servotwin.web.alone.words import WORDS
+from servotwin.web.lessons import mystery
 from servotwin.web.lessons.lessons import lessons
 from servotwin.web.live import said
 from servotwin.web.live.beginning import load_of, middle_of, models_of
+from servotwin.web.live.export import APART, SCRIPT, STEP
+from servotwin.web.live.export import KINDS as KINDS_OF_FILES
 from servotwin.web.live.facts import facts_of, load_facts
 from servotwin.web.live.live_bench import WHOLE
 from servotwin.web.live.scene import TABLES, TOP, Scene
@@ -60,6 +67,10 @@ def world(first: Scene) -> dict[str, Any]:
         "columns": screen.COLUMNS, "events": {str(code): word for code, word in screen.SHOWN.items()},
         "rules": {"actions": said.ACTIONS, "for_all": said.FOR_ALL, "scene": said.SCENE, "view": said.VIEW,
                   "servo": said.SERVO, "loads": {name: _load_rule(name) for name in _LOADS}},
+        "written": _written(), "mystery": {
+            "base": mystery.BASE, "hidden": mystery.unknowns(), "both_ways": mystery.BOTH_WAYS,
+            "friction": mystery.FRICTION, "good": mystery.GOOD, "fair": mystery.FAIR, "seeds": mystery.SEEDS},
+        "files": _files(),
         "no_load": _no_load(), "made": ["", "no_inertia"],
         "set": {"origin": "assumed", "source": SET_BY_USER, "spread": ""},
         "ranges": {name: _ends(one) for name, one in RULES.items()},
@@ -123,6 +134,32 @@ def _servo(name: str) -> dict[str, Any]:
         warnings.simplefilter("ignore")
         default = models_of(Scene(servos=(SceneServo(id=name),)))[0]
     return {**found, "model": type(default).__name__, "of": models}
+
+
+def _written() -> dict[str, Any]:
+    """Return what the registers that lessons write make of their servos, by the words of a scene."""
+    found = {}
+    for one in lessons():
+        for servo in one.scene.servos:
+            if servo.registers:
+                before, model = SceneServo(id=servo.id).servo(), model_named(servo.model)(servo.servo())
+                after = {name: model.servo.get(name) for name in model.servo.names()
+                         if model.servo.get(name) != before.get(name)}
+                found[f"{servo.id} {json.dumps(dict(servo.registers), separators=(',', ':'))}"] = {
+                    "values": after, "loop": facts_of(model, one.scene)["loop"]}
+    return found
+
+
+def _files() -> dict[str, Any]:
+    """Return how files are written: columns of tables by signal, with their factors, and the script."""
+    columns = {}
+    for name, one in {"time": None, **SIGNALS}.items():
+        unit = "s" if one is None else one.unit
+        (at_zero, at_one), = shown_columns({name: np.array([0.0, 1.0])}, {name: unit}).values()
+        shown, = shown_columns({name: np.zeros(1)}, {name: unit})
+        columns[name] = [shown, float(at_one - at_zero), float(at_zero)]
+    return {"columns": columns, "digits": 12, "apart": APART, "rate": 1.0 / STEP, "script": SCRIPT,
+            "kinds": KINDS_OF_FILES}
 
 
 def _ends(one: Any) -> dict[str, Any]:

@@ -7,8 +7,8 @@ from servotwin.simulation.bus_supply import MODEL_NAMES
 
 ONLY_WITH_SERVER = "only with the server: servotwin web"
 WORDS = {
-    "alone": "This bench computes here, without a server. Only with one (servotwin web): fits, "
-             "registers, servo files, mystery servos, logs, tables.",
+    "alone": "This bench computes here, without a server. Only with one (servotwin web): logs, fits, servo "
+             "files, registers but those of lessons, and the control circuit.",
     "only_with_server": ONLY_WITH_SERVER,
     "types": {"number": "float", "whole": "int", "string": "str", "boolean": "bool", "array": "list", "object": "dict"},
     "digits": 6, "smallest": -4,
@@ -18,8 +18,8 @@ WORDS = {
     "no_single_frame": "single frame: got 'a bench that is being repeated', allowed: one that stands",
     "new_beginning": "bench: got {got}, allowed: a new beginning",
     "speed": "speed: got {got}, allowed: a number from 1e-06 to 10, or unpaced",
-    "unknown_servo": "unknown servo {got}",
-    "unknown_lesson": "unknown lesson {got}",
+    "mystery": "Mystery servo {seed}",
+    "mystery_scene": 'format = 1\nname = "Mystery servo {seed}"\n[[servo]]\nmystery = {seed}\nmodel = "PulseServo"\n',
     "no_such_model": "model of {id}: got {got}, allowed: one that the servo has numbers for",
     "takes_goals": "{kind} command of {name}: got '{word}', allowed: angles: it takes goals on a bus "
                    "(firmware.command_kind)",

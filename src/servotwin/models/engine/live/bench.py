@@ -18,6 +18,7 @@ from servotwin.models.engine.live.posts import Told
 from servotwin.models.engine.live.screen import NEXT, USED, Looks, Screen, first_look
 from servotwin.models.engine.memory import Memories, memory_at, put_memory, resumed
 from servotwin.models.engine.step import COMPLETED
+from servotwin.models.state.noise import drawn
 from servotwin.models.terms import duty
 from servotwin.models.terms.source import Source
 from servotwin.physics.converter import counted
@@ -53,6 +54,20 @@ def take(posts: Any, k: int, unit: int, shape: int, given: Any, time: Any, value
 def count(gain: float, offset: float, highest: int, voltage: float) -> int:
     """Return the count of a converter for a voltage [V]."""
     return counted(gain, offset, highest, voltage)
+
+
+def draw(seed: int, number: int, low: float, high: float) -> float:
+    """Return a draw from low to high, both positive, evenly over their logarithm."""
+    return drawn(seed, number, low, high)
+
+
+def look(posts: Any, k: int, told: Told, programs: Any, memories: Memories, rows: Any, used: Any) -> None:
+    """Write a row of a servo as it stands, before anything happens at its time."""
+    post = posts[k]
+    inputs, screen = those.inputs_of(post, k, len(posts), told, programs), Screen(rows[k], rows[k], used[:USED])
+    used[0] = 0
+    stretch.look(those.numbers_of(post.numbers), those.chip_of(post.chip), inputs, memory_at(memories, k),
+                 those.lines_of(post.lines), screen)
 
 
 def tune(sender: Any, rate: float) -> None:

@@ -23,16 +23,18 @@ from servotwin.models.engine.live.screen import (
     see_before,
     switch_of,
     told_of,
+    write,
 )
 from servotwin.models.engine.memory import Inputs, Memory, counted_anew, due, instant, origin_of, resumed, time_of
 from servotwin.models.engine.motions import motion
-from servotwin.models.engine.runs import calmed, is_short
+from servotwin.models.engine.runs import as_now, calmed, is_short, mode_under, told
 from servotwin.models.engine.step import CHATTER, COMPLETED, MOST_IDLE, pulse_width, step
 from servotwin.models.terms import firmware, frame, play
 from servotwin.models.terms.bridge import heeds_silence
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.chip import present as pulsed_chip
-from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.numbers import Numbers, warm
+from servotwin.physics.pieces import piece_value
 
 PLAIN = True  # the compiler takes it for False
 
@@ -52,12 +54,12 @@ def go_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, changed:
     m = motion.nothing(numbers, memory.u, memory.tau)
     idle, short, k = 0, 0, looks.next
     wiper = memory.point.wiper
-    told = told_of(memory, program)
+    shown = told_of(memory, program)
     while memory.point.time < end:
         if due(memory):
             memory = counted_anew(memory)
             end = instant(pulsed, inputs, memory, looks.until - origin_of(memory))
-        before, wiper, said = memory, memory.point.wiper, told
+        before, wiper, said = memory, memory.point.wiper, shown
         memory, m, event, status = step(numbers, chip, inputs, before, m, end)
         if status != COMPLETED:
             return before, was, status
@@ -66,19 +68,19 @@ def go_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, changed:
             return before, was, CHATTER
         if PLAIN:
             screen.rows.tell(time_of(memory))
-        told = told_of(memory, program)
-        _note_doings(chip, inputs, numbers, before, said, memory, told, screen)
+        shown = told_of(memory, program)
+        _note_doings(chip, inputs, numbers, before, said, memory, shown, screen)
         if memory.point.time > before.point.time:
-            now = switch_of(told)
+            now = switch_of(shown)
             if looks.switches == 1 and now != was and was.silent >= 0:
                 start = time_of(before)
                 see_before(screen, lines, inputs, numbers, before, said)
-                m = see(screen, lines, inputs, memory, told, m, wiper, start)
+                m = see(screen, lines, inputs, memory, shown, m, wiper, start)
                 k = k + 1 if k / looks.rate == start else k
             was = now
             time = k / looks.rate
             while time < looks.until and reached(inputs, memory, time, program):
-                m = see(screen, lines, inputs, memory, told, m, wiper, time)
+                m = see(screen, lines, inputs, memory, shown, m, wiper, time)
                 k += 1
                 time = k / looks.rate
         if event >= 0 and event != guards.SHARE and event != guards.CREEPS:
@@ -93,15 +95,24 @@ def go_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, changed:
         return memory, was, COMPLETED
     time = k / looks.rate
     while time < looks.until and (looks.at_end == 1 or not program):  # next to the end
-        m = see(screen, lines, inputs, memory, told, m, wiper, time)
+        m = see(screen, lines, inputs, memory, shown, m, wiper, time)
         k += 1
         time = k / looks.rate
     if looks.at_end == 1:
-        see(screen, lines, inputs, memory, told, m, wiper, looks.until)
+        see(screen, lines, inputs, memory, shown, m, wiper, looks.until)
     screen.used[NEXT] = k
     if program:
         controller.pause(inputs, memory)
     return memory, was, COMPLETED
+
+
+def look(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, lines: Lines, screen: Screen) -> None:
+    """Write a row of a servo as it stands, before anything happens at its time."""
+    program = firmware.present(inputs.firmware[0])
+    u, tau = told(numbers, pulsed_chip(chip), inputs, memory)
+    mode, time, point = mode_under(as_now(numbers, inputs, memory), u, tau, memory), time_of(memory), memory.point
+    write(screen, lines, inputs, told_of(memory, program), warm(as_now(numbers, inputs, memory), point.y), mode,
+          piece_value(u, time), piece_value(tau, time), point.y, point.wiper, time)
 
 
 def _note_doings(chip: Chip, inputs: Inputs, numbers: Numbers, before: Memory, said: Said, memory: Memory, told: Said,

@@ -9,14 +9,16 @@ export class Servo {
    * @param {any} world
    * @param {any} one a servo of a scene
    * @param {any} scene
+   * @param {import("./kernel.js").Kernel} kernel
    */
-  constructor(world, one, scene) {
+  constructor(world, one, scene, kernel) {
     this.world = world;
-    if (!("id" in one) || Object.keys(one.registers).length) refuse("only_with_server");
-    const known = world.servos[one.id];
-    if (!known) unknown("servo", one.id, Object.keys(world.servos));
-    this.known = known;
-    this.id = one.id;
+    this.mystery = "mystery" in one;
+    const id = this.mystery ? world.mystery.base : one.id ?? refuse("only_with_server");
+    const known = world.servos[id];
+    if (!known) unknown("servo", id, Object.keys(world.servos));
+    this.known = this.mystery ? { ...known, id: "mystery", title: filled(world.words.mystery, { seed: one.mystery }) } : known;
+    this.id = this.known.id;
     this.model = one.model || known.model;
     this.own = known.of[this.model] ?? refuse("no_such_model", this.model, known);
     const { reads, family } = world.models[this.model];
@@ -27,6 +29,12 @@ export class Servo {
     /** @type {Map<string, {value: any, source: string}>} values that are others than the catalog's */
     this.changed = new Map();
     this.load = { ...world.no_load, ...scene.load };
+    if (this.mystery) for (const [name, value] of Object.entries(hidden(world, kernel, one.mystery))) this.hide(name, value);
+    if (Object.keys(one.registers).length) {
+      const written = world.written[`${id} ${JSON.stringify(one.registers)}`] ?? refuse("only_with_server");
+      for (const [name, value] of Object.entries(written.values)) { this.values.set(name, value); this.changed.set(name, value); }
+      this.own = { ...this.own, loop: written.loop };
+    }
     this.change(one.parameters);
   }
 
@@ -47,6 +55,18 @@ export class Servo {
   }
 
   get columns() { return this.own.columns; }
+
+  /** @param {string} name @param {number} value */
+  hide(name, value) {
+    const { friction, both_ways: both } = this.world.mystery;
+    for (const one of name === friction ? both : [name]) this.values.set(one, value);
+  }
+
+  /** @param {string} name @returns {boolean} whether a number is not shown */
+  hides(name) {
+    const { hidden: those, both_ways: both } = this.world.mystery;
+    return this.mystery && (both.includes(name) || those.some((/** @type {any} */ one) => one.name === name));
+  }
 
   /** @param {string} name @returns {any} a value, or the usual one */
   value(name) { return this.values.get(name); }
@@ -127,7 +147,7 @@ export class Servo {
         const name = alike[0];
         const set = this.changed.has(name) ? { value: this.changed.get(name), ...world.set } : {};
         return { ...joined(world.of_all, alike), ...joined(world.of_each, known.values[n]), ...set, read: this.reads.has(name) };
-      }) };
+      }).filter((/** @type {any} */ one) => !this.hides(one.name)) };
   }
 
   /** @returns {Servo} the same, of which something may change */
@@ -138,6 +158,11 @@ export class Servo {
     copy.changed = new Map(this.changed);
     return copy;
   }
+}
+
+/** @param {any} world @param {import("./kernel.js").Kernel} kernel @param {number} seed @returns {Record<string, number>} what is hidden behind a seed (SI) */
+export function hidden(world, kernel, seed) {
+  return Object.fromEntries(world.mystery.hidden.map((/** @type {any} */ one, /** @type {number} */ k) => [one.name, kernel.call("draw", seed, k, one.low, one.high)]));
 }
 
 /** @param {string[]} names @param {any[]} values */

@@ -171,6 +171,14 @@ export class Going {
   /** @param {number} k */
   begin(k) { this.kernel.call("begin", this.posts, k, this.told, this.memories); }
 
+  /** @param {number} k @returns {Float64Array} the row of a servo as it stands */
+  now(k) {
+    this.kernel.call("look", this.posts, k, this.told, this.programs, this.memories, this.rows, this.used);
+    const width = this.world.columns.length;
+    const all = this.kernel.numbers(this.rows, k * this.world.limits.rows * width, width);
+    return Float64Array.from(this.picks[k], (from) => all[from]);
+  }
+
   /** @param {number} k @param {number} torque [N m] */
   push(k, torque) { this.kernel.set("post", this.posts, k, "push", torque); }
 

@@ -15,12 +15,13 @@ export function connect(page) {
   /** @type {Room} */
   let room;
   const live = () => { room.turn(); setTimeout(live, world.limits.pause); };
-  queueMicrotask(() => {
+  const begun = Promise.resolve().then(() => {
     page.told({ hello: { role: "own", alone: world.words.alone, lessons: world.lessons } });
-    room = new Room({ kernel: new Kernel(module, world.layout), world }, page);
+    room = new Room({ kernel: new Kernel(module, world.layout), module, world }, page);
     live();
   });
   return { open: true, say: async (message) => {
+    await begun;
     try {
       page.told({ done: message.id, ...await room.answer(message) });
     } catch (error) {

@@ -15,7 +15,8 @@ export class Live {
   constructor(kernel, world, scene) {
     this.world = world;
     this.scene = { ...scene };
-    this.servos = scene.servos.map((/** @type {any} */ one) => new Servo(world, one, scene));
+    this.servos = scene.servos.map((/** @type {any} */ one) => new Servo(world, one, scene, kernel));
+    if (Object.keys(scene.control).length) refuse("only_with_server");
     this.shared = Object.keys(scene.supply).length > 0;
     if (this.shared) {
       this.servos.forEach((/** @type {Servo} */ one, /** @type {number} */ k) => one.hang(scene.supply, k + 1));

@@ -1,7 +1,9 @@
 // A room: a bench that goes on in real time, and the page that looks at it.
 
+import { hidden } from "./facts.js";
+import { file } from "./files.js";
 import { Live } from "./live.js";
-import { Refused, refuse, wrong } from "./check.js";
+import { Refused, filled as filledIn, refuse, unknown, wrong } from "./check.js";
 import { Pace } from "./pace.js";
 import { fragment, read, servo, unfragment, view, written } from "./scene.js";
 
@@ -15,6 +17,7 @@ export class Room {
   constructor(parts, page) {
     const { kernel, world } = parts;
     this.kernel = kernel;
+    this.parts = parts;
     this.world = world;
     this.page = page;
     this.pace = new Pace(world.limits, now());
@@ -58,7 +61,7 @@ export class Room {
     const scene = live.now();
     return { scene: written(this.world, scene), name: scene.name, servos: live.servos.map((one, k) => one.facts(k)), loads: this.loads(),
       view: scene.view, lesson: scene.lesson, supply: filled(scene.supply), control: filled(scene.control),
-      of_catalog: scene.servos.map((/** @type {any} */ one) => one.id ?? null), frame_rate: live.going.rate, unknowns: [],
+      of_catalog: scene.servos.map((/** @type {any} */ one) => one.id ?? null), frame_rate: live.going.rate, unknowns: live.servos[0].mystery ? this.world.mystery.hidden : [],
       running: this.pace.running, speed: this.speed, end: this.end };
   }
 
@@ -141,9 +144,9 @@ export class Room {
   /** Show how all stands, without going on. */
   glance() {
     const live = /** @type {Live} */ (this.live);
-    this.lcd.length = live.servos.length;
-    live.servos.forEach((one, k) => { this.lcd[k] = this.lcd[k] ?? this.reading(one.columns, new Float64Array(0)); });
-    this.push([]);
+    const parts = live.servos.map((one, k) => ({ columns: one.columns, points: live.going.now(k), pulses: new Float64Array(0) }));
+    this.lcd = parts.map((one) => this.reading(one.columns, one.points));
+    this.push([{ parts, events: [] }]);
   }
 
   /** @param {string[]} columns @param {Float64Array} row */
@@ -219,14 +222,41 @@ export class Room {
     else if ("text" in message) {
       const text = written(world, live.now());
       return { text, fragment: await fragment(text) };
-    } else refuse("only_with_server");
+    } else if ("export" in message) return { file: await file(this.parts, live.now(), message.export, message.servo ?? 0) };
+    else if ("mystery" in message) this.put(read(world, this.hidden(message.mystery)));
+    else if ("guess" in message) return { compared: this.compared(live.scene.servos[0].mystery, message.guess) };
+    else refuse("only_with_server");
     return { time: /** @type {Live} */ (this.live).time };
+  }
+
+  /** @param {any} seed @returns {string} the text of a bench with a servo whose numbers are hidden */
+  hidden(seed) {
+    const most = this.world.mystery.seeds;
+    if (!Number.isInteger(seed) || seed < 0 || seed > most) wrong("seed of a mystery servo", seed, `a whole number from 0 to ${most}`);
+    return filledIn(this.world.words.mystery_scene, { seed });
+  }
+
+  /** @param {number|undefined} seed @param {any} guess @returns {any[]} guess and truth side by side */
+  compared(seed, guess) {
+    const { good, fair } = this.world.mystery;
+    if (seed === undefined) wrong("guess", "a bench without a mystery", "a mystery servo");
+    if (!guess || typeof guess !== "object" || !Object.keys(guess).length) wrong("guess", guess, "a table of numbers in SI");
+    const truth = hidden(this.world, this.kernel, /** @type {number} */ (seed));
+    for (const [name, value] of Object.entries(guess)) {
+      if (!(name in truth)) unknown("number of a mystery servo", name, Object.keys(truth));
+      if (!Number.isFinite(value)) wrong(`guess of ${name}`, value, "a finite number in SI");
+    }
+    return Object.entries(truth).map(([name, value]) => {
+      const error = name in guess ? guess[name] / value - 1 : null;
+      const said = error === null ? "not guessed" : Math.abs(error) <= good ? "found" : Math.abs(error) <= fair ? "near" : "off";
+      return { name, truth: error === null ? null : value, guess: guess[name] ?? null, error, said };
+    });
   }
 
   /** @param {string} name @returns {string} */
   lesson(name) {
     const found = this.world.lessons.find((/** @type {any} */ one) => one.name === name);
-    return found ? found.text : refuse("unknown_lesson", name);
+    return found ? found.text : unknown("lesson", name, this.world.lessons.map((/** @type {any} */ one) => one.name));
   }
 
   /** @param {any} scene @param {any} asked @param {any} supply @returns {any} a bench with other servos */

@@ -146,10 +146,15 @@ export class Bench extends EventTarget {
     const again = this.attempt > 0;
     this.attempt = 0;
     this.emit("hello", hello);
-    const packed = location.hash.slice(1);
     if (hello.role === "watcher") return;
     if (again && this.kept) this.tell({ scene: this.kept });
-    else if (packed.startsWith("lesson=")) this.tell({ lesson: decodeURIComponent(packed.slice(7)) });
+    else this.begin();
+  }
+
+  /** Begin with what the link of the page carries. */
+  begin() {
+    const packed = location.hash.slice(1);
+    if (packed.startsWith("lesson=")) this.tell({ lesson: decodeURIComponent(packed.slice(7)) });
     else if (packed.startsWith("mystery=")) this.tell({ mystery: Number(packed.slice(8)) });
     else if (packed) this.tell({ fragment: packed });
   }
