@@ -3,7 +3,9 @@
   const say = (line) => { const place = document.getElementById("notice"); place.hidden = false; place.textContent = line; };
   if (!("DecompressionStream" in self && "WebAssembly" in self)) { say("This browser is too old for the bench: it needs WebAssembly and DecompressionStream."); return; }
   const unpacked = async (id) => {
-    const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (one) => one.charCodeAt(0));
+    const plain = atob(document.getElementById(id).textContent);
+    const bytes = new Uint8Array(plain.length);
+    for (let k = 0; k < plain.length; k += 1) bytes[k] = plain.charCodeAt(k);
     return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
   };
   try {
