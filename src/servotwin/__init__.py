@@ -28,8 +28,8 @@ _LAZY = {
                      "validate"), "identification"),
 }
 _MODULES = ("bench", "control", "datasheet", "diagnosis", "errors", "export", "identification", "linear", "loads",
-            "logs", "models", "parameters", "physics", "plotting", "robots", "signals", "simulation", "studies", "units",
-            "web", "wire")
+            "logs", "models", "parameters", "physics", "plotting", "robots", "signals", "simulation", "studies",
+            "units", "web", "wire")
 
 __all__ = ["__version__", *_LAZY, *_MODULES]
 

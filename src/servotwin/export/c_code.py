@@ -30,7 +30,7 @@ from servotwin.models import (
 from servotwin.models.engine.alone import Alone, Happened, Seen
 from servotwin.models.engine.memory import ACCURACY, Inputs, Memories, Memory
 from servotwin.models.outputs import SIGNALS
-from servotwin.models.state.records import record_of
+from servotwin.models.state.records import numbers_in, record_of
 from servotwin.models.terms import wiring
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.control import Firm
@@ -67,12 +67,16 @@ class CCode:
         The two texts.
     left_out : str
         What the numbers of the servo have no use for, and the code does not follow.
+    table : tuple of float
+        All numbers of the servo in the order in which the struct of its table has them, the table of a potentiometer
+        apart: what another servo with the same things left out may have in its place.
     """
 
     name: str
     header: str
     source: str
     left_out: str
+    table: tuple[float, ...]
 
     def write(self, folder: str | Path, *, overwrite: bool = False) -> tuple[Path, Path]:
         """Write `name.h` and `name.c` into a folder, which is made where there is none; return their paths.
@@ -170,7 +174,8 @@ class _Writing:
             "name": self._name, "guard": self._name.upper(), "version": __version__, "id": self._model.servo.name,
             "title": f"{self._name}: {self._model.servo.name} as a {type(self._model).__name__}."}
         return CCode(self._name, HEADER.substitute(shared | self._of_header(text, flags)),
-                     SOURCE.substitute(shared | names | self._of_source(text)), left_out(flags))
+                     SOURCE.substitute(shared | names | self._of_source(text)), left_out(flags),
+                     tuple(map(float, numbers_in((self._alone, *((self._program,) if self._digital else ()))))))
 
     def _public(self) -> Iterator[tuple[str, Kind]]:
         """Return the structs of the header, each after those in it."""
