@@ -3,6 +3,7 @@
 import re
 import shutil
 import subprocess
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ FEW = ("plain", "bounded", "on a bus")  # of which one has no pulses, and one a 
 CALLS, DRAWS = 60, 26  # 26 for each of 23 structures: 598 servos
 SPANS = (1e-3, 2.5e-3, 7.1e-3, 0.02, 0.0)  # s
 SERVO = "hitec-hs-755hb"
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -201,6 +203,17 @@ def test_the_header_is_one_for_cpp_too(tmp_path):
     (tmp_path / "main.cpp").write_text('#include "servo.h"\nint main() { servo_state s; (void)s; return 0; }\n')
     subprocess.run(["g++", "-std=c++11", "-Wall", "-Wextra", "-Werror", "-pedantic", "-c", "-o",
                     str(tmp_path / "main.o"), str(tmp_path / "main.cpp")], check=True)
+
+
+def test_the_program_of_the_guide_prints_what_the_page_says(tmp_path):
+    page = (ROOT / "docs" / "guide" / "export.md").read_text(encoding="utf-8")
+    program, told = (re.search(rf"```{kind}\n(.*?)```", page, re.DOTALL)[1] for kind in ("c", "text"))
+    export.c(st.PulseServo(st.load_servo(SERVO)), st.loads.Inertia(1e-3)).write(tmp_path)
+    (tmp_path / "main.c").write_text(program)
+    words = told.splitlines()[0].removeprefix("$ ").split(" && ")[0].split()
+    subprocess.run([COMPILERS[0], *words[1:]], cwd=tmp_path, check=True)
+    done = subprocess.run([str(tmp_path / "servo")], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == told.splitlines()[1:]
 
 
 # --- what is refused ----------------------------------------------------------------------------------------------
