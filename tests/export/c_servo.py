@@ -58,9 +58,9 @@ class CServo:
     def table(self):
         return self._numbers.ctypes.data
 
-    def like(self, code):
+    def like(self, table):
         """Take the numbers of another servo, whose code would be the same."""
-        self._numbers[:len(code.table)] = code.table
+        self._numbers[:len(table)] = table
 
     def start(self, command, seed=0):
         return self.start_at(self.state.ctypes.data, self.table, command, seed)
