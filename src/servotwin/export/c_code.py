@@ -232,7 +232,10 @@ class _Writing:
         return {
             "kernels": kernels, "table": ",\n".join(table).replace(", (-", ", (-") + "\n",
             "memories": types.of(_MEMORIES), "inputs": types.of(_INPUTS), "seen": types.of(named(Seen)),
-            "rows": types.of(Array(_EVENT, 1)), "firms": "{&state->firm, {1}}" if self._digital else "{NULL, {0}}",
+            "rows": types.of(Array(_EVENT, 1)), "firms": "{&own->firm, {1}}" if self._digital else "{NULL, {0}}",
+            # the memory is written at the end of a call, but what a program remembers changes on the way
+            "keeping": self._members((f"    const {name}_firm before = state->firm;\n", self._digital)),
+            "restoring": self._members(("    if (status != 0)\n        state->firm = before;\n", self._digital)),
             "period": ("servo->program.T_f" if self._digital else
                        "servo->numbers.chip.frame_period" if self._chip.frame_period > 0.0 else "0.0"),
             "curve": ("{(double *)(uintptr_t)servo->curve, {servo->curve_rows, 2}}" if self._curve
