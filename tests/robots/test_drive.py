@@ -143,6 +143,25 @@ def test_a_held_arm_does_not_creep(kind, integrator):
     assert np.abs(data.qvel).max() < 1e-9
 
 
+@pytest.mark.parametrize("goals", [[0.2] * 6, [0.1, -0.59, -0.14, -0.01, -0.23, 0.52]])
+def test_an_arm_whose_gears_play_falls_onto_its_teeth_and_rests(goals):
+    """Links of an SO-101 are light beside rotors: teeth that met within a tick were apart again, and the arm crept."""
+    drives = st.DigitalServo(st.feetech_sts("lerobot", servo="feetech-sts3215-12v"))
+    ends, steps = [], (5e-4, 1e-3, 1.9e-3, 2e-3, 2.1e-3)
+    for step in steps:
+        model = st.robots.robot_model("so101")
+        model.opt.timestep = step
+        drive = st.robots.ServoDrive(model, dict.fromkeys(st.robots.joint_names(model), drives))
+        data = mujoco.MjData(drive.model)
+        data.qpos[:] = goals
+        drive.command(data, dict(zip(drive.joints, goals, strict=True)))
+        drive.step(data, round(1.0 / step))
+        assert np.abs(data.qvel).max() < 1e-9
+        ends.append(data.qpos.copy())
+    for end, step in zip(ends[1:], steps[1:], strict=True):
+        assert np.abs(end - ends[0]).max() < 4.0 * step  # [rad]; friction holds them in a play of 15 mrad
+
+
 FOUR = """<mujoco><option timestep="0.001" integrator="{}" gravity="0 0 0"/><worldbody>{}</worldbody></mujoco>"""
 WHEEL = ('<body><joint name="{}" axis="0 0 1"/>'
          '<inertial pos="0 0 0" mass="1" diaginertia="1e-3 1e-3 1e-3"/></body>')

@@ -63,7 +63,7 @@ def test_a_hand_holds_a_limp_joint(bus, client):
     assert client.number(1, 56) == 2244
     bus.hand(1, None)
     go_on(bus, 0.5)
-    assert abs(client.number(1, 56) - 2244) < 5
+    assert abs(client.number(1, 56) - 2244) <= 10  # of which a gear's play lets it go
 
 
 def test_power_cycle(bus, client):

@@ -74,9 +74,6 @@ def test_a_fit_finds_the_servo(seed, tmp_path, monkeypatch):
     right = {"output_torque_constant": N * truth.get("motor.torque_constant"),
              "output_coulomb_torque": N * truth.get("friction.coulomb_torque_forward"),
              "output_inertia": N**2 * truth.get("motor.rotor_inertia") + truth.get("gear.output_inertia")}
-    intervals = fit.intervals()
     for name, value in right.items():
-        # nothing is noise here but the rounding to counts, and the interval takes that for drawn
-        half = 0.5 * (intervals[name].upper - intervals[name].lower)
-        assert fit.estimates[name] == pytest.approx(value, abs=3.0 * half)
-        assert fit.estimates[name] == pytest.approx(value, rel=0.08)
+        assert fit.intervals()[name].lower < value < fit.intervals()[name].upper
+        assert fit.estimates[name] == pytest.approx(value, rel=0.05)

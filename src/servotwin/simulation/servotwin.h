@@ -52,7 +52,7 @@ typedef struct servotwin_tick {
     const double *external_torque; /* constant, beside the load, from now on; positive pushes towards -q [N m] */
 
     /* In, shape (lanes,): what another simulator decides. NULL: not imposed now. */
-    const double *set_output_angle; /* of the shaft, between its stops [rad] */
+    const double *set_output_angle; /* of the shaft, between its stops; with a speed, play stays as it is [rad] */
     const double *set_output_speed; /* an impulse; with play in the gear the motor keeps its own [rad/s] */
     const double *set_load_inertia; /* in the place of the load's, from now on, at least 0 [kg m2] */
     const double *set_bus_voltage;  /* at the bridge, from now on, positive [V] */

@@ -92,6 +92,7 @@ class Service:
         self._thread: threading.Thread | None = None
         self._ended = False
         self._asked: float | None = None
+        self._held = b""
         self._said_at = -1e9
         self.error: ServotwinError | None = None
         if self._link is not None:
@@ -194,15 +195,20 @@ class Service:
         while (left := target - bus.time) > 0.0:
             if self._each is not None:
                 self._each(bus)
-            data = bus.advance(min(left, _SLICE))
-            if data:
-                self.timing.dropped += len(data) - self._port.write(data)
-                if self._asked is not None:
-                    self.timing.costs.append(time.thread_time() - self._asked)
-                    self._asked = None
+            self._held += bus.advance(min(left, _SLICE))
+            if self._held and not (bus.due is not None and bus.due - bus.time <= _TOGETHER):
+                self._answer()
             if clock() - began > _LOOK:
                 break
         return start
+
+    def _answer(self) -> None:
+        """Write what is through, and note what it has cost since the question."""
+        self.timing.dropped += len(self._held) - self._port.write(self._held)
+        self._held = b""
+        if self._asked is not None:
+            self.timing.costs.append(time.thread_time() - self._asked)
+            self._asked = None
 
     def _finish(self) -> None:
         """Say what was noted, and keep what is stored."""

@@ -11,6 +11,7 @@ from servotwin.models import Model, default_model
 from servotwin.parameters import Servo, Supply, load_servo
 from servotwin.parameters.registers.robots import as_robot_has_it, said_of, set_of_robot
 from servotwin.robots import Motion, Mount, joint_names, robot_model
+from servotwin.robots.coupling import couplings_of
 
 UNKNOWN = "unknown"
 _SO101, _ARM_SERVO = "so101", "feetech-sts3215-12v"
@@ -81,7 +82,9 @@ def mounts_of(servos: Any, robot: Any, plant: Any, motions: Sequence[Motion]) ->
     if len(kinds) > 1:
         raise InputError("servos of a robot", got=" and ".join(sorted(kind.__name__ for kind in kinds)),
                          allowed="models of one kind")
-    return made, (said_of(kind, *changed),) if changed else ()
+    free = [name for name in joint_names(plant) if name not in made and name not in couplings_of(plant)]
+    return made, (*((said_of(kind, *changed),) if changed else ()), *((
+        f"no servo and no recorded goals at {', '.join(free)}: what hangs there moves freely",) if free else ()))
 
 
 def _mount(given: Any) -> Mount:

@@ -78,6 +78,13 @@ def noise_of(episodes: Sequence[Episode], residuals: Sequence[Array], used: Sequ
     return Noise(np.array(positions), min(float(np.median(off)) if off else 0.0, _MOST_OFF))
 
 
+def spread_of(residuals: Sequence[Array], used: Sequence[Mask]) -> float:
+    """Return how far residuals spread: the mean logarithm of the joints' rms, of noise that nobody knows yet."""
+    r, mask = np.concatenate(list(residuals)), np.concatenate(list(used))
+    squares = (np.where(mask, r, 0.0)**2).sum(axis=0) / np.maximum(mask.sum(axis=0), 1)
+    return float(np.mean(0.5 * np.log(squares + _LEAST**2)))
+
+
 def whitened(values: Array, episode: Episode, noise: Noise, used: Mask) -> Array:
     """Return residuals or derivatives, shape (n, joints, …), in units of noise; 0 where a sample does not count."""
     sigma = noise.positions

@@ -13,9 +13,19 @@ from numpy.typing import NDArray
 from servotwin.identification.arms.arm_fit import ArmCause
 from servotwin.identification.arms.causes import causes_of, confirmed
 from servotwin.identification.arms.doubts import Doubts, doubts_of
-from servotwin.identification.arms.numbers import Numbers
+from servotwin.identification.arms.numbers import LATENCY, Numbers
 from servotwin.identification.arms.problem import Problem
-from servotwin.identification.arms.rows import Linear, Noise, beyond_scatter, noise_of, parts_of, used_rows, usual_steps
+from servotwin.identification.arms.rows import (
+    Linear,
+    Noise,
+    beyond_scatter,
+    noise_of,
+    parts_of,
+    spread_of,
+    used_rows,
+    usual_steps,
+)
+from servotwin.identification.arms.whole import WholeArm
 from servotwin.identification.arms.windows import LeftOut, strange_windows, without
 from servotwin.identification.fitting.stopping import Stops
 
@@ -141,7 +151,8 @@ def _second_stage(way: Way, show: Show, *, intervals: bool) -> None:
     """Search with the whole robot, and see what its derivatives say of the numbers."""
     what = way.what
     arm = what.whole()
-    noise = way.noise = noise_of(what.episodes, what.left(arm, way.x), what.used)
+    way.x, way.noise = _nearest(what, arm, way.x)
+    noise = way.noise
     if not intervals:
         way.know(CAUSES)
         return
@@ -168,6 +179,19 @@ def _second_stage(way: Way, show: Show, *, intervals: bool) -> None:
     way.noise = noise_of(what.episodes, found, what.used)
     way.doubts = doubts_of(what, way.x, way.noise, found, slopes, shakes)
     way.know(INTERVALS)
+
+
+def _nearest(what: Problem, arm: WholeArm, x: Array) -> tuple[Array, Noise]:
+    """Return which of some points the whole robot moves nearest by, and the noise that it leaves.
+
+    Joints that hang on others without servos, or that stick, do otherwise alone: what the search of single joints has
+    found may then be worse than what the files say.
+    """
+    late = np.where(np.array(what.numbers.names) == LATENCY, x, what.numbers.start)
+    points = (x, late, what.numbers.start)
+    found = [what.left(arm, point) for point in points]
+    best = int(np.argmin([spread_of(left, what.used) for left in found]))
+    return points[best], noise_of(what.episodes, found[best], what.used)
 
 
 def _clean(what: Problem, linear: Sequence[Linear], noise: Noise) -> list[Array]:

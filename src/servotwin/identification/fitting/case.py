@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_FRAME_PERIOD = "electronics.frame_period"
+_FRAME_PERIOD, _TICK = "electronics.frame_period", "firmware.control_period"
+_JUMPS = ("armature_current", "supply_current", "bus_voltage")
 _UNKNOWN = 0.1  # s, more than the delay of a servo and its bus
 _UNSURE = 3.0  # times what five samples scatter, which is known no better
 TIME = "time"  # of the noise: how far off the times of pulses, ticks and samples are, one by one [s]
@@ -62,6 +63,8 @@ class Case:
         T_f that log or servo say [s]; 0 of a model without pulses.
     leans : float
         To which side of the gear's play the motor lies at first: -1 or 1; 0 in the middle, where the log does not tell.
+    tick : float
+        T_c of a program that works on goals [s]; 0 of other servos.
     """
 
     log: Log
@@ -75,6 +78,7 @@ class Case:
     key: tuple[Any, ...] = field(repr=False)
     period: float = 0.0
     leans: float = 0.0
+    tick: float = 0.0
 
     @property
     def count(self) -> int:
@@ -82,8 +86,11 @@ class Case:
         return sum(len(place) for place in self.places.values())
 
     def sigma(self, name: str, noise: Mapping[str, float]) -> Array | float:
-        """Return the noise of a sensor's values (SI); that of times counts as far as the signal goes meanwhile."""
-        late = noise.get(TIME, 0.0)
+        """Return the noise of a sensor's values (SI); that of times counts as far as the signal goes meanwhile.
+
+        A current jumps where a program ticks, and when it does is known to a tick only.
+        """
+        late = math.hypot(noise.get(TIME, 0.0), self.tick if name in _JUMPS else 0.0)
         return np.hypot(noise[name], late * self._rates[name]) if late else noise[name]
 
     @cached_property
@@ -126,7 +133,8 @@ def make_case(log: Log, model: Model, space: Space, sensors: Sequence[str], *, d
     signal = _signal(log, model, {} if signals is None else signals)
     return Case(log=log, signal=signal, times=times, places=places, values=values, start=(angle, speed),
                 scatter=scatter, moving=moving, key=key, period=_period(log, model),
-                leans=_leans(log, model, angle, scatter))
+                leans=_leans(log, model, angle, scatter),
+                tick=0.0 if has_pulses(model) else model.value_or(_TICK, 0.0))
 
 
 def _usable(log: Log, model: Model, name: str) -> NDArray[np.bool_]:

@@ -28,12 +28,12 @@ def stand(d: int, drive: Words, room: Rows) -> int:
 def listen(d: int, drive: Words, block: Numbers, room: Rows) -> int:
     """Put the servos' commands into their room; return whose is not a number, or −1."""
     n, head = drive[place.SERVOS], place.HEAD
-    command_at, goals = words(drive[place.COMMAND_AT], n), block[head + 12 * n:head + 14 * n]
+    command_at, goals = words(drive[place.COMMAND_AT], n), block[head + 8 * n:head + 10 * n]
     gain, zero = numbers(drive[place.TOLD_GAIN], n), numbers(drive[place.TOLD_ZERO], n)
     low, high = numbers(drive[place.LOW], n), numbers(drive[place.HIGH], n)
     scale, offset = numbers(drive[place.SCALE], n), numbers(drive[place.OFFSET], n)
     least, most = numbers(drive[place.CONTROL_LOW], n), numbers(drive[place.CONTROL_HIGH], n)
-    ctrl, held = word_at(d, drive[place.CTRL]), block[head + 11 * n:head + 12 * n]
+    ctrl, held = word_at(d, drive[place.CTRL]), block[head + 7 * n:head + 8 * n]
     for i in range(n):
         if command_at[i] >= 0:
             control = number_at(ctrl, 8 * command_at[i])
@@ -54,36 +54,13 @@ def listen(d: int, drive: Words, block: Numbers, room: Rows) -> int:
 
 
 def stay(drive: Words, block: Numbers, room: Rows, dt: float, rk4: bool) -> None:
-    """Let the servos be where they have come to, as far as the engine has done what was expected of it."""
-    n, head = drive[place.SERVOS], place.HEAD
-    reached, expected = block[head + 4 * n:head + 5 * n], block[head + 5 * n:head + 6 * n]
+    """Let the servos be where their joints have come to: semi-implicit steps turn these by the speed at their end."""
+    n = drive[place.SERVOS]
     lower, upper = numbers(drive[place.LOWER], n), numbers(drive[place.UPPER], n)
+    ahead = 0.0 if rk4 or block[place.FRESH] != 0.0 else 0.5 * dt
     for i in range(n):
-        q, way = room[place.R_ANGLE, i], abs(room[place.R_SPEED, i]) * dt
-        if block[place.FRESH] == 0.0:
-            # semi-implicit steps take the speed at their end
-            usual = 0.0 if rk4 else -0.5 * dt * room[place.R_SPEED, i]
-            apart = reached[i] - expected[i] - usual
-            apart -= min(max(apart, -place.LEAK * way), place.LEAK * way)
-            room[place.R_ANGLE, i] = q + usual + min(max(apart, -place.APART), place.APART)
-        room[place.R_ANGLE, i] = min(max(room[place.R_ANGLE, i], lower[i]), upper[i])
-        expected[i] = q
-
-
-def expect(drive: Words, instance: Words, block: Numbers, room: Rows, dt: float, rk4: bool) -> None:
-    """Note the angles that servos have reached, and those that the engine's way of integrating leads to."""
-    n, head = drive[place.SERVOS], place.HEAD
-    reached, expected = block[head + 4 * n:head + 5 * n], block[head + 5 * n:head + 6 * n]
-    groups = words(instance[place.GROUPS], instance[place.COUNT])
-    for k in range(instance[place.COUNT]):
-        group = words(groups[k], place.GROUP_WORDS)
-        lanes = group[place.LANES]
-        which, angle = words(group[place.WHICH], lanes), numbers(group[place.G_REACHED], lanes)
-        for lane in range(lanes):
-            reached[which[lane]] = angle[lane]
-    for i in range(n):
-        w, after = room[place.R_SPEED, i], room[place.R_AFTER, i]
-        expected[i] += dt * (0.5 * (w + after) if rk4 else after)
+        angle = room[place.R_ANGLE, i] - ahead * room[place.R_SPEED, i]
+        room[place.R_ANGLE, i] = min(max(angle, lower[i]), upper[i])
 
 
 def go_on(instance: Words, room: Rows, dt: float, watched: bool) -> int:

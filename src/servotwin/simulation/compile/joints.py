@@ -7,8 +7,9 @@ and ends at another speed; the joint gets the mean torque τᵢ = (Δω/Δt − 
 which aᵢ needs too, are predicted: each is what it was, less its share of what another aᵢ asks of it; one at rest takes
 up all. Where that was wrong by more than a speed that does not count, all go through the tick again.
 
-The servo keeps the angle that it has reached, plus what the engine's differs from the one that its way of integrating
-leads to with these speeds: else a shaft that comes to rest on a tooth within a tick would float before it for ever.
+The engine turns a joint by its speeds at the ends of ticks, and the servo is put where the joint has come to with all
+that is behind its gear: else a shaft that comes to rest on a tooth within a tick would be off the tooth again, and fall
+onto it for ever.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ from servotwin.simulation.compile.joint_memory import (
     word_at,
 )
 from servotwin.simulation.compile.joint_record import account, keep, note_forces
-from servotwin.simulation.compile.joint_servos import expect, go_on, listen, stand, stay
+from servotwin.simulation.compile.joint_servos import go_on, listen, stand, stay
 from servotwin.simulation.compile.joint_torques import accelerations, learn, predict
 from servotwin.simulation.compile.joints_layout import (
     ASK_RESET,
@@ -78,7 +79,6 @@ def _tick(m: int, d: int, drive: Words, instance: Words, block: Numbers, room: R
     _finish(drive, block, inverse, room, final, dt)
     predict(words(drive[place.SPEED_AT], n), inverse, final, room, square)
     torque[:] = room[place.R_PREDICTED]
-    expect(drive, instance, block, room, dt, rk4)
     if recorded:
         note_forces(d, drive, instance, block, inverse[n])
         keep(drive, instance, room, torque, block[place.END], again)
@@ -139,7 +139,7 @@ def _start_anew(drive: Words, instance: Words, block: Numbers, room: Rows, half:
     for i in range(n):
         room[place.R_ANGLE, i] = min(max(room[place.R_ANGLE, i], lower[i]), upper[i])
         room[place.R_GOAL, i] = rest[i] if math.isfinite(rest[i]) else room[place.R_ANGLE, i]
-        block[place.HEAD + 11 * n + i] = room[place.R_GOAL, i]
+        block[place.HEAD + 7 * n + i] = room[place.R_GOAL, i]
     if instance[place.NEW] == 0:
         told(drive[place.ASK], ASK_RESET, instance[place.DATA], 0)
         memories(instance, half, False)
@@ -167,7 +167,7 @@ def _begin(drive: Words, instance: Words, block: Numbers, room: Rows, halves_at:
     half = halves_at + 8 * size * int(block[place.HALF])
     if again or (onward and block[place.SERIAL] != instance[place.SERIAL_NOW]):
         memories(instance, half, True)
-    now, before = block[head + n:head + 6 * n], block[head + 6 * n:head + 11 * n]
+    now, before = block[head + n:head + 4 * n], block[head + 4 * n:head + 7 * n]
     if again:
         now[:] = before
     else:

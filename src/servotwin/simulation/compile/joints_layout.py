@@ -46,12 +46,11 @@ BLOCK = ("start", "end", "calls", "fresh", "serial", "restored", "half")
 """What servos remember of a tick: its times, the calls of the engine's step in it, whether it is the first, who worked
 it out last, whether it was restored with its constraint forces, and which half of the memories is of its beginning.
 Behind it stand the numbers of `OF_EACH`, the constraint forces that it took, and both halves."""
-_CARRIED = ("known torque", "known acceleration", "share", "reached", "expected")
+_CARRIED = ("known torque", "known acceleration", "share")
 OF_EACH = ("torque", *_CARRIED, *(f"{name} before" for name in _CARRIED), "held", "goal",
            "told")
 """Numbers of each servo in a block: its mean torque over the tick; from where on the next torque is predicted, and how
-much of another acceleration of its joint the servo takes up, from 0 (nothing) to 1 (it holds); the angle that it has
-reached at the end of the tick, and the one that the engine should have reached; where it holds before a
+much of another acceleration of its joint the servo takes up, from 0 (nothing) to 1 (it holds); where it holds before a
 command; what the joint was told to, of one without an actuator, and whether it was (0: not)."""
 
 ASK_NEW, ASK_RESET, ASK_ROOM = range(3)

@@ -253,7 +253,8 @@ class VectorSimulator:
         ----------
         output_angle, output_speed : float or array, optional
             Of the shaft [rad], [rad/s]. A speed is an impulse, whose work `impulse_work` adds up; with play in the gear
-            the motor keeps its own, and its angle as far as the play allows.
+            the motor keeps its own. It keeps its angle as far as the play allows; with both, as another simulator
+            gives them that moves the shaft, it goes along, and the play stays as it is.
         load_inertia : float or array, optional
             J_L instead of the load's [kg m²]; the gear's own stays.
         bus_voltage : float or array, optional

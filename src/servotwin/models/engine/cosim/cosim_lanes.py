@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from servotwin.models.engine.bus.bus_records import put_vector
 from servotwin.models.engine.bus.coupled_motion import APART
 from servotwin.models.engine.cosim.cosim_calls import ANGLE, SPEED, shaft_at, stops_at
-from servotwin.models.engine.cosim.imposed_state import carried, impulse_work, placed
+from servotwin.models.engine.cosim.imposed_state import behind, carried, impulse_work, placed
 from servotwin.models.engine.cosim.layout_convert import put_beside, remembered
 from servotwin.models.engine.memory import memory_at, point_of, put_memory, put_point, time_of
 from servotwin.models.engine.step import COMPLETED
@@ -77,8 +77,9 @@ def impose_on_tiles(has: Indices, given: Floats, numbers: Any, which: Indices, p
             servo.w_m[j] = servo.w_m[j] if half > 0.0 else after
         if has[ANGLE] != 0:
             angle = within_stops(own, i, given[ANGLE, lane])
+            before = 1.0 * servo.q[j]
             servo.q[j], servo.wiper[j] = angle, carried(1.0 * servo.wiper[j], angle, own.sensor.half_slack[i])
-            servo.q_m[j] = carried(1.0 * servo.q_m[j], angle, half) if half > 0.0 else angle
+            servo.q_m[j] = behind(1.0 * servo.q_m[j], before, angle, half, has[SPEED] != 0) if half > 0.0 else angle
 
 
 def impose_on_records(has: Indices, given: Floats, numbers: Any, which: Indices, places: Indices, work: Floats,

@@ -53,13 +53,15 @@ def placed(point: Point, angle: float, speed: float, sets_angle: bool, sets_spee
            half_slack: float, sprung: bool) -> Point:
     """Return a point with another angle [rad] or speed [rad/s] of the output, from which a new motion begins.
 
-    Motor and potentiometer go along as far as their play. What is at the other end of a spring (`sprung`) goes along
-    so that the twist stays, and keeps its speed.
+    Motor and potentiometer go along as far as their play. Where the speed is set too, the shaft is one that another
+    simulator moves: the motor goes along so that the play stays as it is, or teeth that have met within a tick would be
+    apart again. What is at the other end of a spring (`sprung`) goes along so that the twist stays, and keeps its
+    speed.
     """
     q, w, i, T_w, T_h, q_motor, w_motor = point.y
     wiper, play = point.wiper, half_play > 0.0
     if sets_angle:
-        q_motor = q_motor + (angle - q) if sprung else carried(q_motor, angle, half_play) if play else angle
+        q_motor = behind(q_motor, q, angle, half_play, sprung or sets_speed) if sprung or play else angle
         q, wiper = angle, carried(wiper, angle, half_slack)
     if sets_speed:
         w = speed
@@ -68,6 +70,11 @@ def placed(point: Point, angle: float, speed: float, sets_angle: bool, sets_spee
     mode = Mode(point.mode.zone, point.mode.contact, INSIDE if play else RIGID, point.mode.motor,
                 point.mode.share)
     return Point(point.time, y, mode, math.inf, y, point.step, wiper)
+
+
+def behind(follows: float, before: float, angle: float, half_play: float, together: bool) -> float:
+    """Return the angle [rad] of what is behind a gear whose output is put from an angle to another one."""
+    return follows + (angle - before) if together else carried(follows, angle, half_play)
 
 
 def carried(follows: float, angle: float, half_play: float) -> float:
