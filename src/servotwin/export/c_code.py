@@ -8,14 +8,15 @@ import tempfile
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from string import Template
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from servotwin import __version__
 from servotwin.errors import InputError
-from servotwin.export.c_header import HEADER, events_of, signals_of
-from servotwin.export.c_source import SOURCE
+from servotwin.export.c_header import HEADER, MADE, events_of, signals_of
+from servotwin.export.c_source import MAKING, PROGRAM, SOURCE
 from servotwin.export.features import features_of, left_out, recipe_of
 from servotwin.loads import as_load
 from servotwin.models import (
@@ -35,9 +36,12 @@ from servotwin.models.terms import wiring
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.control import Firm
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
+from servotwin.models.terms.given import Given
+from servotwin.models.terms.hung import Hung, hung_of
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import table_of
 from servotwin.models.terms.wiring import Wiring
+from servotwin.simulation.compile import Recipe
 from servotwin.simulation.compile.kinds import FLOAT64, INT64, Array, Kind, Record, Tuple
 from servotwin.simulation.compile.signatures import named
 from servotwin.simulation.compile.standalone import Standalone
@@ -96,7 +100,8 @@ class CCode:
         return paths
 
 
-def c(model: Model, load: Load | Part | None = None, *, name: str | None = None, accuracy: float = ACCURACY) -> CCode:
+def c(model: Model, load: Load | Part | None = None, *, name: str | None = None, accuracy: float = ACCURACY,
+      parameters: bool = False) -> CCode:
     """Return a servo as C: a header and a source of functions that start it, let it go on, and look at it.
 
     What they compute is what `Simulator` computes, of the same kernels. The numbers of servo and load stand in a table;
@@ -112,6 +117,8 @@ def c(model: Model, load: Load | Part | None = None, *, name: str | None = None,
         Of the files, and the beginning of all names in them; that of the servo unless given.
     accuracy : float
         What angles may be off by where motions are integrated [rad].
+    parameters : bool
+        Whether there is a function too that makes the numbers of the parameters of a servo file.
 
     Returns
     -------
@@ -140,14 +147,14 @@ def c(model: Model, load: Load | Part | None = None, *, name: str | None = None,
     name = re.sub(r"\W", "_", model.servo.name.lower()) if name is None else name
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         raise InputError("export c: name", got=name, allowed="small letters, digits and _, a letter first")
-    return _Writing(model, hung, name, accuracy_of(accuracy)).code()
+    return _Writing(model, hung, name, accuracy_of(accuracy), makes=parameters).code()
 
 
 class _Writing:
     """The numbers of one servo on their way into C."""
 
-    def __init__(self, model: Any, load: Load, name: str, accuracy: float) -> None:
-        self._model, self._load, self._name = model, load, name
+    def __init__(self, model: Any, load: Load, name: str, accuracy: float, *, makes: bool) -> None:
+        self._model, self._load, self._name, self._makes = model, load, name, makes
         self._program: Firmware = model.firmware() or NO_FIRMWARE
         self._chip: Chip = model.chip() or NO_CHIP
         self._curve = table_of(model.curve())
@@ -162,11 +169,12 @@ class _Writing:
         flags = features_of(self._numbers, self._chip, self._program, len(self._curve) > 0)
         text = Standalone(dict(self._public()))
         names = text.add(recipe_of(flags), _signatures())
+        made = self._making(text) if self._makes else ""
         shared = {
             "name": self._name, "guard": self._name.upper(), "version": __version__, "id": self._model.servo.name,
             "title": f"{self._name}: {self._model.servo.name} as a {type(self._model).__name__}."}
         return CCode(self._name, HEADER.substitute(shared | self._of_header(text, flags)),
-                     SOURCE.substitute(shared | names | self._of_source(text)))
+                     SOURCE.substitute(shared | names | self._of_source(text)) + made)
 
     def _public(self) -> Iterator[tuple[str, Kind]]:
         """Return the structs of the header, each after those in it."""
@@ -174,11 +182,27 @@ class _Writing:
         roots: list[tuple[str, Kind]] = [("numbers", named(Alone)), ("memory", _MEMORY), ("event", _EVENT)]
         if self._digital:
             roots += [("program", _PROGRAM), ("firm", _FIRM)]
+        if self._makes:
+            roots.append(("given", named(Given)))
         for own, root in roots:
             for inner, kind in (*_within(root), (own, root)):
                 if kind not in seen:
                     seen.add(kind)
                     yield f"{name}_{inner}", kind
+
+    def _making(self, text: Standalone) -> str:
+        """Return the function that makes a servo of what is given of it, and print its kernels."""
+        kinds = (named(Given), named(Hung), FLOAT64, FLOAT64, FLOAT64)
+        made = _made_by(self._model)
+        entries = {made: kinds} | ({"program": (named(Given),)} if self._digital else {})
+        names = text.add(Recipe("alone_making", tuple(f"servotwin.models.engine.alone_making:{one}" for one in entries)),
+                         entries)
+        types, alone = text.types, self._alone
+        return MAKING.substitute(
+            name=self._name, made=names[made], hung=types.of(named(Hung)),
+            load=types.initial(named(Hung), hung_of(self._load)), given=types.initial(named(Given), self._model.given),
+            error=repr(float(self._model.standing_error)), torque=repr(float(alone.torque)), accuracy=repr(alone.accuracy),
+            program=PROGRAM.substitute(kind=types.of(named(Firmware)), made=names["program"]) if self._digital else "")
 
     def _of_header(self, text: Standalone, flags: int) -> dict[str, str]:
         name, structs = self._name, text.public
@@ -189,7 +213,7 @@ class _Writing:
             "event": _laid_out(event), "events": events_of(name.upper()),
             "command": "a goal [rad]" if goals else "the width of a pulse [s]",
             "example": f"{self._alone.wiring.at_zero + self._alone.wiring.per_angle:.6g}",
-            "absent": left_out(flags), "signals": signals_of(self._signals()),
+            "absent": left_out(flags), "making": Template(MADE).substitute(name=name) if self._makes else "", "signals": signals_of(self._signals()),
             "more": self._members((f"    {name}_program program;\n", self._digital),
                                   ("    const double *curve; /* of the potentiometer: angle [rad] and error [V] */\n"
                                    "    int64_t curve_rows;\n", len(self._curve) > 0)),
@@ -229,6 +253,13 @@ class _Writing:
     @staticmethod
     def _read(signal: str) -> str:
         return f"seen.{signal}" if signal in ("output_angle", "output_speed") else f"seen.shown.{signal}"
+
+
+def _made_by(model: Any) -> str:
+    """Return the entry that makes the numbers of a model."""
+    kinds = ((BoundedServo, "bounded"), (AveragedServo, "averaged"), (AveragedServoInductive, "averaged"),
+             (DigitalServo, "digital"))
+    return next((entry for kind, entry in kinds if isinstance(model, kind)), "pulsed")
 
 
 def wiring_of(model: Any) -> Wiring:
