@@ -166,7 +166,7 @@ class _Writing:
 
     def code(self) -> CCode:
         """Return header and source."""
-        flags = features_of(self._numbers, self._chip, self._program, len(self._curve) > 0)
+        flags = features_of_model(self._model, self._load)
         text = Standalone(dict(self._public()))
         names = text.add(recipe_of(flags), _signatures())
         made = self._making(text) if self._makes else ""
@@ -247,12 +247,23 @@ class _Writing:
 
     def _signals(self) -> list[tuple[str, str, str]]:
         """Return names, units and meanings of the signals that the servo has."""
-        names = self._model.signals_with(self._load)
-        return [(name, SIGNALS[name].unit, SIGNALS[name].meaning) for name in names if name not in _COMMANDS]
+        return signals_of_model(self._model, self._load)
 
     @staticmethod
     def _read(signal: str) -> str:
         return f"seen.{signal}" if signal in ("output_angle", "output_speed") else f"seen.shown.{signal}"
+
+
+def signals_of_model(model: Any, load: Load) -> list[tuple[str, str, str]]:
+    """Return names, units and meanings of the signals of a servo in C."""
+    return [(name, SIGNALS[name].unit, SIGNALS[name].meaning) for name in model.signals_with(load)
+            if name not in _COMMANDS]
+
+
+def features_of_model(model: Any, load: Load) -> int:
+    """Return what the code of a servo has to follow: flags of `terms.dependence`."""
+    return features_of(model.pack(load), model.chip() or NO_CHIP, model.firmware() or NO_FIRMWARE,
+                       len(table_of(model.curve())) > 0)
 
 
 def _made_by(model: Any) -> str:
