@@ -2,7 +2,6 @@
 
 import shutil
 import subprocess
-import sys
 import zipfile
 
 import numpy as np
@@ -15,8 +14,8 @@ from servotwin.export.fmu_variables import base_units
 from servotwin.models import default_model
 
 fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed")
-from fmpy import fmi2, fmi3  # noqa: E402
-from fmpy.validation import validate_fmu  # noqa: E402
+from fmpy import fmi2, fmi3
+from fmpy.validation import validate_fmu
 
 PENDULUM = st.loads.Pendulum(mass=0.05, length=0.08)
 SERVOS = {"pulse": ("hitec-hs-755hb", None), "pendulum": ("hitec-hs-755hb", PENDULUM),
@@ -128,3 +127,168 @@ def test_steps_of_any_length_are_those_of_a_simulator(made, tmp_path, kind, vers
     assert worst < 1e-9
     assert abs(tool.get("output_angle") - angle) > 0.05
     assert tool.get("armature_current") == pytest.approx(lanes["armature_current"][0], abs=1e-7)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_parameters_are_those_of_the_servo_until_it_begins(made, tmp_path, version):
+    changes = {"motor.armature_resistance": 4.0, "supply.open_circuit_voltage": 5.0, "electronics.frame_period": 0.015}
+    tool, lanes = Tool(made("pulse", version), tmp_path, **changes), beside("pulse", **changes)
+    lanes.reset(output_angle=[tool.get("output_angle")], pulse_width=[tool.get("pulse_width")])
+    tool.set("pulse_width", 1.7e-3)
+    for _ in range(50):
+        tool.step(4e-3)
+        lanes.advance(4e-3, pulse_width=[1.7e-3])
+    assert tool.get("output_angle") == pytest.approx(lanes["output_angle"][0], abs=1e-9)
+    assert tool.get("motor.armature_resistance") == 4.0
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        tool.set("motor.armature_resistance", 3.0)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize(("start", "words"), [
+    ({"motor.armature_resistance": -1.0}, "more than 0"), ({"gear.gear_reduction": 0.5}, "at least 1"),
+    ({"stops.lower_angle": 4.0}, "less than stops.upper_angle"), ({"start.frames_begin": 0.02}, "less than a frame"),
+    ({"start.output_angle": 9.0}, "between its stops"), ({"pulse_width": float("nan")}, "finite")])
+def test_what_cannot_be_is_refused_in_words(made, tmp_path, capsys, version, start, words):
+    tool = Tool(made("pulse", version), tmp_path)
+    tool.slave.reset()
+    capsys.readouterr()
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        tool.initialize(**start)
+    said = capsys.readouterr().out
+    assert next(iter(start)) in said
+    assert words in said
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_command_that_it_does_not_take_changes_nothing(made, tmp_path, version):
+    tool = Tool(made("pulse", version), tmp_path)
+    tool.step(0.03)
+    before = tool.get("output_angle")
+    tool.set("pulse_width", 0.05)
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        tool.step(0.01)
+    tool.set("pulse_width", 1.4e-3)
+    assert tool.get("output_angle") == before
+    tool.step(0.01)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_frames_begin_when_they_shall(made, tmp_path, version):
+    """A pulse that begins 5 ms after the start moves the shaft no sooner."""
+    tool = Tool(made("pulse", version), tmp_path, **{"start.frames_begin": 5e-3})
+    rest = tool.get("output_angle")
+    tool.set("pulse_width", 1.9e-3)
+    tool.step(5e-3 + 0.9e-3)
+    assert tool.get("output_angle") == rest
+    tool.step(1.2e-3)
+    assert abs(tool.get("output_angle") - rest) > 1e-6
+    lanes = beside("pulse")
+    lanes.reset(output_angle=[rest], pulse_width=[1.9e-3])
+    lanes.advance(2.1e-3, pulse_width=[1.9e-3])
+    assert tool.get("output_angle") == pytest.approx(lanes["output_angle"][0], abs=1e-9)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("kind", ["pulse", "bus"])
+def test_a_state_goes_on_alike(made, tmp_path, kind, version):
+    """Kept, taken up in another instance from bytes, and after a reset."""
+    tool, other = (Tool(made(kind, version), tmp_path / name) for name in ("one", "two"))
+    name = told(kind)
+    slave = tool.slave
+    newer = version == "3.0"
+
+    def go(which, value, count):
+        which.set(name, value)
+        seen = []
+        for _ in range(count):
+            which.step(3e-3)
+            seen.append(which.get("output_angle"))
+        return seen
+
+    value = 0.5 if kind == "bus" else 1.7e-3
+    go(tool, value, 20)
+    kept = slave.getFMUState() if newer else slave.getFMUstate()
+    time = tool.time
+    first = go(tool, 0.8 * value, 30)
+    data = slave.serializeFMUState(kept) if newer else slave.serializeFMUstate(kept)
+    (slave.setFMUState if newer else slave.setFMUstate)(kept)
+    tool.time = time
+    assert go(tool, 0.8 * value, 30) == first
+    taken = (other.slave.deserializeFMUState if newer else other.slave.deSerializeFMUstate)(data)
+    (other.slave.setFMUState if newer else other.slave.setFMUstate)(taken)
+    other.time = time
+    assert go(other, 0.8 * value, 30) == first
+    slave.reset()
+    tool.initialize()
+    fresh = Tool(made(kind, version), tmp_path / "three")
+    assert go(tool, value, 10) == go(fresh, value, 10)
+
+
+def test_a_step_ends_with_the_frame_where_it_may(made, tmp_path):
+    tool = Tool(made("pulse", "3.0"), tmp_path, early=True, **{"start.frames_begin": 6e-3})
+    ends = []
+    while tool.time < 0.05:
+        early = tool.step(min(0.05 - tool.time, 0.03))
+        ends.append((round(tool.time, 9), early))
+    assert ends == [(0.006, True), (0.026, True), (0.046, True), (0.05, False)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_tool_builds_it_from_its_sources(tmp_path, version):
+    if shutil.which("cmake") is None:
+        pytest.skip("cmake is not installed")
+    from fmpy.build import build_platform_binary
+
+    model = default_model(st.load_servo("hitec-hs-755hb"))
+    path = fmu(model, fmi=version, sources=True).write(tmp_path / "sources.fmu")
+    with zipfile.ZipFile(path) as whole:
+        whole.extractall(tmp_path / "sources")
+    (tmp_path / "build").mkdir()
+    build_platform_binary(tmp_path / "sources", build_dir=tmp_path / "build")
+    assert list((tmp_path / "sources" / "binaries").rglob("hitec_hs_755hb.so"))
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_its_sources_have_no_warning(tmp_path, version):
+    compiler = next((each for each in ("clang", "gcc") if shutil.which(each)), None)
+    if compiler is None:
+        pytest.skip("no compiler of C is installed")
+    made = fmu(default_model(st.load_servo("feetech-sts3215-12v")), fmi=version, sources=True)
+    for name, content in made.contents.items():
+        if name.startswith("sources/"):
+            (tmp_path / name[8:]).write_bytes(content)
+    for text in tmp_path.glob("*.c"):
+        subprocess.run([compiler, "-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wno-strict-prototypes",
+                        "-c", text, "-o", tmp_path / "object.o"], check=True)
+
+
+def test_it_is_small_and_the_same_each_time(made, tmp_path):
+    with zipfile.ZipFile(made("bus", "2.0")) as whole:
+        sizes = [each.file_size for each in whole.infolist() if each.filename.startswith("binaries/")]
+    assert 0 < max(sizes) < 200_000
+    model = default_model(st.load_servo("hitec-hs-755hb"))
+    one, two = (fmu(model, sources=True).write(tmp_path / name).read_bytes() for name in ("a.fmu", "b.fmu"))
+    assert one == two
+
+
+def test_bad_input(monkeypatch, tmp_path):
+    model = default_model(st.load_servo("hitec-hs-755hb"))
+    with pytest.raises(InputError, match="fmi"):
+        fmu(model, fmi="1.0")
+    with pytest.raises(InputError, match="DCMotor|Motor"):
+        fmu(st.DCMotor(st.load_servo("hitec-hs-755hb")))
+    monkeypatch.setattr("servotwin.export.fmu_binary.compilers", lambda: ())
+    with pytest.raises(InputError, match="ziglang"):
+        fmu(model)
+    path = fmu(model, sources=True).write(tmp_path / "a.fmu")
+    with pytest.raises(st.errors.OutputExistsError):
+        fmu(model, sources=True).write(path)
+
+
+@pytest.mark.parametrize(("unit", "powers"), [
+    ("V s/rad", {"kg": 1, "m": 2, "s": -2, "A": -1, "rad": -1}), ("kg m2", {"kg": 1, "m": 2}), ("1", {}),
+    ("s2/rad", {"s": 2, "rad": -1}), ("K/W", {"K": 1, "kg": -1, "m": -2, "s": 3})])
+def test_units_are_those_of_the_si(unit, powers):
+    assert base_units(unit) == powers

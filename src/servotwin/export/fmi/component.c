@@ -60,6 +60,9 @@ bool component_ready(component *c) {
     const double period = MODEL_FRAMES(&now->servo);
     if (!(now->frames_begin >= 0.0 && (now->frames_begin < period || now->frames_begin == 0.0)))
         return refuse_number(c, model_names[FRAMES_BEGIN], now->frames_begin, "from 0 to less than a frame period");
+    const double lower = now->servo.numbers.wiring.lower, upper = now->servo.numbers.wiring.upper;
+    if (!(now->angle >= lower && now->angle <= upper))
+        return refuse_number(c, model_names[ANGLE], now->angle, "between its stops");
     const double rest = model_command(&now->servo, now->angle);
     if (model_start(&now->state, &now->servo, rest, 0) != MODEL_DONE)
         return refuse_number(c, model_names[ANGLE], now->angle, "an angle at which the servo can rest");
