@@ -27,9 +27,9 @@ _LAZY = {
     **dict.fromkeys(("Fit", "Sheet", "SheetPoint", "advise", "friction_ladder", "identify", "servo_from_sheet",
                      "validate"), "identification"),
 }
-_MODULES = ("bench", "control", "datasheet", "diagnosis", "errors", "identification", "linear", "loads", "logs",
-            "models", "parameters", "physics", "plotting", "robots", "signals", "simulation", "studies", "units", "web",
-            "wire")
+_MODULES = ("bench", "control", "datasheet", "diagnosis", "errors", "export", "identification", "linear", "loads",
+            "logs", "models", "parameters", "physics", "plotting", "robots", "signals", "simulation", "studies",
+            "units", "web", "wire")
 
 __all__ = ["__version__", *_LAZY, *_MODULES]
 

@@ -3,6 +3,7 @@ from servotwin import control as control
 from servotwin import datasheet as datasheet
 from servotwin import diagnosis as diagnosis
 from servotwin import errors as errors
+from servotwin import export as export
 from servotwin import identification as identification
 from servotwin import linear as linear
 from servotwin import loads as loads

@@ -11,6 +11,7 @@ from servotwin.cli.bench import bench
 from servotwin.cli.catalog import catalog
 from servotwin.cli.curves import curves
 from servotwin.cli.doctor import doctor
+from servotwin.cli.export import export
 from servotwin.cli.fit import fit
 from servotwin.cli.linear import linear
 from servotwin.cli.log import EPILOG as LOG_EPILOG
@@ -89,4 +90,5 @@ app.command("wire", help="Serve servos that are not there at a serial port, wher
                    "Example: servotwin wire koch --link /tmp/koch --faults faults.toml")(wire)
 app.add_typer(catalog, name="catalog")
 app.add_typer(robot, name="robot")
+app.add_typer(export, name="export")
 app.add_typer(bench, name="bench")

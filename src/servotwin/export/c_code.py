@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from servotwin import __version__
-from servotwin.errors import InputError
+from servotwin.errors import InputError, OutputError, OutputExistsError
 from servotwin.export.c_header import HEADER, MADE, events_of, signals_of
 from servotwin.export.c_source import MAKING, PROGRAM, SOURCE
 from servotwin.export.features import features_of, left_out, recipe_of
@@ -31,7 +31,7 @@ from servotwin.models import (
 from servotwin.models.engine.alone import Alone, Happened, Seen
 from servotwin.models.engine.memory import ACCURACY, Inputs, Memories, Memory
 from servotwin.models.outputs import SIGNALS
-from servotwin.models.state.records import record_of
+from servotwin.models.state.records import numbers_in, record_of
 from servotwin.models.terms import wiring
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.control import Firm
@@ -69,24 +69,33 @@ class CCode:
         Begins the names of the files, types and functions.
     header, source : str
         The two texts.
+    left_out : str
+        What the numbers of the servo have no use for, and the code does not follow.
+    table : tuple of float
+        All numbers of the servo in the order in which the struct of its table has them, the table of a potentiometer
+        apart: what another servo with the same things left out may have in its place.
     """
 
     name: str
     header: str
     source: str
+    left_out: str
+    table: tuple[float, ...]
 
     def write(self, folder: str | Path, *, overwrite: bool = False) -> tuple[Path, Path]:
         """Write `name.h` and `name.c` into a folder, which is made where there is none; return their paths.
 
         Raises
         ------
-        InputError
-            If the folder cannot be written, or a file is there and `overwrite` is not given; then nothing has changed.
+        OutputExistsError
+            If a file is there and `overwrite` is not given; then nothing has changed.
+        OutputError
+            If they cannot be written.
         """
         paths = Path(folder) / f"{self.name}.h", Path(folder) / f"{self.name}.c"
         for path in paths:
             if path.exists() and not overwrite:
-                raise InputError("export c", got=f"{path} is there already", allowed="another folder, or overwriting")
+                raise OutputExistsError(path)
         try:
             Path(folder).mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryDirectory(prefix=".servotwin-", dir=folder) as aside:
@@ -95,8 +104,7 @@ class CCode:
                 for path in paths:
                     os.replace(Path(aside) / path.name, path)
         except OSError as error:
-            raise InputError("export c", got=str(folder),
-                             allowed=f"a folder that can be written ({error.strerror})") from None
+            raise OutputError(f"{folder} cannot be written ({error.strerror or error})") from None
         return paths
 
 
@@ -174,7 +182,8 @@ class _Writing:
             "name": self._name, "guard": self._name.upper(), "version": __version__, "id": self._model.servo.name,
             "title": f"{self._name}: {self._model.servo.name} as a {type(self._model).__name__}."}
         return CCode(self._name, HEADER.substitute(shared | self._of_header(text, flags)),
-                     SOURCE.substitute(shared | names | self._of_source(text)) + made)
+                     SOURCE.substitute(shared | names | self._of_source(text)) + made, left_out(flags),
+                     tuple(map(float, numbers_in((self._alone, *((self._program,) if self._digital else ()))))))
 
     def _public(self) -> Iterator[tuple[str, Kind]]:
         """Return the structs of the header, each after those in it."""

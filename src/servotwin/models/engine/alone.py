@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.models.engine import controller
 from servotwin.models.engine.events import kinds
 from servotwin.models.engine.legs.legs import MOST_SHORT
 from servotwin.models.engine.memory import (
+    SAME,
     Inputs,
     Memories,
     Memory,
+    Point,
     counted_anew,
     due,
+    edge_of,
     instant,
     memory_at,
     origin_of,
@@ -26,11 +30,13 @@ from servotwin.models.engine.motions import motion
 from servotwin.models.engine.observe import Observed, observed, told_by
 from servotwin.models.engine.runs import as_now, calmed, is_short, mode_under, told
 from servotwin.models.engine.step import CHATTER, COMPLETED, MOST_IDLE, pulse_width, step
-from servotwin.models.state.modes import INSIDE, RIGID, Vector
-from servotwin.models.terms import control, duty, firmware, frame, play
+from servotwin.models.state.modes import INSIDE, RIGID, Vector, at_rest
+from servotwin.models.terms import control, duty, elastic, firmware, frame, play
 from servotwin.models.terms.bridge import heeds_silence
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.chip import present as pulsed_chip
+from servotwin.models.terms.heat import present as warms
+from servotwin.models.terms.motor import inductive
 from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.models.terms.wiring import Wiring, possible, rest_angle
 from servotwin.physics.pieces import piece_value
@@ -105,7 +111,7 @@ def advance(servo: Alone, inputs: Inputs, memories: Memories, until: float, comm
     status = answer(servo, command, inputs.constant_torque)
     if status != READY:
         return status
-    if until < time_of(memory):
+    if until < time_of(memory) - SAME * memory.beat:  # of which the instant of an edge may be off
         return BEFORE
     memory, status = run(servo.numbers, servo.chip, inputs, memory, until, rows, used)
     if status == COMPLETED:
@@ -121,6 +127,8 @@ def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, until: flo
     if firmware.present(inputs.firmware[0]):
         controller.resume(inputs, memory)
     end = instant(pulsed, inputs, memory, until - origin_of(memory))
+    if stands(numbers, chip, inputs, memory, end):
+        return memory_then(memory, end), COMPLETED
     m = motion.nothing(numbers, memory.u, memory.tau)
     idle = short = trip = 0
     while memory.point.time < end:
@@ -146,6 +154,28 @@ def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, until: flo
     if firmware.present(inputs.firmware[0]):
         controller.pause(inputs, memory)
     return memory, COMPLETED
+
+
+def stands(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, end: float) -> bool:
+    """Tell whether a servo stands still until `end`, and nothing is decided before: then time alone goes on."""
+    point, now = memory.point, memory.chip
+    if not at_rest(point.mode.contact) or point.mode.mesh != RIGID or point.anchor_time == math.inf:
+        return False
+    if inductive(numbers.motor) or warms(numbers.heat) or elastic.present(numbers.elastic) or (
+            firmware.present(inputs.firmware[0])):
+        return False
+    if pulsed_chip(chip) and (frame.next_switch(now, heeds_silence(numbers.bridge)) < end
+                              or edge_of(inputs, memory, now.number) < end):
+        return False
+    return memory.u_end >= end and memory.tau_end >= end and not due(memory)
+
+
+def memory_then(memory: Memory, time: float) -> Memory:
+    """Return the memory of a servo that has stood still until a time [s]."""
+    p = memory.point
+    point = Point(time, p.y, p.mode, p.anchor_time, p.anchor, p.step, p.wiper)
+    return Memory(memory.frames, memory.beat, point, memory.chip, memory.u, memory.u_end, memory.tau, memory.tau_end,
+                  memory.firm)
 
 
 def _note(numbers: Numbers, chip: Chip, inputs: Inputs, before: Memory, trip: int, memory: Memory, event: int,

@@ -41,8 +41,9 @@ class Printer:
         Their text.
     """
 
-    def __init__(self, vector: bool, in_any_order: frozenset[str], called: frozenset[str]) -> None:
-        self.vector, self.in_any_order, self.called = vector, in_any_order, called
+    def __init__(self, vector: bool, in_any_order: frozenset[str], called: frozenset[str],
+                 inlined: frozenset[str] = frozenset()) -> None:
+        self.vector, self.in_any_order, self.called, self.inlined = vector, in_any_order, called, inlined
         self.types = Types()
         self.functions: list[str] = []
         self._names: dict[Specialised, str] = {}
@@ -62,6 +63,7 @@ class _Text(CallExpressions):
     def __init__(self, printer: Printer, own: Specialised) -> None:
         super().__init__(printer, own)
         self._vector, self._in_any_order, self._called = printer.vector, printer.in_any_order, printer.called
+        self._inlined = printer.inlined
         self._variables = Variables(own)
 
     # --- the function -------------------------------------------------------------------------------------------------
@@ -101,6 +103,8 @@ class _Text(CallExpressions):
 
         In the vector form all is inlined but for loops over lanes, and what is seldom called.
         """
+        if self._own.node.name in self._inlined:
+            return "INLINED"
         if self._vector and self._own.node.name in self._called:
             return "ASIDE"
         loops = any(isinstance(node, (ast.For, ast.While)) for node in ast.walk(self._own.node))

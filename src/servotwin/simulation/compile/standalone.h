@@ -12,10 +12,11 @@
 #endif
 #if defined(__GNUC__)
 #define SMALL static inline __attribute__((unused))
+#define INLINED static inline __attribute__((always_inline, unused))
 #else
 #define SMALL static inline
-#endif
 #define INLINED SMALL
+#endif
 #define PACKED
 #define FMA(a, b, c) ((a) * (b) + (c))
 #define FMAf(a, b, c) ((a) * (b) + (c))

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from servotwin.simulation.compile.c_types import Types
     from servotwin.simulation.compile.recipe import Recipe
 
+_ONCE = frozenset({  # called at one place, with structs of a kilobyte that would be copied: a third of the time
+    "engine_alone__advance", "engine_alone__run", "engine_memory__resumed", "engine_step__step", "engine_step__onward",
+    "engine_step__follow", "motions_choice__begin", "motions_motion__nothing", "motions_motion__closed"})
 _SIZES = re.compile(r"\nCHECKED_SIZE\(.*?\);")
 
 
@@ -33,7 +36,7 @@ class Standalone:
     """
 
     def __init__(self, public: Mapping[str, Kind]) -> None:
-        self._printer = Printer(False, frozenset(), frozenset())
+        self._printer = Printer(False, frozenset(), frozenset(), _ONCE)
         for name, kind in public.items():
             self.types.call(kind, name)
         self._public = len(self.types.structs)

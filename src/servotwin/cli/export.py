@@ -1,0 +1,77 @@
+"""`servotwin export`: servos for programs that have no Python."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from servotwin.cli import shared_options as shared
+from servotwin.cli.terminal import emit_help, emit_json, pairs, patience, show
+
+if TYPE_CHECKING:
+    from servotwin.export import CCode
+
+_ACCURACY = 1e-9
+
+export = typer.Typer(
+    help="Write a servo as a program that needs no Python.",
+    epilog="Example: servotwin export c hitec-hs-755hb --out firmware")
+
+
+@export.callback(invoke_without_command=True)
+def _export(context: typer.Context) -> None:
+    """Show the help where no command is given."""
+    if context.invoked_subcommand is None:
+        emit_help(context)
+
+
+def c(
+    servo: shared.ServoArgument,
+    out: Annotated[Path, typer.Option(
+        metavar="DIR", help="Folder for the two files; made where there is none.", rich_help_panel=shared.OUTPUT)],
+    name: Annotated[str | None, typer.Option(
+        metavar="NAME", help="Of the files, and the beginning of all names in them (default: the servo's).",
+        rich_help_panel=shared.OUTPUT)] = None,
+    model: Annotated[str | None, typer.Option(
+        metavar="MODEL", help="digital, pulse, pulse-inductive, bounded, averaged or averaged-inductive (default: by "
+        "the kind of the servo).", rich_help_panel=shared.PLANT)] = None,
+    load: Annotated[list[str] | None, typer.Option(
+        metavar="PART=VALUE", help="Load, such as inertia=1e-3 or pendulum=0.1:0.12; repeatable, or with commas.",
+        rich_help_panel=shared.PLANT)] = None,
+    change: Annotated[list[str] | None, typer.Option(
+        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter; repeatable.",
+        rich_help_panel=shared.PLANT)] = None,
+    register: shared.RegisterOption = None,
+    supply: shared.SupplyOption = None,
+    accuracy: shared.AccuracyOption = _ACCURACY,
+    force: Annotated[bool, typer.Option(
+        "--force", help="Replace existing files.", rich_help_panel=shared.OUTPUT)] = False,
+    as_json: shared.JsonOption = False,
+) -> None:
+    """Write a servo as C99: a header and a source."""
+    from servotwin.cli.load_words import load_from
+    from servotwin.cli.model_words import model_of
+    from servotwin.export import c as exported
+
+    chosen = model_of(servo, model, change or [], None, register or [], supply)
+    hangs = load_from(load or [], chosen)
+    with patience(f"printing {chosen.servo.name}"):
+        code = exported(chosen, hangs, name=name, accuracy=accuracy)
+        files = code.write(out, overwrite=force)
+    facts = _facts(code) | {"model": type(chosen).__name__, "files": [str(path) for path in files]}
+    if as_json:
+        emit_json(facts)
+        return
+    show(pairs([("model", facts["model"]), ("left out", facts["left_out"]),
+                *(("written", path) for path in facts["files"])]))
+
+
+def _facts(code: CCode) -> dict[str, Any]:
+    return {"name": code.name, "left_out": code.left_out}
+
+
+export.command("c", help="Write a servo as C99: a header and a source, without allocation or globals.",
+               epilog="Example: servotwin export c hitec-hs-755hb --out firmware\n\n"
+                      "Example: servotwin export c feetech-sts3215-12v --load inertia=1e-3 --out arm --name elbow")(c)
