@@ -1,10 +1,12 @@
 """A servo as an FMU, as fmpy sets, steps and reads it: the same as `simulate`."""
 
+import os
 import shutil
 import subprocess
+import sys
 import zipfile
+from pathlib import Path
 
-import numpy as np
 import pytest
 
 import servotwin as st
@@ -14,8 +16,8 @@ from servotwin.export.fmu_variables import base_units
 from servotwin.models import default_model
 
 fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed")
-from fmpy import fmi2, fmi3
-from fmpy.validation import validate_fmu
+fmi2, fmi3 = (pytest.importorskip(f"fmpy.{name}") for name in ("fmi2", "fmi3"))
+validate_fmu = pytest.importorskip("fmpy.validation").validate_fmu
 
 PENDULUM = st.loads.Pendulum(mass=0.05, length=0.08)
 SERVOS = {"pulse": ("hitec-hs-755hb", None), "pendulum": ("hitec-hs-755hb", PENDULUM),
@@ -236,7 +238,8 @@ def test_a_step_ends_with_the_frame_where_it_may(made, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("version", VERSIONS)
-def test_a_tool_builds_it_from_its_sources(tmp_path, version):
+def test_a_tool_builds_it_from_its_sources(tmp_path, monkeypatch, version):
+    monkeypatch.setenv("PATH", os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"])))
     if shutil.which("cmake") is None:
         pytest.skip("cmake is not installed")
     from fmpy.build import build_platform_binary
@@ -277,7 +280,7 @@ def test_bad_input(monkeypatch, tmp_path):
     model = default_model(st.load_servo("hitec-hs-755hb"))
     with pytest.raises(InputError, match="fmi"):
         fmu(model, fmi="1.0")
-    with pytest.raises(InputError, match="DCMotor|Motor"):
+    with pytest.raises(InputError, match="Motor"):
         fmu(st.DCMotor(st.load_servo("hitec-hs-755hb")))
     monkeypatch.setattr("servotwin.export.fmu_binary.compilers", lambda: ())
     with pytest.raises(InputError, match="ziglang"):

@@ -8,7 +8,6 @@ import tempfile
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from string import Template
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +15,8 @@ import numpy as np
 from servotwin import __version__
 from servotwin.errors import InputError, OutputError, OutputExistsError
 from servotwin.export.c_header import HEADER, MADE, events_of, signals_of
-from servotwin.export.c_source import MAKING, PROGRAM, SOURCE
+from servotwin.export.c_making import making
+from servotwin.export.c_source import SOURCE
 from servotwin.export.features import features_of, left_out, recipe_of
 from servotwin.loads import as_load
 from servotwin.models import (
@@ -37,11 +37,9 @@ from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.control import Firm
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.given import Given
-from servotwin.models.terms.hung import Hung, hung_of
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import table_of
 from servotwin.models.terms.wiring import Wiring
-from servotwin.simulation.compile import Recipe
 from servotwin.simulation.compile.kinds import FLOAT64, INT64, Array, Kind, Record, Tuple
 from servotwin.simulation.compile.signatures import named
 from servotwin.simulation.compile.standalone import Standalone
@@ -177,7 +175,7 @@ class _Writing:
         flags = features_of_model(self._model, self._load)
         text = Standalone(dict(self._public()))
         names = text.add(recipe_of(flags), _signatures())
-        made = self._making(text) if self._makes else ""
+        made = making(text, self._model, self._load, self._alone, name=self._name) if self._makes else ""
         shared = {
             "name": self._name, "guard": self._name.upper(), "version": __version__, "id": self._model.servo.name,
             "title": f"{self._name}: {self._model.servo.name} as a {type(self._model).__name__}."}
@@ -199,20 +197,6 @@ class _Writing:
                     seen.add(kind)
                     yield f"{name}_{inner}", kind
 
-    def _making(self, text: Standalone) -> str:
-        """Return the function that makes a servo of what is given of it, and print its kernels."""
-        kinds = (named(Given), named(Hung), FLOAT64, FLOAT64, FLOAT64)
-        made = _made_by(self._model)
-        entries = {made: kinds} | ({"program": (named(Given),)} if self._digital else {})
-        names = text.add(Recipe("alone_making", tuple(f"servotwin.models.engine.alone_making:{one}" for one in entries)),
-                         entries)
-        types, alone = text.types, self._alone
-        return MAKING.substitute(
-            name=self._name, made=names[made], hung=types.of(named(Hung)),
-            load=types.initial(named(Hung), hung_of(self._load)), given=types.initial(named(Given), self._model.given),
-            error=repr(float(self._model.standing_error)), torque=repr(float(alone.torque)), accuracy=repr(alone.accuracy),
-            program=PROGRAM.substitute(kind=types.of(named(Firmware)), made=names["program"]) if self._digital else "")
-
     def _of_header(self, text: Standalone, flags: int) -> dict[str, str]:
         name, structs = self._name, text.public
         event = next(each for each in structs if each.endswith(f" {name}_event;"))
@@ -222,7 +206,8 @@ class _Writing:
             "event": _laid_out(event), "events": events_of(name.upper()),
             "command": "a goal [rad]" if goals else "the width of a pulse [s]",
             "example": f"{self._alone.wiring.at_zero + self._alone.wiring.per_angle:.6g}",
-            "absent": left_out(flags), "making": Template(MADE).substitute(name=name) if self._makes else "", "signals": signals_of(self._signals()),
+            "absent": left_out(flags),
+            "making": MADE.substitute(name=name) if self._makes else "", "signals": signals_of(self._signals()),
             "more": self._members((f"    {name}_program program;\n", self._digital),
                                   ("    const double *curve; /* of the potentiometer: angle [rad] and error [V] */\n"
                                    "    int64_t curve_rows;\n", len(self._curve) > 0)),
@@ -273,13 +258,6 @@ def features_of_model(model: Any, load: Load) -> int:
     """Return what the code of a servo has to follow: flags of `terms.dependence`."""
     return features_of(model.pack(load), model.chip() or NO_CHIP, model.firmware() or NO_FIRMWARE,
                        len(table_of(model.curve())) > 0)
-
-
-def _made_by(model: Any) -> str:
-    """Return the entry that makes the numbers of a model."""
-    kinds = ((BoundedServo, "bounded"), (AveragedServo, "averaged"), (AveragedServoInductive, "averaged"),
-             (DigitalServo, "digital"))
-    return next((entry for kind, entry in kinds if isinstance(model, kind)), "pulsed")
 
 
 def wiring_of(model: Any) -> Wiring:

@@ -104,13 +104,13 @@ $making
 #endif
 ''')
 
-MADE = '''
+MADE = Template('''
 /* The parameters of the servo file, SI, words as their places among those allowed; NAN: not given. */
 extern const ${name}_given ${name}_given_table;
 
 /* Make a servo of parameters, with the load of the table. They are not checked. */
 void ${name}_make(${name}_servo *servo, const ${name}_given *given);
-'''
+''')
 
 
 def events_of(guard: str) -> str:

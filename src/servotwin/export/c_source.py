@@ -81,17 +81,3 @@ double ${name}_command(const ${name}_servo *servo, double angle) {
     return servo->numbers.wiring.per_angle * angle + servo->numbers.wiring.at_zero;
 }
 ''')
-
-MAKING = Template('''
-const ${name}_given ${name}_given_table = $given;
-
-void ${name}_make(${name}_servo *servo, const ${name}_given *given) {
-    static const $hung hung = $load;
-    *servo = ${name}_table;
-    servo->numbers = $made(given, &hung, $error, $torque, $accuracy);
-$program}
-''')
-PROGRAM = Template('''    typedef char same_words[sizeof(servo->program) == sizeof($kind) ? 1 : -1];
-    const $kind program = $made(given);
-    memcpy(&servo->program, &program, sizeof(same_words) * sizeof program);
-''')

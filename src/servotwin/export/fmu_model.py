@@ -31,7 +31,8 @@ def model_header(name: str, token: str, variables: Sequence[Variable], *, frames
     lines = [
         f"/* {name}: what the functions of FMI have to know of it. */", "#ifndef MODEL_H", "#define MODEL_H", "",
         "#include <math.h>", f'#include "{name}.h"', "", f'#define MODEL_TOKEN "{token}"',
-        f"#define MODEL_COMMAND {start[1]!r}", f"#define MODEL_ANGLE {start[3]!r}", f"#define MODEL_FRAMES(s) ({frames})",
+        f"#define MODEL_COMMAND {start[1]!r}", f"#define MODEL_ANGLE {start[3]!r}",
+        f"#define MODEL_FRAMES(s) ({frames})",
         f"#define HAS_FRAMES {int(frames != '0.0')}",
         *(f"#define MODEL_{code} {name.upper()}_{code}" for code in _CODES),
         *(f"#define model_{each} {name}_{each}" for each in _NAMES), "",

@@ -42,12 +42,12 @@ def description(version: str, *, name: str, title: str, token: str, variables: S
                                                                          "false"})})
     if older:
         files = Xml.SubElement(run, "SourceFiles")
-        for each in sources:
-            Xml.SubElement(files, "File", name=each)
+        for source in sources:
+            Xml.SubElement(files, "File", name=source)
     _add_units(root, variables)
     categories = Xml.SubElement(root, "LogCategories")
-    for each, words in (("logStatusError", "what is wrong"), ("logAll", "everything")):
-        Xml.SubElement(categories, "Category", name=each, description=words)
+    for category, words in (("logStatusError", "what is wrong"), ("logAll", "everything")):
+        Xml.SubElement(categories, "Category", name=category, description=words)
     Xml.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize=repr(step))
     made = Xml.SubElement(root, "ModelVariables")
     for each in variables:
@@ -104,4 +104,5 @@ def _numbers(variable: Variable) -> dict[str, str]:
 
 def _text(root: Xml.Element) -> bytes:
     Xml.indent(root)
-    return Xml.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"
+    text: bytes = Xml.tostring(root, encoding="UTF-8", xml_declaration=True)
+    return text + b"\n"
