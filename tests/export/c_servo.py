@@ -43,7 +43,7 @@ class CServo:
         self.state = np.zeros(self._library.size_of_state(), np.uint8)
         self._code = code
         address, number = ctypes.c_void_p, ctypes.c_double
-        self.start_at = self._function("start", address, address, number, ctypes.c_int64)
+        self.start_at = self._function("init", address, address, number, ctypes.c_int64)
         self.advance_to = self._function("advance", address, address, number, number, number, address)
         self.observe_at = self._function("observe", address, address, number, number, address)
         self.time_of = self._function("time", address, result=number)
@@ -58,9 +58,9 @@ class CServo:
     def table(self):
         return self._numbers.ctypes.data
 
-    def like(self, code):
+    def like(self, table):
         """Take the numbers of another servo, whose code would be the same."""
-        self._numbers[:len(code.table)] = code.table
+        self._numbers[:len(table)] = table
 
     def start(self, command, seed=0):
         return self.start_at(self.state.ctypes.data, self.table, command, seed)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import tempfile
+import textwrap
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -156,6 +157,11 @@ def c(model: Model, load: Load | Part | None = None, *, name: str | None = None,
     return _Writing(model, hung, name, accuracy_of(accuracy), makes=parameters).code()
 
 
+def table_for(model: Model, load: Load | Part | None = None, accuracy: float = ACCURACY) -> tuple[float, ...]:
+    """Return `CCode.table` of a servo, without its code."""
+    return _Writing(model, as_load(load), "", accuracy_of(accuracy), makes=False).table
+
+
 class _Writing:
     """The numbers of one servo on their way into C."""
 
@@ -180,8 +186,12 @@ class _Writing:
             "name": self._name, "guard": self._name.upper(), "version": __version__, "id": self._model.servo.name,
             "title": f"{self._name}: {self._model.servo.name} as a {type(self._model).__name__}."}
         return CCode(self._name, HEADER.substitute(shared | self._of_header(text, flags)),
-                     SOURCE.substitute(shared | names | self._of_source(text)) + made, left_out(flags),
-                     tuple(map(float, numbers_in((self._alone, *((self._program,) if self._digital else ()))))))
+                     SOURCE.substitute(shared | names | self._of_source(text)) + made, left_out(flags), self.table)
+
+    @property
+    def table(self) -> tuple[float, ...]:
+        """All numbers of the table in its order."""
+        return tuple(map(float, numbers_in((self._alone, *((self._program,) if self._digital else ())))))
 
     def _public(self) -> Iterator[tuple[str, Kind]]:
         """Return the structs of the header, each after those in it."""
@@ -206,7 +216,7 @@ class _Writing:
             "event": _laid_out(event), "events": events_of(name.upper()),
             "command": "a goal [rad]" if goals else "the width of a pulse [s]",
             "example": f"{self._alone.wiring.at_zero + self._alone.wiring.per_angle:.6g}",
-            "absent": left_out(flags),
+            "absent": textwrap.fill(f"{left_out(flags)}.", 110, initial_indent=" * ", subsequent_indent=" * "),
             "making": MADE.substitute(name=name) if self._makes else "", "signals": signals_of(self._signals()),
             "more": self._members((f"    {name}_program program;\n", self._digital),
                                   ("    const double *curve; /* of the potentiometer: angle [rad] and error [V] */\n"

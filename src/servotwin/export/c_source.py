@@ -31,7 +31,7 @@ static $inputs inputs_of(${name}_state *state, const ${name}_servo *servo, doubl
     return all;
 }
 
-int ${name}_start(${name}_state *state, const ${name}_servo *servo, double command, int64_t seed) {
+int ${name}_init(${name}_state *state, const ${name}_servo *servo, double command, int64_t seed) {
     ${name}_state next = {0};
     const $memories all = memories_of(&next);
     const array_double_2 curve = $curve;
