@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from servotwin.export.fmu_variables import FIRST_PARAMETER, FIRST_SIGNAL, Variable
 from servotwin.models.terms.given import field_of
 
-_NAMES = ("servo", "state", "signals", "given", "table", "given_table", "make", "start", "advance", "observe",
+_NAMES = ("servo", "state", "signals", "given", "table", "given_table", "make", "init", "advance", "observe",
           "command")
 _CODES = ("DONE", "DIVERGED", "STEP_TOO_SMALL", "CHATTER", "TOO_FAST", "CROWDED", "NOT_FINITE", "BAD_COMMAND",
           "IN_THE_PAST")

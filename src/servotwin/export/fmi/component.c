@@ -64,7 +64,7 @@ bool component_ready(component *c) {
     if (!(now->angle >= lower && now->angle <= upper))
         return refuse_number(c, model_names[ANGLE], now->angle, "between its stops");
     const double rest = model_command(&now->servo, now->angle);
-    if (model_start(&now->state, &now->servo, rest, 0) != MODEL_DONE)
+    if (model_init(&now->state, &now->servo, rest, 0) != MODEL_DONE)
         return refuse_number(c, model_names[ANGLE], now->angle, "an angle at which the servo can rest");
     now->ahead = now->frames_begin > 0.0 ? period - now->frames_begin : 0.0;
     if (now->ahead > 0.0 && !outcome(c, model_advance(&now->state, &now->servo, now->ahead, rest, 0.0, NULL)))
