@@ -97,12 +97,20 @@ double ${name}_time(const ${name}_state *state);
 
 /* The command under which the servo has no error at an angle [rad]. */
 double ${name}_command(const ${name}_servo *servo, double angle);
-
+$making
 #ifdef __cplusplus
 }
 #endif
 
 #endif
+''')
+
+MADE = Template('''
+/* The parameters of the servo file, SI, words as their places among those allowed; NAN: not given. */
+extern const ${name}_given ${name}_given_table;
+
+/* Make a servo of parameters, with the load of the table. They are not checked. */
+void ${name}_make(${name}_servo *servo, const ${name}_given *given);
 ''')
 
 
