@@ -13,7 +13,7 @@ int main(int count, char **words) {
     NAME_state servo;
     NAME_signals seen = {0};
     double low = NAME_command(&NAME_table, LOW), high = NAME_command(&NAME_table, HIGH), sum = 0.0;
-    if (NAME_start(&servo, &NAME_table, low, 0) != 0)
+    if (NAME_init(&servo, &NAME_table, low, 0) != 0)
         return 1;
     const double begun = now();
     for (int k = 1; k <= calls; k++)

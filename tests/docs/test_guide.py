@@ -11,6 +11,7 @@ from importlib.resources import files
 
 import pytest
 
+import servotwin as st
 from docs.pages import PAGES, ROOT, blocks, promised, with_code
 
 
@@ -36,6 +37,8 @@ def test_programs_in_c(page, tmp_path):
         pytest.skip("no C compiler: cc is not found")
     (tmp_path / "servotwin.h").write_bytes(files("servotwin.simulation").joinpath("servotwin.h").read_bytes())
     programs = [block.code for block in blocks(page, "c") if "#include" in block.code]
+    for name in {name for text in programs for name in re.findall(r'#include "(\w+)\.h"', text)} - {"servotwin"}:
+        st.export.c(st.PulseServo(st.load_servo(name.replace("_", "-")))).write(tmp_path, overwrite=True)
     assert programs
     for text in programs:
         subprocess.run([compiler, "-std=c99", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "-I", tmp_path, "-x",

@@ -37,11 +37,13 @@ class CServo:
         self.names = re.findall(r"double (\w+);", struct)
         events = code.header.split("/* What happens, of an event. */")[1].split("};")[0]
         self.events = {int(number): word for word, number in re.findall(rf"{code.name.upper()}_(\w+) = (\d+)", events)}
-        self._table = ctypes.c_char.in_dll(self._library, f"{code.name}_table")
+        own = ctypes.addressof(ctypes.c_char.in_dll(self._library, f"{code.name}_table"))
+        self._numbers = np.ctypeslib.as_array((ctypes.c_double * (len(code.table) + 2)).from_address(own)).copy()
+        assert self._numbers[:-2].tolist() == list(code.table)
         self.state = np.zeros(self._library.size_of_state(), np.uint8)
         self._code = code
         address, number = ctypes.c_void_p, ctypes.c_double
-        self.start_at = self._function("start", address, address, number, ctypes.c_int64)
+        self.start_at = self._function("init", address, address, number, ctypes.c_int64)
         self.advance_to = self._function("advance", address, address, number, number, number, address)
         self.observe_at = self._function("observe", address, address, number, number, address)
         self.time_of = self._function("time", address, result=number)
@@ -54,7 +56,11 @@ class CServo:
 
     @property
     def table(self):
-        return ctypes.addressof(self._table)
+        return self._numbers.ctypes.data
+
+    def like(self, table):
+        """Take the numbers of another servo, whose code would be the same."""
+        self._numbers[:len(table)] = table
 
     def start(self, command, seed=0):
         return self.start_at(self.state.ctypes.data, self.table, command, seed)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import tempfile
+import textwrap
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -14,7 +15,8 @@ import numpy as np
 
 from servotwin import __version__
 from servotwin.errors import InputError, OutputError, OutputExistsError
-from servotwin.export.c_header import HEADER, events_of, signals_of
+from servotwin.export.c_header import HEADER, MADE, events_of, signals_of
+from servotwin.export.c_making import making
 from servotwin.export.c_source import SOURCE
 from servotwin.export.features import features_of, left_out, recipe_of
 from servotwin.loads import as_load
@@ -30,11 +32,12 @@ from servotwin.models import (
 from servotwin.models.engine.alone import Alone, Happened, Seen
 from servotwin.models.engine.memory import ACCURACY, Inputs, Memories, Memory
 from servotwin.models.outputs import SIGNALS
-from servotwin.models.state.records import record_of
+from servotwin.models.state.records import numbers_in, record_of
 from servotwin.models.terms import wiring
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.control import Firm
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
+from servotwin.models.terms.given import Given
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import table_of
 from servotwin.models.terms.wiring import Wiring
@@ -67,12 +70,16 @@ class CCode:
         The two texts.
     left_out : str
         What the numbers of the servo have no use for, and the code does not follow.
+    table : tuple of float
+        All numbers of the servo in the order in which the struct of its table has them, the table of a potentiometer
+        apart: what another servo with the same things left out may have in its place.
     """
 
     name: str
     header: str
     source: str
     left_out: str
+    table: tuple[float, ...]
 
     def write(self, folder: str | Path, *, overwrite: bool = False) -> tuple[Path, Path]:
         """Write `name.h` and `name.c` into a folder, which is made where there is none; return their paths.
@@ -100,7 +107,8 @@ class CCode:
         return paths
 
 
-def c(model: Model, load: Load | Part | None = None, *, name: str | None = None, accuracy: float = ACCURACY) -> CCode:
+def c(model: Model, load: Load | Part | None = None, *, name: str | None = None, accuracy: float = ACCURACY,
+      parameters: bool = False) -> CCode:
     """Return a servo as C: a header and a source of functions that start it, let it go on, and look at it.
 
     What they compute is what `Simulator` computes, of the same kernels. The numbers of servo and load stand in a table;
@@ -116,6 +124,8 @@ def c(model: Model, load: Load | Part | None = None, *, name: str | None = None,
         Of the files, and the beginning of all names in them; that of the servo unless given.
     accuracy : float
         What angles may be off by where motions are integrated [rad].
+    parameters : bool
+        Whether there is a function too that makes the numbers of the parameters of a servo file.
 
     Returns
     -------
@@ -144,14 +154,19 @@ def c(model: Model, load: Load | Part | None = None, *, name: str | None = None,
     name = re.sub(r"\W", "_", model.servo.name.lower()) if name is None else name
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         raise InputError("export c: name", got=name, allowed="small letters, digits and _, a letter first")
-    return _Writing(model, hung, name, accuracy_of(accuracy)).code()
+    return _Writing(model, hung, name, accuracy_of(accuracy), makes=parameters).code()
+
+
+def table_for(model: Model, load: Load | Part | None = None, accuracy: float = ACCURACY) -> tuple[float, ...]:
+    """Return `CCode.table` of a servo, without its code."""
+    return _Writing(model, as_load(load), "", accuracy_of(accuracy), makes=False).table
 
 
 class _Writing:
     """The numbers of one servo on their way into C."""
 
-    def __init__(self, model: Any, load: Load, name: str, accuracy: float) -> None:
-        self._model, self._load, self._name = model, load, name
+    def __init__(self, model: Any, load: Load, name: str, accuracy: float, *, makes: bool) -> None:
+        self._model, self._load, self._name, self._makes = model, load, name, makes
         self._program: Firmware = model.firmware() or NO_FIRMWARE
         self._chip: Chip = model.chip() or NO_CHIP
         self._curve = table_of(model.curve())
@@ -163,14 +178,20 @@ class _Writing:
 
     def code(self) -> CCode:
         """Return header and source."""
-        flags = features_of(self._numbers, self._chip, self._program, len(self._curve) > 0)
+        flags = features_of_model(self._model, self._load)
         text = Standalone(dict(self._public()))
         names = text.add(recipe_of(flags), _signatures())
+        made = making(text, self._model, self._load, self._alone, name=self._name) if self._makes else ""
         shared = {
             "name": self._name, "guard": self._name.upper(), "version": __version__, "id": self._model.servo.name,
             "title": f"{self._name}: {self._model.servo.name} as a {type(self._model).__name__}."}
         return CCode(self._name, HEADER.substitute(shared | self._of_header(text, flags)),
-                     SOURCE.substitute(shared | names | self._of_source(text)), left_out(flags))
+                     SOURCE.substitute(shared | names | self._of_source(text)) + made, left_out(flags), self.table)
+
+    @property
+    def table(self) -> tuple[float, ...]:
+        """All numbers of the table in its order."""
+        return tuple(map(float, numbers_in((self._alone, *((self._program,) if self._digital else ())))))
 
     def _public(self) -> Iterator[tuple[str, Kind]]:
         """Return the structs of the header, each after those in it."""
@@ -178,6 +199,8 @@ class _Writing:
         roots: list[tuple[str, Kind]] = [("numbers", named(Alone)), ("memory", _MEMORY), ("event", _EVENT)]
         if self._digital:
             roots += [("program", _PROGRAM), ("firm", _FIRM)]
+        if self._makes:
+            roots.append(("given", named(Given)))
         for own, root in roots:
             for inner, kind in (*_within(root), (own, root)):
                 if kind not in seen:
@@ -193,7 +216,8 @@ class _Writing:
             "event": _laid_out(event), "events": events_of(name.upper()),
             "command": "a goal [rad]" if goals else "the width of a pulse [s]",
             "example": f"{self._alone.wiring.at_zero + self._alone.wiring.per_angle:.6g}",
-            "absent": left_out(flags), "signals": signals_of(self._signals()),
+            "absent": textwrap.fill(f"{left_out(flags)}.", 110, initial_indent=" * ", subsequent_indent=" * "),
+            "making": MADE.substitute(name=name) if self._makes else "", "signals": signals_of(self._signals()),
             "more": self._members((f"    {name}_program program;\n", self._digital),
                                   ("    const double *curve; /* of the potentiometer: angle [rad] and error [V] */\n"
                                    "    int64_t curve_rows;\n", len(self._curve) > 0)),
@@ -216,7 +240,10 @@ class _Writing:
         return {
             "kernels": kernels, "table": ",\n".join(table).replace(", (-", ", (-") + "\n",
             "memories": types.of(_MEMORIES), "inputs": types.of(_INPUTS), "seen": types.of(named(Seen)),
-            "rows": types.of(Array(_EVENT, 1)), "firms": "{&state->firm, {1}}" if self._digital else "{NULL, {0}}",
+            "rows": types.of(Array(_EVENT, 1)), "firms": "{&own->firm, {1}}" if self._digital else "{NULL, {0}}",
+            # the memory is written at the end of a call, but what a program remembers changes on the way
+            "keeping": self._members((f"    const {name}_firm before = state->firm;\n", self._digital)),
+            "restoring": self._members(("    if (status != 0)\n        state->firm = before;\n", self._digital)),
             "period": ("servo->program.T_f" if self._digital else
                        "servo->numbers.chip.frame_period" if self._chip.frame_period > 0.0 else "0.0"),
             "curve": ("{(double *)(uintptr_t)servo->curve, {servo->curve_rows, 2}}" if self._curve
@@ -227,12 +254,23 @@ class _Writing:
 
     def _signals(self) -> list[tuple[str, str, str]]:
         """Return names, units and meanings of the signals that the servo has."""
-        names = self._model.signals_with(self._load)
-        return [(name, SIGNALS[name].unit, SIGNALS[name].meaning) for name in names if name not in _COMMANDS]
+        return signals_of_model(self._model, self._load)
 
     @staticmethod
     def _read(signal: str) -> str:
         return f"seen.{signal}" if signal in ("output_angle", "output_speed") else f"seen.shown.{signal}"
+
+
+def signals_of_model(model: Any, load: Load) -> list[tuple[str, str, str]]:
+    """Return names, units and meanings of the signals of a servo in C."""
+    return [(name, SIGNALS[name].unit, SIGNALS[name].meaning) for name in model.signals_with(load)
+            if name not in _COMMANDS]
+
+
+def features_of_model(model: Any, load: Load) -> int:
+    """Return what the code of a servo has to follow: flags of `terms.dependence`."""
+    return features_of(model.pack(load), model.chip() or NO_CHIP, model.firmware() or NO_FIRMWARE,
+                       len(table_of(model.curve())) > 0)
 
 
 def wiring_of(model: Any) -> Wiring:

@@ -14,12 +14,13 @@ HEADER = Template('''/* $title
  *
  *     ${name}_state servo;
  *     ${name}_signals now;
- *     ${name}_start(&servo, &${name}_table, $example, 0);
+ *     ${name}_init(&servo, &${name}_table, $example, 0);
  *     ${name}_advance(&servo, &${name}_table, 0.02, $example, 0.0, NULL);
  *     ${name}_observe(&servo, &${name}_table, $example, 0.0, &now);
  *
- * The command is $command. Several servos are several states; a state may be copied, kept and taken up again.
- * What the table lacks is left out of the code: $absent.
+ * The command is $command. Several servos are several states; a state may be copied,
+ * kept and taken up again. What the servo does not have is left out of the code:
+$absent
  */
 #ifndef ${guard}_H
 #define ${guard}_H
@@ -80,7 +81,7 @@ $signals
 extern const ${name}_servo ${name}_table;
 
 /* Put the servo to rest at t = 0, where it has no error under a command; the seed is that of its noise. */
-int ${name}_start(${name}_state *state, const ${name}_servo *servo, double command, int64_t seed);
+int ${name}_init(${name}_state *state, const ${name}_servo *servo, double command, int64_t seed);
 
 /* Go on to a time since the start [s] under a command from now on, and a torque that is constant meanwhile, beside that
  * of the load; positive pushes towards -q [N m]. `events` may be NULL. */
@@ -96,12 +97,20 @@ double ${name}_time(const ${name}_state *state);
 
 /* The command under which the servo has no error at an angle [rad]. */
 double ${name}_command(const ${name}_servo *servo, double angle);
-
+$making
 #ifdef __cplusplus
 }
 #endif
 
 #endif
+''')
+
+MADE = Template('''
+/* The parameters of the servo file, SI, words as their places among those allowed; NAN: not given. */
+extern const ${name}_given ${name}_given_table;
+
+/* Make a servo of parameters, with the load of the table. They are not checked. */
+void ${name}_make(${name}_servo *servo, const ${name}_given *given);
 ''')
 
 

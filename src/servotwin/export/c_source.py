@@ -15,13 +15,14 @@ const ${name}_servo ${name}_table = {
 $table};
 
 /* The memory of a servo as the kernels take it. */
-static $memories memories_of(${name}_state *state) {
-    $memories all = {{&state->memory, {1}}, $firms};
+static $memories memories_of(const ${name}_state *state) {
+    ${name}_state *own = (${name}_state *)(uintptr_t)state;
+    $memories all = {{&own->memory, {1}}, $firms};
     return all;
 }
 
 /* What a servo is told, with room for its one command. */
-static $inputs inputs_of(${name}_state *state, const ${name}_servo *servo, double command, double torque,
+static $inputs inputs_of(const ${name}_state *state, const ${name}_servo *servo, double command, double torque,
     double *piece) {
     $inputs all = {{piece, {1, 7}}, {NULL, {0, 7}}, torque + servo->numbers.torque, $period, {NULL, {0}}, $curve,
         state->seed, servo->numbers.accuracy, $program};
@@ -31,14 +32,12 @@ static $inputs inputs_of(${name}_state *state, const ${name}_servo *servo, doubl
     return all;
 }
 
-int ${name}_start(${name}_state *state, const ${name}_servo *servo, double command, int64_t seed) {
-    ${name}_state next = {0};
-    const $memories all = memories_of(&next);
+int ${name}_init(${name}_state *state, const ${name}_servo *servo, double command, int64_t seed) {
+    const $memories all = memories_of(state);
     const array_double_2 curve = $curve;
     const int status = (int)$start(&servo->numbers, curve, &all, command);
-    next.seed = seed;
     if (status == 0)
-        *state = next;
+        state->seed = seed;
     return status;
 }
 
@@ -46,25 +45,21 @@ int ${name}_advance(${name}_state *state, const ${name}_servo *servo, double unt
     ${name}_events *events) {
     double piece[7];
     int64_t count = 0;
-    ${name}_state next = *state;
-    const $memories all = memories_of(&next);
-    const $inputs told = inputs_of(&next, servo, command, torque, piece);
+    const $memories all = memories_of(state);
+    const $inputs told = inputs_of(state, servo, command, torque, piece);
     const $rows rows = {events != NULL ? events->rows : NULL, {events != NULL ? events->room : 0}};
     const array_int64_t_1 used = {&count, {1}};
-    const int status = (int)$advance(&servo->numbers, &told, &all, until, command, rows, used);
+$keeping    const int status = (int)$advance(&servo->numbers, &told, &all, until, command, rows, used);
     if (events != NULL)
         events->count = count;
-    if (status == 0)
-        *state = next;
-    return status;
+$restoring    return status;
 }
 
 int ${name}_observe(const ${name}_state *state, const ${name}_servo *servo, double command, double torque,
     ${name}_signals *signals) {
     double piece[7];
-    ${name}_state now = *state;
-    const $memories all = memories_of(&now);
-    const $inputs told = inputs_of(&now, servo, command, torque, piece);
+    const $memories all = memories_of(state);
+    const $inputs told = inputs_of(state, servo, command, torque, piece);
     const int status = (int)$answer(&servo->numbers, command, torque);
     if (status != 0)
         return status;

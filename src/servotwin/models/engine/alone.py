@@ -9,6 +9,7 @@ from servotwin.models.engine import controller
 from servotwin.models.engine.events import kinds
 from servotwin.models.engine.legs.legs import MOST_SHORT
 from servotwin.models.engine.memory import (
+    SAME,
     Inputs,
     Memories,
     Memory,
@@ -110,7 +111,7 @@ def advance(servo: Alone, inputs: Inputs, memories: Memories, until: float, comm
     status = answer(servo, command, inputs.constant_torque)
     if status != READY:
         return status
-    if until < time_of(memory):
+    if until < time_of(memory) - SAME * memory.beat:  # of which the instant of an edge may be off
         return BEFORE
     memory, status = run(servo.numbers, servo.chip, inputs, memory, until, rows, used)
     if status == COMPLETED:

@@ -5,7 +5,8 @@ Starting from the entries, every function that is called is collected from its o
 in these ways only: docstrings and annotations are dropped; what a recipe has no use for is left out, and what plain
 Python alone does (`if PLAIN`); in the float32 form every float literal gets that type; in the vector form exponentials,
 logarithms, sines and floors become those of `engine.elementary`, and the sums of functions that a module names
-`IN_ANY_ORDER` are taken so; those that it names in `CALLED` are not inlined.
+`IN_ANY_ORDER` are taken so; those that it names in `CALLED` are not inlined. A constant that it names in `ONLY_FOR` is
+empty where nothing is left of what needs it.
 """
 
 from __future__ import annotations
@@ -129,6 +130,8 @@ class Derivation:
             self.imports[flat] = (value.__module__, value.__name__)
         elif name == "SINGLE":
             self.constants[flat] = repr(self.recipe.single)
+        elif self.recipe.excluded.issuperset(getattr(import_module(module), "ONLY_FOR", {}).get(name, ("",))):
+            self.constants[flat] = "()"
         else:
             self.constants[flat] = self._constant(module, value)
         return flat

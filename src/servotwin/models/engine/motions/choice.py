@@ -91,11 +91,11 @@ def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vect
     on, behind = dependence(numbers, mode, u, still), source.present(numbers.source)
     if still and not on & ON_HEAT and (not on & ON_I or constant_current(mode.zone)):
         return closed(REST, numbers, mode, u, tau, t0, y, NO_COEFFICIENTS, (0.0, 0.0), step)
-    if on & ~BY_SHARE == TWO_BODIES and behind and not not_constant(tau):
+    if on & TWO_BODIES and on & ~BY_SHARE == TWO_BODIES and behind and not not_constant(tau):
         output_rate, output_pull, motor_rate, motor_pull = apart_coefficients(numbers, mode, u.value, tau.value)
         laws = (output_rate, output_pull, motor_rate, motor_pull, 0.0, 0.0, 0.0, 0.0, 0.0)
         return closed(APART, numbers, mode, u, tau, t0, y, laws, (0.0, 0.0), step)
-    if two_mass_series.linear(numbers, on, u, tau):
+    if elastic.present(numbers.elastic) and two_mass_series.linear(numbers, on, u, tau):
         return _pair(numbers, mode, u, tau, t0, y, step, limit)
     # Without inductance nothing is stiff: explicit steps are as long, and longer where a small winding warms fast
     if (heat.present(numbers.heat) and motor.inductive(numbers.motor) and behind and not on & ~_WITH_HEAT
@@ -137,9 +137,10 @@ def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vect
 
 def dependence(numbers: Numbers, mode: Mode, u: Piece, still: bool) -> int:
     """Return on what the acceleration depends in a mode, as the terms have it; `still` where nothing moves."""
-    alone = mode.mesh == INSIDE or elastic.geared(numbers.elastic)  # it is the motor that moves against the gear
     return (motor.depends(numbers.motor) | heat.depends(numbers.heat) | load.depends(numbers.load)
-            | friction.depends(numbers.friction, mode.motor if alone else mode.contact)
+            # where the two move apart it is the motor that moves against the gear
+            | friction.depends(numbers.friction, mode.motor if mode.mesh == INSIDE or elastic.geared(numbers.elastic)
+                               else mode.contact)
             | play.depends(mode.mesh, still)
             | elastic.depends(numbers.elastic, still) | sensor.depends(numbers.sensor, numbers.source)
             | follower.depends(mode.zone, u))

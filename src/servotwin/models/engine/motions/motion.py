@@ -48,6 +48,8 @@ _ORIGIN = (0.0, 0.0, 0.0)
 NO_STAGES = (_ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN)
 NO_DENSE = (_ORIGIN, _ORIGIN, _ORIGIN)
 NO_LONG_DENSE = (NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE)
+ONLY_FOR = {"NO_STAGES": ("STEP",), "NO_DENSE": ("STEP",), "NO_LONG_DENSE": ("LONG_STEP", "PAIR", "WARMING")}
+"""Kinds of motion that need this room: kernels without them have none, and less to copy."""
 NO_COEFFICIENTS = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
