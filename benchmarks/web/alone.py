@@ -22,7 +22,8 @@ SIX = {
     "six STS3215": ("feetech-sts3215-12v", "DigitalServo", 6, "", "deg", -40.0, 40.0, 1),
     "one STS3215, processor 4 times slower": ("feetech-sts3215-12v", "DigitalServo", 1, "", "deg", -40.0, 40.0, 4)}
 SECONDS = """async (text) => {
-  const [{ Kernel }, { Live }, { read }] = await Promise.all(["kernel", "live", "scene"].map((one) => import(`bench/${one}.js`)));
+  const names = ["kernel", "live", "scene"];
+  const [{ Kernel }, { Live }, { read }] = await Promise.all(names.map((one) => import(`bench/${one}.js`)));
   const { world, module } = globalThis.servotwin;
   const live = new Live(new Kernel(module, world.layout), world, { ...read(world, text), end: 0 });
   const run = (until) => { while (!live.going.reached(until)) live.advance(Math.min(until, live.time + 1 / 60), 180); };
@@ -102,7 +103,8 @@ def main() -> None:
         page.evaluate("bench.ask({run: false})")
         for name, (*servo, slower) in SIX.items():
             session.send("Emulation.setCPUThrottlingRate", {"rate": slower})
-            print(f"  {name}: {page.evaluate(SECONDS, scene(*servo)):.3f} s for a second (bar {1.0 if slower > 1 else SECOND})")
+            lasted = page.evaluate(SECONDS, scene(*servo))
+            print(f"  {name}: {lasted:.3f} s for a second (bar {1.0 if slower > 1 else SECOND})")
             session.send("Emulation.setCPUThrottlingRate", {"rate": 1})
         browser.close()
 

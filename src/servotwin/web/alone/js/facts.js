@@ -25,7 +25,7 @@ export class Servo {
     this.family = family;
     this.reads = new Set(reads);
     /** @type {Map<string, any>} */
-    this.values = new Map(world.parameters.map(([name], /** @type {number} */ n) => [name, known.values[n][world.of_each.indexOf("value")]]));
+    this.values = new Map(world.parameters.map((/** @type {any[]} */ [name], /** @type {number} */ n) => [name, known.values[n][world.of_each.indexOf("value")]]));
     /** @type {Map<string, {value: any, source: string}>} values that are others than the catalog's */
     this.changed = new Map();
     this.load = { ...world.no_load, ...scene.load };

@@ -216,7 +216,7 @@ export class Going {
       const all = kernel.numbers(this.rows, k * rows * width, seen * width);
       const picks = this.picks[k];
       const points = new Float64Array(seen * picks.length);
-      for (let n = 0; n < seen; n += 1) picks.forEach((from, to) => { points[n * picks.length + to] = all[n * width + from]; });
+      for (let n = 0; n < seen; n += 1) picks.forEach((/** @type {number} */ from, /** @type {number} */ to) => { points[n * picks.length + to] = all[n * width + from]; });
       const events_ = kernel.numbers(this.events, k * events * 2, noted * 2);
       for (let n = 0; n < noted; n += 1) {
         const word = world.events[events_[2 * n + 1]];

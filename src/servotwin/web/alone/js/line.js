@@ -6,6 +6,9 @@ import { Room } from "./room.js";
 
 const { world, module } = /** @type {any} */ (globalThis).servotwin;
 
+/** @typedef {{n: number, m: number, columns: string[]}} Part how many rows, of what, and how many pulses */
+/** @typedef {{points: Float64Array, pulses: Float64Array}} Numbers rows, and edges and widths [s], one after the other */
+
 /**
  * @param {{told: (message: any) => void, pushed: (header: any, parts: any[]) => void}} page
  * @returns {{open: boolean, say: (message: any) => void}}

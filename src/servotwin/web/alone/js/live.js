@@ -15,6 +15,7 @@ export class Live {
   constructor(kernel, world, scene) {
     this.world = world;
     this.scene = { ...scene };
+    /** @type {Servo[]} */
     this.servos = scene.servos.map((/** @type {any} */ one) => new Servo(world, one, scene, kernel));
     if (Object.keys(scene.control).length) refuse("only_with_server");
     this.shared = Object.keys(scene.supply).length > 0;
@@ -157,6 +158,7 @@ function set(live, action) {
   const those = live.those(all ? { ...action, servo: null } : action).map((k) => ({ k, own: names.filter((name) => isLoad(name) || live.servos[k].reads.has(name)) }))
     .filter(({ own }) => own.length);
   if (!those.length) wrong(names.join(", "), "no servo here reads it", "what a model here reads");
+  /** @type {{k: number, servo: Servo, taken?: any}[]} */
   const made = [];
   try {
     for (const { k, own } of those) {
@@ -166,7 +168,7 @@ function set(live, action) {
       made.push({ k, servo });
       live.going.make(k, servo);
       const { command, time } = live.told[k];
-      Object.assign(made[made.length - 1], { taken: live.takes(k, command, time, servo) });
+      made[made.length - 1].taken = live.takes(k, command, time, servo);
     }
   } catch (error) {
     for (const { k } of made) live.going.make(k, live.servos[k]); // as before

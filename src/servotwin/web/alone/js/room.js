@@ -18,6 +18,8 @@ export class Room {
     const { kernel, world } = parts;
     this.kernel = kernel;
     this.parts = parts;
+    /** @type {Live|undefined} */
+    this.live = undefined;
     this.world = world;
     this.page = page;
     this.pace = new Pace(world.limits, now());

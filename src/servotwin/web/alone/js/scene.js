@@ -112,7 +112,7 @@ function value(one) {
 function name(key) { return /^[\w-]+$/.test(key) ? key : quoted(key); }
 
 /** @param {string} text @returns {string} */
-function quoted(text) { return JSON.stringify(text.toWellFormed?.() ?? text).replaceAll("\x7f", "\\u007f"); }
+function quoted(text) { return JSON.stringify(/** @type {any} */ (text).toWellFormed?.() ?? text).replaceAll("\x7f", "\\u007f"); }
 
 /** @param {string} text @returns {Promise<string>} the text packed for the part of a link after its # */
 export async function fragment(text) {
