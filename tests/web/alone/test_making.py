@@ -82,4 +82,4 @@ def test_shapes_are_the_signals_of_the_package(command):
     table = np.zeros((2 * shapes.PERIODS + 1, 7))
     count = shapes.shaped([*shapes.FIELDS].index(known["shape"]), given, *samples, table)
     np.testing.assert_allclose(table[:count], signal.pieces.rows, rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(shapes.extremes(table, count), signal.pieces.extremes, rtol=1e-12)
+    np.testing.assert_allclose(shapes.extremes(table, count)[:2], signal.pieces.extremes, rtol=1e-12)

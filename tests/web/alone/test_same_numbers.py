@@ -15,6 +15,7 @@ from servotwin.web.live import LiveBench, read_scene
 from servotwin.web.live.rest_watch import NOT_AT_REST
 
 ANGLE = 1e-9  # rad
+BETWEEN = 1e-8  # s: where a drive ends as the next begins, rounding decides whether the bridge is off in between
 OTHER = 1e-6  # of the peak of a signal: rates that two libraries of functions, under an integrator, leave
 
 
@@ -56,7 +57,10 @@ def compare(folder, seeds):
             assert ours.shape == theirs.shape, seed
             off, at = np.abs(ours - theirs), names.index("output_angle")
             assert off[:, at].max() < ANGLE, seed
-            assert (off / np.maximum(np.abs(theirs).max(axis=0), 1e-3)).max() < OTHER, seed
+            bad = (off / np.maximum(np.abs(theirs).max(axis=0), 1e-3)).max(axis=1) >= OTHER
+            apart = np.diff(theirs[:, 0], prepend=-1.0, append=1e9)
+            assert not bad[np.minimum(apart[:-1], apart[1:]) > BETWEEN].any(), seed
+            assert bad.sum() <= 2, seed
             moved += np.ptp(theirs[:, at]) > 0.01
         for ours, theirs in zip(page["pulses"], server["pulses"], strict=True):
             np.testing.assert_allclose(ours, theirs, atol=1e-12, err_msg=str(seed))

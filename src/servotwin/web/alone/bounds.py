@@ -56,7 +56,7 @@ def _pulses(model: Model, *, accepted: bool) -> list[dict[str, Any]]:
     if accepted:
         return [{"of": "command", "low": ["electronics.pulse_width_min", PULSE_RANGE[0]],
                  "high": ["electronics.pulse_width_max", PULSE_RANGE[1]], "factor": 1e6,
-                 "words": "pulse width, piece 0 of the command (from {start} s on): got '{got} us', allowed: "
+                 "words": "pulse width, piece {piece} of the command (from {start} s on): got '{got} us', allowed: "
                           "{low} to {high} us, the pulses that {name} accepts"}]
     if not isinstance(model, SwitchedServo):
         return []

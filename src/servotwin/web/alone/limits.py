@@ -26,7 +26,7 @@ def limits() -> dict[str, Any]:
     (1e-06, 10.0)
     """
     return {
-        "rows": _ROWS, "events": _EVENTS, "pulses": _PULSES, "train": _TRAIN, "used": USED, "given": _GIVEN,
+        "rows": _ROWS, "events": _EVENTS, "pulses": _PULSES, "train": _TRAIN, "used": USED, "given": _GIVEN, "ends": 4,
         "at_once": _AT_ONCE,
         "piece": len(Piece._fields), "most_pieces": 2 * PERIODS + 1, "never": NEVER,
         "frame_rate": FRAME_RATE, "accuracy": ACCURACY, "rates": RATES,

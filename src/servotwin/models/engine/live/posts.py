@@ -90,16 +90,19 @@ def take(post: Any, unit: int, shape: int, given: Floats, time: Floats, value: F
          ends: Floats) -> int:
     """Put a command from a time on [s] into a table as a servo follows it; return how many pieces there are.
 
-    `ends` gets its lowest and highest value, and the same of what the servo follows (SI).
+    `ends` gets its lowest and highest value, the same of what the servo follows (SI), and of the first two their
+    pieces, and when these start [s].
     """
     follow = post.width if unit == 0 else post.angle if unit == 1 else post.voltage
     count = shapes.shaped(shape, given, time, value, table)
     shapes.scaled(table, count, _SI[unit], 0.0)
-    ends[0], ends[1] = shapes.extremes(table, count)
+    low, high, lowest, highest = shapes.extremes(table, count)
+    ends[0], ends[1], ends[4], ends[5] = low, high, 1.0 * lowest, 1.0 * highest
     shapes.scaled(table, count, follow.gain, follow.offset)
-    ends[2], ends[3] = shapes.extremes(table, count)
+    ends[2], ends[3], _, _ = shapes.extremes(table, count)
     for n in range(count):
         table[n, 0] += start
+    ends[6], ends[7] = table[lowest, 0], table[highest, 0]
     return count
 
 

@@ -101,12 +101,18 @@ def scaled(table: Floats, count: int, gain: float, offset: float) -> None:
         table[n, 3] *= gain
 
 
-def extremes(table: Floats, count: int) -> tuple[float, float]:
-    """Return the lowest and the highest value until the last piece starts; a sinusoid counts with its amplitude."""
-    low, high = math.inf, -math.inf
+def extremes(table: Floats, count: int) -> tuple[float, float, int, int]:
+    """Return the lowest and the highest value until the last piece starts, and in which pieces these are.
+
+    A sinusoid counts with its whole amplitude.
+    """
+    low, high, lowest, highest = math.inf, -math.inf, 0, 0
     for n in range(count):
         row = table[n]
         end = table[min(n + 1, count - 1), 0]
         least, most = piece_range(Piece(row[0], row[1], row[2], row[3], row[4], row[5], row[6]), end)
-        low, high = min(low, least), max(high, most)
-    return low, high
+        if least < low:
+            low, lowest = least, n
+        if most > high:
+            high, highest = most, n
+    return low, high, lowest, highest

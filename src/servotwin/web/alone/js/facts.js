@@ -110,23 +110,23 @@ export class Servo {
   /**
    * Refuse a command that goes beyond bounds.
    * @param {any} command
-   * @param {number[]} ends lowest and highest of the command, and of what the servo follows
-   * @param {number} start [s]
+   * @param {number[][]} ends lowest and highest of the command, and of what the servo follows; their pieces, and when these start [s]
    */
-  bound(command, ends, start) {
+  bound(command, ends) {
     const bounds = this.own.bounds[command.unit] ?? this.untold(this.world.kinds[command.unit]);
     const end = (/** @type {any} */ one, /** @type {number} */ none) => {
       const [name, usual] = Array.isArray(one) ? one : [null, one];
       return (name && this.value(name)) ?? usual ?? none;
     };
     for (const one of bounds) {
-      const [lowest, highest] = one.of === "command" ? ends : ends.slice(2);
+      const [[lowest, highest], followed, pieces, starts] = ends;
+      const [least, most] = one.of === "command" ? [lowest, highest] : followed;
       const [low, high] = [end(one.low, -Infinity), end(one.high, Infinity)];
       const slack = one.slack ?? 0;
-      const below = one.open ? lowest <= low : lowest < low - slack;
-      if (!below && !(one.open ? highest >= high : highest > high + slack)) continue;
-      const [got, from, to] = [below ? lowest : highest, low, high].map((x) => tidy(x * one.factor));
-      throw new Refused(filled(one.words, { got, low: from, high: to, name: this.id, start }));
+      const below = one.open ? least <= low : least < low - slack;
+      if (!below && !(one.open ? most >= high : most > high + slack)) continue;
+      const [got, from, to] = [below ? least : most, low, high].map((x) => tidy(x * one.factor));
+      throw new Refused(filled(one.words, { got, low: from, high: to, name: this.id, piece: pieces[below ? 0 : 1], start: tidy(starts[below ? 0 : 1]) }));
     }
   }
 

@@ -31,7 +31,7 @@ export class Going {
     this.events = kernel.take(n, events, 2);
     this.pulses = kernel.take(n, pulses, 2);
     this.used = kernel.take(n * world.limits.used);
-    this.ends = kernel.take(2, 2);
+    this.ends = kernel.take(world.limits.ends, 2);
     this.given = kernel.take(world.limits.given);
     this.none = { address: this.ends.address, lengths: [0] };
     this.trains = n * train; // rows of the table of commands that trains of pulses have
@@ -108,7 +108,7 @@ export class Going {
       samples[0] ?? this.none, samples[1] ?? this.none, time, table, this.ends);
     kernel.free = free; // the samples are in the table now
     this.pending.push([first, count]);
-    return { first, count, ends: [...kernel.numbers(this.ends)] };
+    return { first, count, ends: Array.from({ length: world.limits.ends }, (_, row) => row).map((row) => [...kernel.numbers(this.ends, 2 * row, 2)]) };
   }
 
   /** @param {number} k @param {{first: number, count: number}} taken */

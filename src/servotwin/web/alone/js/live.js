@@ -75,11 +75,11 @@ export class Live {
   /** @param {number} k @param {any} command @param {number} time @param {Servo} [servo] that is to follow it */
   takes(k, command, time, servo = this.servos[k]) {
     const taken = this.going.taken(k, command, time);
-    servo.bound(command, taken.ends, time);
+    servo.bound(command, taken.ends);
     return { ...taken, command, time };
   }
 
-  /** @param {number} k @param {{first: number, count: number, command: any, time: number, ends: number[]}} taken */
+  /** @param {number} k @param {{first: number, count: number, command: any, time: number, ends: number[][]}} taken */
   follow(k, taken) {
     this.told[k] = taken;
     this.going.follow(k, taken);
@@ -87,7 +87,7 @@ export class Live {
 
   /** Refuse frames that some pulse does not fit into. @param {number} rate [Hz] */
   fits(rate) {
-    if (this.told.some((one, k) => this.going.hears(k) && /** @type {any} */ (one).ends.at(-1) * rate >= 1)) refuse("frame_rate", `${tidy(rate)} Hz`);
+    if (this.told.some((one, k) => this.going.hears(k) && /** @type {any} */ (one).ends[1][1] * rate >= 1)) refuse("frame_rate", `${tidy(rate)} Hz`);
   }
 
   /** Do what the scene says was done by now. */
