@@ -1,4 +1,4 @@
-"""How what a model follows stands for commands, as rows of a bench show them."""
+"""What rows of a bench show of a model, and how what it follows stands for commands."""
 
 from __future__ import annotations
 
@@ -7,10 +7,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from servotwin.models.base import KINDS
-from servotwin.models.engine.live.screen import Lines
+from servotwin.models.engine.live.screen import COLUMNS, Lines
 
 if TYPE_CHECKING:
+    from servotwin.loads import Load
     from servotwin.models import Model
+
+
+def names_of(model: Model, load: Load) -> tuple[str, ...]:
+    """Return the names of all signals that rows show of a model under a load.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> names_of(st.DCMotor(st.load_servo("hitec-hs-755hb")), st.loads.Load())[:2]
+    ('armature_voltage', 'armature_current')
+    """
+    return tuple(name for name in model.signals_with(load) if name in COLUMNS)
 
 
 def lines_of(model: Model) -> Lines:

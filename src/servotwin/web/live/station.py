@@ -18,9 +18,8 @@ from servotwin.models.state.records import object_of
 from servotwin.models.terms import control
 from servotwin.simulation import Simulator
 from servotwin.simulation.engine import Plan, State, failure
-from servotwin.simulation.sight import names_of
 from servotwin.simulation.status import Status
-from servotwin.web.live.lines import lines_of
+from servotwin.web.live.lines import lines_of, names_of
 from servotwin.web.live.told import Taken, Told
 
 if TYPE_CHECKING:
