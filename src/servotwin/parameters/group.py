@@ -29,7 +29,7 @@ class Range(NamedTuple):
     high: float = math.inf
     open: bool = False  # whether `low` is not possible itself
 
-    def holds(self, x: Any) -> Any:
+    def __call__(self, x: Any) -> Any:
         """Tell whether a number, or each number of a column, is there."""
         return (x > self.low if self.open else x >= self.low) & (x <= self.high)
 
@@ -138,7 +138,7 @@ class Group:
                 unit = si_unit(metadata["dimension"])
                 raise ParameterError(what, got=value, allowed=f"a list of finite numbers [{unit}]")
             return tuple(float(x) for x in value)
-        if not is_finite(value) or not RULES[rule].holds(float(value)):  # the float is kept, so it is what counts
+        if not is_finite(value) or not RULES[rule](float(value)):  # the float is kept, so it is what counts
             raise ParameterError(what, got=value, allowed=f"{rule} [{si_unit(metadata['dimension'])}]")
         return float(value)
 
@@ -167,4 +167,4 @@ def check_column(what: str, column: NDArray[np.float64], rule: str, unit: str) -
     --------
     >>> check_column("gear.gear_reduction", np.array([2.0, 1.0]), AT_LEAST_ONE, "1")
     """
-    Relation(what, np.isfinite(column) & RULES[rule].holds(column), column, f"{rule} [{unit}]").check()
+    Relation(what, np.isfinite(column) & RULES[rule](column), column, f"{rule} [{unit}]").check()

@@ -32,9 +32,6 @@ from servotwin.simulation.compile.kinds import Kind, Scalar, Tuple
 from servotwin.simulation.compile.signatures import signatures
 from servotwin.simulation.compile.translate import Translation
 
-BENCH = Recipe("bench", tuple(f"servotwin.models.engine.live.bench:{name}" for name in (
-    "make", "begin", "change", "take", "count", "draw", "look",
-    "tune", "snapped", "next_edge", "advance", "advance_together")))
 _INCLUDE = Path(__file__).parent / "include"
 _FLAGS = ("-std=c99", "-Os", "-w", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv",
           "-fno-strict-aliasing", "-mbulk-memory", "-mnontrapping-fptoint", "-nostdlib", f"-I{_INCLUDE}",
@@ -45,6 +42,14 @@ _NO_FMA = "\ndouble fma(double a, double b, double c) { return a * b + c; }\n"
 _WORDS = 128  # of the longest call
 _PAGE = 65536  # bytes of memory that WebAssembly adds at once
 _LONGEST = 600.0  # s that a compiler may take
+
+
+@cache
+def recipe() -> Recipe:
+    """Return what the kernel is made of; it is none of those that wheels have libraries of."""
+    return Recipe("bench", tuple(f"servotwin.models.engine.live.bench:{name}" for name in (
+        "make", "begin", "change", "take", "count", "draw", "look",
+        "tune", "snapped", "next_edge", "advance", "advance_together")))
 
 
 class NoCompilerError(InputError):
@@ -74,7 +79,7 @@ def module() -> bytes:
 
 @cache
 def _printed() -> Translation:
-    return printed(BENCH)
+    return printed(recipe())
 
 
 def _compiled(compiler: Compiler, source: Path, made: Path) -> str:
@@ -99,7 +104,7 @@ def layout() -> dict[str, Any]:
              "sender": Sender, "memory": Memory, "firm": Firm, "program": Firmware,
              "given": Given, "weights": Weights}
     records = {name: {"size": record_of(kind).itemsize, "at": _places(record_of(kind))} for name, kind in kinds.items()}
-    known = dict(signatures(BENCH))
+    known = dict(signatures(recipe()))
     entries = {one.name: {"kinds": [_told(kind) for kind in known[one.name]], "result": one.result}
                for one in _printed().entries}
     tiles = {"size": rows_of(Chip, np.float64).itemsize, "at": {}}
