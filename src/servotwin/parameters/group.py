@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,7 +113,7 @@ class Group:
     """Base of all groups: checks every field once, and the relations between fields."""
 
     title: ClassVar[str]
-    less: ClassVar[tuple[tuple[str, str], ...]] = ()
+    less = cast("tuple[tuple[str, str], ...]", ())  # no field, and no annotation that would make it one
     """Fields of which the first has to be less than the second."""
 
     def __post_init__(self) -> None:
