@@ -54,6 +54,16 @@ class CServo:
         function.argtypes, function.restype = arguments, result
         return function
 
+    def make(self, given, hung):
+        """Make the table of parameters and a load; return what the function says."""
+        given, hung = (np.array(each, np.float64) for each in (given, hung))
+        address = ctypes.c_void_p
+        return self._function("make", address, address, address)(self.table, given.ctypes.data, hung.ctypes.data)
+
+    @property
+    def numbers(self):
+        return self._numbers[:len(self._code.table)].tolist()
+
     @property
     def table(self):
         return self._numbers.ctypes.data

@@ -10,11 +10,14 @@ import pytest
 
 import servotwin as st
 from export.c_servo import STRICT, CServo, Events
-from export.structures import STRUCTURES, commands, model_of
+from export.structures import HEAT, STRUCTURES, commands, model_of
 from servotwin import export
 from servotwin.errors import InputError, OutputError, OutputExistsError
 from servotwin.export.c_code import table_for
+from servotwin.loads import as_load
 from servotwin.models.engine.events.kinds import NAMES
+from servotwin.models.terms.given import given_of
+from servotwin.models.terms.hung import hung_of
 
 COMPILERS = [compiler for compiler in ("gcc", "clang") if shutil.which(compiler)]
 pytestmark = pytest.mark.skipif(not COMPILERS, reason="needs gcc or clang")
@@ -185,6 +188,37 @@ def test_what_a_servo_lacks_is_not_in_its_code():
         body = shorter
     lines = [line for line in body.splitlines() if re.match(r"(static )?(?!const|inline|typedef)\w.*(=|\w;)", line)]
     assert not [line for line in lines if "(" not in line and "const" not in line and "typedef" not in line]
+
+
+INDUCTANCE = ({"motor.armature_inductance": 1e-3}, None)
+LACKS = {  # what asks for what the code of a structure leaves out
+    "plain": (INDUCTANCE, ({}, st.loads.Spring(0.3, 1.0)), ({}, st.loads.Pendulum(mass=0.1, length=0.1)), (HEAT, None),
+              ({"gear.backlash": 0.02, "gear.output_inertia": 1e-4}, None)),
+    "bounded": (INDUCTANCE,), "on a bus": (INDUCTANCE, (HEAT, None))}
+
+
+@pytest.mark.parametrize("name", FEW)
+def test_c_makes_the_numbers_that_python_makes(name, tmp_path):
+    load = st.loads.Inertia(2e-3) + st.loads.Coulomb(0.02)
+    c = CServo(export.c(model_of(name, 0), load, name="servo", parameters=True), tmp_path, COMPILERS[0], ("-O1",))
+    for draw in range(5):
+        model, other = model_of(name, draw), as_load(st.loads.Inertia(1e-3 * draw) + st.loads.Viscous(1e-4))
+        assert c.make(model.given, hung_of(other)) == 0
+        assert c.numbers == list(table_for(model, other))
+    before, own = c.numbers, STRUCTURES[name]
+    for changes, hung in LACKS[name]:
+        given = given_of(st.load_servo(own.servo).replace(own.changes | changes),
+                         (*own.kind.requires, *own.kind.optional, *changes))
+        assert c.make(given, hung_of(as_load(hung))) == -4
+        assert c.numbers == before
+
+
+def test_all_names_of_the_header_begin_with_that_of_the_servo():
+    for name in ("on a bus", "everything"):
+        header = export.c(model_of(name, 0), name="servo", parameters=True).header
+        types = re.findall(r"^\} (\w+);", header, re.MULTILINE)
+        assert len(types) == len(set(types)) > 20
+        assert all(each.startswith("servo_") for each in types)
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)

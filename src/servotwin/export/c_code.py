@@ -15,6 +15,7 @@ import numpy as np
 
 from servotwin import __version__
 from servotwin.errors import InputError, OutputError, OutputExistsError
+from servotwin.export import c_parameters
 from servotwin.export.c_header import HEADER, events_of, signals_of
 from servotwin.export.c_source import SOURCE
 from servotwin.export.features import features_of, left_out, recipe_of
@@ -29,16 +30,21 @@ from servotwin.models import (
     PulseServoInductive,
 )
 from servotwin.models.engine.alone import Alone, Happened, Seen
-from servotwin.models.engine.memory import ACCURACY, Inputs, Memories, Memory
+from servotwin.models.engine.memory import ACCURACY, Inputs, Memories, Memory, Point
 from servotwin.models.outputs import SIGNALS
+from servotwin.models.state.modes import Mode, Vector
 from servotwin.models.state.records import numbers_in, record_of
 from servotwin.models.terms import wiring
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.control import Firm
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
+from servotwin.models.terms.frame import Decision, Frame
+from servotwin.models.terms.given import Given
+from servotwin.models.terms.hung import Hung
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import table_of
 from servotwin.models.terms.wiring import Wiring
+from servotwin.physics.pieces import Piece
 from servotwin.simulation.compile.kinds import FLOAT64, INT64, Array, Kind, Record, Tuple
 from servotwin.simulation.compile.signatures import named
 from servotwin.simulation.compile.standalone import Standalone
@@ -48,12 +54,19 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from servotwin.loads import Load, Part
+    from servotwin.simulation.compile import Recipe
 
+_KINDS: dict[type[Model], str] = {
+    AveragedServo: "averaged", AveragedServoInductive: "averaged", BoundedServo: "bounded", PulseServo: "pulsed",
+    PulseServoInductive: "pulsed", DigitalServo: "digital"}
 _COMMANDS = ("command_voltage", "command_angle", "pulse_width")  # are what the caller says
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
-_KNOWN = (AveragedServo, AveragedServoInductive, BoundedServo, PulseServo, PulseServoInductive, DigitalServo)
+_KNOWN = tuple(_KINDS)
 _TABLE = Array(FLOAT64, 2)
 _PROGRAM, _FIRM, _MEMORY, _EVENT = (Record(record_of(kind)) for kind in (Firmware, Firm, Memory, Happened))
+_RECORDS: dict[Kind, str] = {Record(record_of(kind)): kind.__name__ for kind in (
+    Firmware, Firm, Memory, Happened, Point, Vector, Mode, Frame, Decision, Piece)}
+_OWN_NAMES = {"Numbers": "plant", "Alone": "numbers", "Firmware": "program", "Happened": "event", "Given": "parameters"}
 
 
 @dataclass(frozen=True)
@@ -105,7 +118,8 @@ class CCode:
         return paths
 
 
-def c(model: Model, load: Load | Part | None = None, *, name: str | None = None, accuracy: float = ACCURACY) -> CCode:
+def c(model: Model, load: Load | Part | None = None, *, name: str | None = None, parameters: bool = False,
+      accuracy: float = ACCURACY) -> CCode:
     """Return a servo as C: a header and a source of functions that start it, let it go on, and look at it.
 
     What they compute is what `Simulator` computes, of the same kernels. The numbers of servo and load stand in a table;
@@ -119,6 +133,8 @@ def c(model: Model, load: Load | Part | None = None, *, name: str | None = None,
         What hangs on the shaft; nothing unless given. A recorded torque is told at each call instead.
     name : str, optional
         Of the files, and the beginning of all names in them; that of the servo unless given.
+    parameters : bool
+        Whether a function is there too that makes a table of other parameters.
     accuracy : float
         What angles may be off by where motions are integrated [rad].
 
@@ -149,7 +165,7 @@ def c(model: Model, load: Load | Part | None = None, *, name: str | None = None,
     name = re.sub(r"\W", "_", model.servo.name.lower()) if name is None else name
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         raise InputError("export c: name", got=name, allowed="small letters, digits and _, a letter first")
-    return _Writing(model, hung, name, accuracy_of(accuracy)).code()
+    return _Writing(model, hung, name, accuracy_of(accuracy), bool(parameters)).code()
 
 
 def table_for(model: Model, load: Load | Part | None = None, accuracy: float = ACCURACY) -> tuple[float, ...]:
@@ -160,8 +176,8 @@ def table_for(model: Model, load: Load | Part | None = None, accuracy: float = A
 class _Writing:
     """The numbers of one servo on their way into C."""
 
-    def __init__(self, model: Any, load: Load, name: str, accuracy: float) -> None:
-        self._model, self._load, self._name = model, load, name
+    def __init__(self, model: Any, load: Load, name: str, accuracy: float, parameters: bool = False) -> None:
+        self._model, self._load, self._name, self._parameters = model, load, name, parameters
         self._program: Firmware = model.firmware() or NO_FIRMWARE
         self._chip: Chip = model.chip() or NO_CHIP
         self._curve = table_of(model.curve())
@@ -174,37 +190,61 @@ class _Writing:
     def code(self) -> CCode:
         """Return header and source."""
         flags = features_of(self._numbers, self._chip, self._program, len(self._curve) > 0)
-        text = Standalone(dict(self._public()))
-        names = text.add(recipe_of(flags), _signatures())
+        text, recipe = Standalone(dict(self._public())), recipe_of(flags)
+        names = text.add(recipe, _signatures())
+        head, source = self._making(text, recipe) if self._parameters else ("", "")
         shared = {
             "name": self._name, "guard": self._name.upper(), "version": __version__, "id": self._model.servo.name,
             "title": f"{self._name}: {self._model.servo.name} as a {type(self._model).__name__}."}
-        return CCode(self._name, HEADER.substitute(shared | self._of_header(text, flags)),
-                     SOURCE.substitute(shared | names | self._of_source(text)), left_out(flags), self.table)
+        return CCode(self._name, HEADER.substitute(shared | self._of_header(text, flags), making=head),
+                     SOURCE.substitute(shared | names | self._of_source(text), making=source), left_out(flags),
+                     self.table)
+
+    def _making(self, text: Standalone, recipe: Recipe) -> tuple[str, str]:
+        """Return what header and source have of making a table."""
+        pulses, program, name = self._chip.frame_period > 0.0, self._digital, self._name
+        kind = _KINDS[type(self._model)]
+        names = c_parameters.printed(text, kind, pulses=pulses, program=program)
+        structs = {each.split()[-1].rstrip(";"): _laid_out(each) for each in text.public}
+        logic = f"    next.numbers.chip = {names['logic']}(given, NAN);\n" if pulses else ""
+        made = "&(const Firmware){0}"
+        if program:
+            made = "&made"
+            logic = (f"    const Firmware made = {names['logic']}(given, NAN);\n"
+                     "    memcpy(&next.program, &made, sizeof made);\n")
+        standing = float(getattr(self._model, "standing_error", 0.0))
+        shared = {
+            "name": name, "guard": name.upper(), "parameters": structs[f"{name}_parameters"],
+            "hung": structs[f"{name}_hung"], "given": text.types.initial(named(Given), self._model.given),
+            "load": text.types.initial(named(Hung), Hung(*map(float, self._model.hung(self._load)))),
+            "error": f", {text.types.initial(FLOAT64, standing)}" if pulses or program else "",
+            "period": ", NAN" if pulses or program else "", "logic": logic, "program": made,
+            "flags": str(recipe.knows), "absent": c_parameters.is_absent(recipe, pulses=pulses, program=program)}
+        words = names | shared
+        return c_parameters.HEADER.substitute(words), c_parameters.SOURCE.substitute(words)
 
     @property
     def table(self) -> tuple[float, ...]:
         """All numbers of the table in its order."""
         return tuple(map(float, numbers_in((self._alone, *((self._program,) if self._digital else ())))))
 
-    def _public(self) -> Iterator[tuple[str, Kind]]:
-        """Return the structs of the header, each after those in it."""
-        name, seen = self._name, set[Kind]()
-        roots: list[tuple[str, Kind]] = [("numbers", named(Alone)), ("memory", _MEMORY), ("event", _EVENT)]
+    def _public(self) -> dict[str, Kind]:
+        """Return the structs of the header by their names, each after those in it."""
+        roots: list[Kind] = [named(Alone), _MEMORY, _EVENT]
         if self._digital:
-            roots += [("program", _PROGRAM), ("firm", _FIRM)]
-        for own, root in roots:
-            for inner, kind in (*_within(root), (own, root)):
-                if kind not in seen:
-                    seen.add(kind)
-                    yield f"{name}_{inner}", kind
+            roots += [_PROGRAM, _FIRM]
+        if self._parameters:
+            roots += [named(Given), named(Hung)]
+        structs = dict.fromkeys(kind for root in roots for kind in (*_within(root), root))
+        return {f"{self._name}_{_name_of(kind)}": kind for kind in structs}
 
     def _of_header(self, text: Standalone, flags: int) -> dict[str, str]:
         name, structs = self._name, text.public
-        event = next(each for each in structs if each.endswith(f" {name}_event;"))
+        apart = tuple(f" {name}_{word};" for word in ("event", "parameters", "hung"))
+        event = next(each for each in structs if each.endswith(apart[0]))
         goals = self._alone.wiring.per_angle == 1.0
         return {
-            "structs": "\n".join(map(_laid_out, (each for each in structs if each is not event))),
+            "structs": "\n".join(map(_laid_out, (each for each in structs if not each.endswith(apart)))),
             "event": _laid_out(event), "events": events_of(name.upper()),
             "command": "a goal [rad]" if goals else "the width of a pulse [s]",
             "example": f"{self._alone.wiring.at_zero + self._alone.wiring.per_angle:.6g}",
@@ -281,19 +321,22 @@ def _signatures() -> dict[str, tuple[Kind, ...]]:
             "answer": (alone, FLOAT64, FLOAT64), "observe": (alone, _INPUTS, _MEMORIES)}
 
 
-def _within(kind: Kind) -> Iterator[tuple[str, Kind]]:
-    """Return the structs within a struct, each after those in it, with the names of their places."""
+def _within(kind: Kind) -> Iterator[Kind]:
+    """Return the structs within a struct, each after those in it."""
+    inner: list[Kind] = []
     if isinstance(kind, Tuple):
-        for place, inner in zip(kind.fields, kind.elements, strict=True):
-            if isinstance(inner, Tuple):
-                yield from _within(inner)
-                yield place, inner
+        inner = [each for each in kind.elements if isinstance(each, Tuple)]
     elif isinstance(kind, Record):
-        for place in kind.dtype.names or ():
-            inner_type = kind.dtype[place]
-            if inner_type.names:
-                yield from _within(Record(inner_type))
-                yield place, Record(inner_type)
+        inner = [Record(kind.dtype[place]) for place in kind.dtype.names or () if kind.dtype[place].names]
+    for each in inner:
+        yield from _within(each)
+        yield each
+
+
+def _name_of(kind: Kind) -> str:
+    """Return what a struct is called, behind the name of the servo."""
+    name = kind.name if isinstance(kind, Tuple) else _RECORDS[kind]
+    return _OWN_NAMES.get(name, name.lower())
 
 
 def _laid_out(struct: str) -> str:

@@ -41,7 +41,8 @@ enum {
     ${guard}_CROWDED = 5,        /* pulses that come before two others are decided upon */
     ${guard}_NOT_FINITE = -1,    /* a time or a torque is no number */
     ${guard}_BAD_COMMAND = -2,   /* a command that the servo does not take, or no number */
-    ${guard}_IN_THE_PAST = -3    /* the servo is further already */
+    ${guard}_IN_THE_PAST = -3,   /* the servo is further already */
+    ${guard}_OTHER_CODE = -4     /* parameters that ask for what was left out of this code */
 };
 
 /* What happens, of an event. */
@@ -80,7 +81,7 @@ $signals
 /* The numbers of $id. */
 extern const ${name}_servo ${name}_table;
 
-/* Put the servo to rest at t = 0, where it has no error under a command; the seed is that of its noise. */
+$making/* Put the servo to rest at t = 0, where it has no error under a command; the seed is that of its noise. */
 int ${name}_init(${name}_state *state, const ${name}_servo *servo, double command, int64_t seed);
 
 /* Go on to a time since the start [s] under a command from now on, and a torque that is constant meanwhile, beside that
