@@ -27,7 +27,8 @@ def test_name_model_and_parameters(tmp_path):
 
 @pytest.mark.parametrize(("words", "said"), [
     (["--model", "dc-motor", "--set", "motor.armature_inductance=1e-3"], "DCMotor"), (["--name", "9"], "name"),
-    (["--model", "pulsed"], "pulsed"), (["--load", "recorded=none.csv"], "none.csv"), (["--accuracy", "2"], "accuracy")])
+    (["--model", "pulsed"], "pulsed"), (["--load", "recorded=none.csv"], "none.csv"),
+    (["--accuracy", "2"], "accuracy")])
 def test_what_is_not_possible_is_said_in_a_line_and_nothing_is_written(words, said, tmp_path, capsys):
     assert main(["export", "c", SERVO, "--out", str(tmp_path / "new"), *words]) == 2
     lines = capsys.readouterr().err.strip().splitlines()
