@@ -54,11 +54,10 @@ class CServo:
         function.argtypes, function.restype = arguments, result
         return function
 
-    def make(self, given, hung):
-        """Make the table of parameters and a load; return what the function says."""
-        given, hung = (np.array(each, np.float64) for each in (given, hung))
-        address = ctypes.c_void_p
-        return self._function("make", address, address, address)(self.table, given.ctypes.data, hung.ctypes.data)
+    def make(self, given):
+        """Make the table of parameters; return what the function says."""
+        given = np.array(given, np.float64)
+        return self._function("make", ctypes.c_void_p, ctypes.c_void_p)(self.table, given.ctypes.data)
 
     @property
     def numbers(self):

@@ -10,14 +10,12 @@ import pytest
 
 import servotwin as st
 from export.c_servo import STRICT, CServo, Events
-from export.structures import HEAT, STRUCTURES, commands, model_of
+from export.structures import HEAT, INDUCTANCE, STRUCTURES, commands, model_of
 from servotwin import export
 from servotwin.errors import InputError, OutputError, OutputExistsError
 from servotwin.export.c_code import table_for
-from servotwin.loads import as_load
 from servotwin.models.engine.events.kinds import NAMES
 from servotwin.models.terms.given import given_of
-from servotwin.models.terms.hung import hung_of
 
 COMPILERS = [compiler for compiler in ("gcc", "clang") if shutil.which(compiler)]
 pytestmark = pytest.mark.skipif(not COMPILERS, reason="needs gcc or clang")
@@ -190,26 +188,24 @@ def test_what_a_servo_lacks_is_not_in_its_code():
     assert not [line for line in lines if "(" not in line and "const" not in line and "typedef" not in line]
 
 
-INDUCTANCE = ({"motor.armature_inductance": 1e-3}, None)
 LACKS = {  # what asks for what the code of a structure leaves out
-    "plain": (INDUCTANCE, ({}, st.loads.Spring(0.3, 1.0)), ({}, st.loads.Pendulum(mass=0.1, length=0.1)), (HEAT, None),
-              ({"gear.backlash": 0.02, "gear.output_inertia": 1e-4}, None)),
-    "bounded": (INDUCTANCE,), "on a bus": (INDUCTANCE, (HEAT, None))}
+    "plain": (INDUCTANCE, HEAT, {"gear.backlash": 0.02, "gear.output_inertia": 1e-4},
+              {"electronics.off_state": "coast"}, {"friction.load_friction": 0.1}),
+    "bounded": (INDUCTANCE,), "on a bus": (INDUCTANCE, HEAT)}
 
 
 @pytest.mark.parametrize("name", FEW)
 def test_c_makes_the_numbers_that_python_makes(name, tmp_path):
-    load = st.loads.Inertia(2e-3) + st.loads.Coulomb(0.02)
+    load = st.loads.Inertia(2e-3) + st.loads.Coulomb(0.02) + st.loads.Constant(0.01)
     c = CServo(export.c(model_of(name, 0), load, name="servo", parameters=True), tmp_path, COMPILERS[0], ("-O1",))
     for draw in range(5):
-        model, other = model_of(name, draw), as_load(st.loads.Inertia(1e-3 * draw) + st.loads.Viscous(1e-4))
-        assert c.make(model.given, hung_of(other)) == 0
-        assert c.numbers == list(table_for(model, other))
+        assert c.make(model_of(name, draw).given) == 0
+        assert c.numbers == list(table_for(model_of(name, draw), load))
     before, own = c.numbers, STRUCTURES[name]
-    for changes, hung in LACKS[name]:
+    for changes in LACKS[name]:
         given = given_of(st.load_servo(own.servo).replace(own.changes | changes),
                          (*own.kind.requires, *own.kind.optional, *changes))
-        assert c.make(given, hung_of(as_load(hung))) == -4
+        assert c.make(given) == -4
         assert c.numbers == before
 
 

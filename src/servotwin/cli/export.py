@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from servotwin.export import CCode
 
 _ACCURACY = 1e-9
+_MODELS = ("digital, pulse, pulse-inductive, bounded, averaged or averaged-inductive (default: by the kind of the "
+           "servo).")
+_LOADS = "Load, such as inertia=1e-3 or pendulum=0.1:0.12; repeatable, or with commas."
 
 export = typer.Typer(
     help="Write a servo as a program that needs no Python.",
@@ -35,11 +38,9 @@ def c(
         metavar="NAME", help="Of the files, and the beginning of all names in them (default: the servo's).",
         rich_help_panel=shared.OUTPUT)] = None,
     model: Annotated[str | None, typer.Option(
-        metavar="MODEL", help="digital, pulse, pulse-inductive, bounded, averaged or averaged-inductive (default: by "
-        "the kind of the servo).", rich_help_panel=shared.PLANT)] = None,
+        metavar="MODEL", help=_MODELS, rich_help_panel=shared.PLANT)] = None,
     load: Annotated[list[str] | None, typer.Option(
-        metavar="PART=VALUE", help="Load, such as inertia=1e-3 or pendulum=0.1:0.12; repeatable, or with commas.",
-        rich_help_panel=shared.PLANT)] = None,
+        metavar="PART=VALUE", help=_LOADS, rich_help_panel=shared.PLANT)] = None,
     change: Annotated[list[str] | None, typer.Option(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter; repeatable.",
         rich_help_panel=shared.PLANT)] = None,
@@ -67,7 +68,7 @@ def c(
     if as_json:
         emit_json(facts)
         return
-    show(pairs([("model", facts["model"]), ("left out", facts["left_out"]),
+    show(pairs([("model", type(chosen).__name__), ("left out", facts["left_out"]),
                 *(("written", path) for path in facts["files"])]))
 
 
@@ -78,3 +79,55 @@ def _facts(code: CCode) -> dict[str, Any]:
 export.command("c", help="Write a servo as C99: a header and a source, without allocation or globals.",
                epilog="Example: servotwin export c hitec-hs-755hb --out firmware\n\n"
                       "Example: servotwin export c feetech-sts3215-12v --load inertia=1e-3 --out arm --name elbow")(c)
+
+
+def fmu(
+    servo: shared.ServoArgument,
+    out: Annotated[Path, typer.Option(metavar="FILE.fmu", help="The archive.", rich_help_panel=shared.OUTPUT)],
+    fmi: Annotated[str, typer.Option(metavar="VERSION", help="2.0 or 3.0.", rich_help_panel=shared.OUTPUT)] = "2.0",
+    sources: Annotated[bool, typer.Option(
+        "--sources", help="Leave the library out: a tool compiles the sources.",
+        rich_help_panel=shared.OUTPUT)] = False,
+    name: Annotated[str | None, typer.Option(
+        metavar="NAME", help="The model identifier (default: the servo's name).",
+        rich_help_panel=shared.OUTPUT)] = None,
+    model: Annotated[str | None, typer.Option(
+        metavar="MODEL", help=_MODELS, rich_help_panel=shared.PLANT)] = None,
+    load: Annotated[list[str] | None, typer.Option(
+        metavar="PART=VALUE", help=_LOADS, rich_help_panel=shared.PLANT)] = None,
+    change: Annotated[list[str] | None, typer.Option(
+        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter; repeatable.",
+        rich_help_panel=shared.PLANT)] = None,
+    register: shared.RegisterOption = None,
+    supply: shared.SupplyOption = None,
+    accuracy: shared.AccuracyOption = _ACCURACY,
+    force: Annotated[bool, typer.Option(
+        "--force", help="Replace an existing file.", rich_help_panel=shared.OUTPUT)] = False,
+    as_json: shared.JsonOption = False,
+) -> None:
+    """Write a servo as an FMU for co-simulation."""
+    from servotwin.cli.load_words import load_from
+    from servotwin.cli.model_words import model_of
+    from servotwin.export import fmu as exported
+
+    chosen = model_of(servo, model, change or [], None, register or [], supply)
+    hangs = load_from(load or [], chosen)
+    with patience(f"compiling {chosen.servo.name}"):
+        made = exported(chosen, hangs, fmi=fmi, name=name, accuracy=accuracy, sources=sources)
+        path = made.write(out, overwrite=force)
+    of = {kind: [each.name for each in made.variables if each.causality == kind]
+          for kind in ("input", "output", "parameter")}
+    facts = {"name": made.name, "fmi": made.version, "model": type(chosen).__name__, "inputs": of["input"],
+             "outputs": of["output"], "parameters": of["parameter"], "file": str(path)}
+    if as_json:
+        emit_json(facts)
+        return
+    show(pairs([("model", type(chosen).__name__), ("FMI", made.version), ("inputs", ", ".join(of["input"])),
+                ("outputs", ", ".join(of["output"])), ("parameters", f"{len(of['parameter'])} of the servo file"),
+                ("written", str(path))]))
+
+
+export.command("fmu", help="Write a servo as an FMU for co-simulation, FMI 2.0 or 3.0, with library and sources.",
+               epilog="Example: servotwin export fmu hitec-hs-755hb --out hs755hb.fmu\n\n"
+                      "Example: servotwin export fmu hitec-hs-755hb --load pendulum=0.1:0.12 --fmi 3.0 "
+                      "--out pendulum.fmu")(fmu)

@@ -15,8 +15,8 @@ import numpy as np
 
 from servotwin import __version__
 from servotwin.errors import InputError, OutputError, OutputExistsError
-from servotwin.export import c_parameters
-from servotwin.export.c_header import HEADER, events_of, signals_of
+from servotwin.export.c_header import HEADER, MADE, events_of, signals_of
+from servotwin.export.c_making import making
 from servotwin.export.c_source import SOURCE
 from servotwin.export.features import features_of, left_out, recipe_of
 from servotwin.loads import as_load
@@ -40,7 +40,6 @@ from servotwin.models.terms.control import Firm
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.frame import Decision, Frame
 from servotwin.models.terms.given import Given
-from servotwin.models.terms.hung import Hung
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import table_of
 from servotwin.models.terms.wiring import Wiring
@@ -54,19 +53,15 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from servotwin.loads import Load, Part
-    from servotwin.simulation.compile import Recipe
 
-_KINDS: dict[type[Model], str] = {
-    AveragedServo: "averaged", AveragedServoInductive: "averaged", BoundedServo: "bounded", PulseServo: "pulsed",
-    PulseServoInductive: "pulsed", DigitalServo: "digital"}
 _COMMANDS = ("command_voltage", "command_angle", "pulse_width")  # are what the caller says
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
-_KNOWN = tuple(_KINDS)
+_KNOWN = (AveragedServo, AveragedServoInductive, BoundedServo, PulseServo, PulseServoInductive, DigitalServo)
 _TABLE = Array(FLOAT64, 2)
 _PROGRAM, _FIRM, _MEMORY, _EVENT = (Record(record_of(kind)) for kind in (Firmware, Firm, Memory, Happened))
 _RECORDS: dict[Kind, str] = {Record(record_of(kind)): kind.__name__ for kind in (
     Firmware, Firm, Memory, Happened, Point, Vector, Mode, Frame, Decision, Piece)}
-_OWN_NAMES = {"Numbers": "plant", "Alone": "numbers", "Firmware": "program", "Happened": "event", "Given": "parameters"}
+_OWN_NAMES = {"Numbers": "plant", "Alone": "numbers", "Firmware": "program", "Happened": "event"}
 
 
 @dataclass(frozen=True)
@@ -118,8 +113,8 @@ class CCode:
         return paths
 
 
-def c(model: Model, load: Load | Part | None = None, *, name: str | None = None, parameters: bool = False,
-      accuracy: float = ACCURACY) -> CCode:
+def c(model: Model, load: Load | Part | None = None, *, name: str | None = None, accuracy: float = ACCURACY,
+      parameters: bool = False) -> CCode:
     """Return a servo as C: a header and a source of functions that start it, let it go on, and look at it.
 
     What they compute is what `Simulator` computes, of the same kernels. The numbers of servo and load stand in a table;
@@ -133,10 +128,10 @@ def c(model: Model, load: Load | Part | None = None, *, name: str | None = None,
         What hangs on the shaft; nothing unless given. A recorded torque is told at each call instead.
     name : str, optional
         Of the files, and the beginning of all names in them; that of the servo unless given.
-    parameters : bool
-        Whether a function is there too that makes a table of other parameters.
     accuracy : float
         What angles may be off by where motions are integrated [rad].
+    parameters : bool
+        Whether there is a function too that makes the numbers of the parameters of a servo file.
 
     Returns
     -------
@@ -165,19 +160,19 @@ def c(model: Model, load: Load | Part | None = None, *, name: str | None = None,
     name = re.sub(r"\W", "_", model.servo.name.lower()) if name is None else name
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         raise InputError("export c: name", got=name, allowed="small letters, digits and _, a letter first")
-    return _Writing(model, hung, name, accuracy_of(accuracy), bool(parameters)).code()
+    return _Writing(model, hung, name, accuracy_of(accuracy), makes=parameters).code()
 
 
 def table_for(model: Model, load: Load | Part | None = None, accuracy: float = ACCURACY) -> tuple[float, ...]:
     """Return `CCode.table` of a servo, without its code."""
-    return _Writing(model, as_load(load), "", accuracy_of(accuracy)).table
+    return _Writing(model, as_load(load), "", accuracy_of(accuracy), makes=False).table
 
 
 class _Writing:
     """The numbers of one servo on their way into C."""
 
-    def __init__(self, model: Any, load: Load, name: str, accuracy: float, parameters: bool = False) -> None:
-        self._model, self._load, self._name, self._parameters = model, load, name, parameters
+    def __init__(self, model: Any, load: Load, name: str, accuracy: float, *, makes: bool) -> None:
+        self._model, self._load, self._name, self._makes = model, load, name, makes
         self._program: Firmware = model.firmware() or NO_FIRMWARE
         self._chip: Chip = model.chip() or NO_CHIP
         self._curve = table_of(model.curve())
@@ -189,39 +184,15 @@ class _Writing:
 
     def code(self) -> CCode:
         """Return header and source."""
-        flags = features_of(self._numbers, self._chip, self._program, len(self._curve) > 0)
-        text, recipe = Standalone(dict(self._public())), recipe_of(flags)
+        flags = features_of_model(self._model, self._load)
+        text, recipe = Standalone(self._public()), recipe_of(flags)
         names = text.add(recipe, _signatures())
-        head, source = self._making(text, recipe) if self._parameters else ("", "")
+        made = making(text, recipe, self._model, self._load, self._alone, name=self._name) if self._makes else ""
         shared = {
             "name": self._name, "guard": self._name.upper(), "version": __version__, "id": self._model.servo.name,
             "title": f"{self._name}: {self._model.servo.name} as a {type(self._model).__name__}."}
-        return CCode(self._name, HEADER.substitute(shared | self._of_header(text, flags), making=head),
-                     SOURCE.substitute(shared | names | self._of_source(text), making=source), left_out(flags),
-                     self.table)
-
-    def _making(self, text: Standalone, recipe: Recipe) -> tuple[str, str]:
-        """Return what header and source have of making a table."""
-        pulses, program, name = self._chip.frame_period > 0.0, self._digital, self._name
-        kind = _KINDS[type(self._model)]
-        names = c_parameters.printed(text, kind, pulses=pulses, program=program)
-        structs = {each.split()[-1].rstrip(";"): _laid_out(each) for each in text.public}
-        logic = f"    next.numbers.chip = {names['logic']}(given, NAN);\n" if pulses else ""
-        made = "&(const Firmware){0}"
-        if program:
-            made = "&made"
-            logic = (f"    const Firmware made = {names['logic']}(given, NAN);\n"
-                     "    memcpy(&next.program, &made, sizeof made);\n")
-        standing = float(getattr(self._model, "standing_error", 0.0))
-        shared = {
-            "name": name, "guard": name.upper(), "parameters": structs[f"{name}_parameters"],
-            "hung": structs[f"{name}_hung"], "given": text.types.initial(named(Given), self._model.given),
-            "load": text.types.initial(named(Hung), Hung(*map(float, self._model.hung(self._load)))),
-            "error": f", {text.types.initial(FLOAT64, standing)}" if pulses or program else "",
-            "period": ", NAN" if pulses or program else "", "logic": logic, "program": made,
-            "flags": str(recipe.knows), "absent": c_parameters.is_absent(recipe, pulses=pulses, program=program)}
-        words = names | shared
-        return c_parameters.HEADER.substitute(words), c_parameters.SOURCE.substitute(words)
+        return CCode(self._name, HEADER.substitute(shared | self._of_header(text, flags)),
+                     SOURCE.substitute(shared | names | self._of_source(text)) + made, left_out(flags), self.table)
 
     @property
     def table(self) -> tuple[float, ...]:
@@ -233,22 +204,22 @@ class _Writing:
         roots: list[Kind] = [named(Alone), _MEMORY, _EVENT]
         if self._digital:
             roots += [_PROGRAM, _FIRM]
-        if self._parameters:
-            roots += [named(Given), named(Hung)]
+        if self._makes:
+            roots.append(named(Given))
         structs = dict.fromkeys(kind for root in roots for kind in (*_within(root), root))
         return {f"{self._name}_{_name_of(kind)}": kind for kind in structs}
 
     def _of_header(self, text: Standalone, flags: int) -> dict[str, str]:
         name, structs = self._name, text.public
-        apart = tuple(f" {name}_{word};" for word in ("event", "parameters", "hung"))
-        event = next(each for each in structs if each.endswith(apart[0]))
+        event = next(each for each in structs if each.endswith(f" {name}_event;"))
         goals = self._alone.wiring.per_angle == 1.0
         return {
-            "structs": "\n".join(map(_laid_out, (each for each in structs if not each.endswith(apart)))),
+            "structs": "\n".join(map(_laid_out, (each for each in structs if each is not event))),
             "event": _laid_out(event), "events": events_of(name.upper()),
             "command": "a goal [rad]" if goals else "the width of a pulse [s]",
             "example": f"{self._alone.wiring.at_zero + self._alone.wiring.per_angle:.6g}",
             "absent": textwrap.fill(f"{left_out(flags)}.", 110, initial_indent=" * ", subsequent_indent=" * "),
+            "making": MADE.substitute(name=name, guard=name.upper()) if self._makes else "",
             "signals": signals_of(self._signals()),
             "more": self._members((f"    {name}_program program;\n", self._digital),
                                   ("    const double *curve; /* of the potentiometer: angle [rad] and error [V] */\n"
@@ -286,12 +257,23 @@ class _Writing:
 
     def _signals(self) -> list[tuple[str, str, str]]:
         """Return names, units and meanings of the signals that the servo has."""
-        names = self._model.signals_with(self._load)
-        return [(name, SIGNALS[name].unit, SIGNALS[name].meaning) for name in names if name not in _COMMANDS]
+        return signals_of_model(self._model, self._load)
 
     @staticmethod
     def _read(signal: str) -> str:
         return f"seen.{signal}" if signal in ("output_angle", "output_speed") else f"seen.shown.{signal}"
+
+
+def signals_of_model(model: Any, load: Load) -> list[tuple[str, str, str]]:
+    """Return names, units and meanings of the signals of a servo in C."""
+    return [(name, SIGNALS[name].unit, SIGNALS[name].meaning) for name in model.signals_with(load)
+            if name not in _COMMANDS]
+
+
+def features_of_model(model: Any, load: Load) -> int:
+    """Return what the code of a servo has to follow: flags of `terms.dependence`."""
+    return features_of(model.pack(load), model.chip() or NO_CHIP, model.firmware() or NO_FIRMWARE,
+                       len(table_of(model.curve())) > 0)
 
 
 def wiring_of(model: Any) -> Wiring:

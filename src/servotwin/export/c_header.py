@@ -81,7 +81,7 @@ $signals
 /* The numbers of $id. */
 extern const ${name}_servo ${name}_table;
 
-$making/* Put the servo to rest at t = 0, where it has no error under a command; the seed is that of its noise. */
+/* Put the servo to rest at t = 0, where it has no error under a command; the seed is that of its noise. */
 int ${name}_init(${name}_state *state, const ${name}_servo *servo, double command, int64_t seed);
 
 /* Go on to a time since the start [s] under a command from now on, and a torque that is constant meanwhile, beside that
@@ -98,12 +98,21 @@ double ${name}_time(const ${name}_state *state);
 
 /* The command under which the servo has no error at an angle [rad]. */
 double ${name}_command(const ${name}_servo *servo, double angle);
-
+$making
 #ifdef __cplusplus
 }
 #endif
 
 #endif
+''')
+
+MADE = Template('''
+/* The parameters of the servo file, SI, words as their places among those allowed; NAN: not given. */
+extern const ${name}_given ${name}_given_table;
+
+/* Make a servo of parameters, with the load of the table; ${guard}_OTHER_CODE, and nothing changes, where they ask
+ * for what was left out. They are not checked otherwise. */
+int ${name}_make(${name}_servo *servo, const ${name}_given *given);
 ''')
 
 

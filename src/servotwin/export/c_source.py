@@ -14,7 +14,7 @@ $kernels
 const ${name}_servo ${name}_table = {
 $table};
 
-$making/* The memory of a servo as the kernels take it. */
+/* The memory of a servo as the kernels take it. */
 static $memories memories_of(const ${name}_state *state) {
     ${name}_state *own = (${name}_state *)(uintptr_t)state;
     $memories all = {{&own->memory, {1}}, $firms};
