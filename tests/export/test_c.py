@@ -226,6 +226,14 @@ def test_no_compiler_complains(compiler, name, tmp_path):
                     str(tmp_path / "servo.c")], check=True)
 
 
+@pytest.mark.slow
+def test_no_compiler_complains_of_any_structure(tmp_path):
+    for name, own in STRUCTURES.items():
+        export.c(model_of(name, 0), own.load, name="servo", parameters=True).write(tmp_path, overwrite=True)
+        for compiler in COMPILERS:
+            subprocess.run([compiler, *STRICT, "-fsyntax-only", str(tmp_path / "servo.c")], check=True)
+
+
 def test_the_header_is_one_for_cpp_too(tmp_path):
     if shutil.which("g++") is None:
         pytest.skip("needs g++")
