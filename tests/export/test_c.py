@@ -197,7 +197,7 @@ LACKS = {  # what asks for what the code of a structure leaves out
 @pytest.mark.parametrize("name", FEW)
 def test_c_makes_the_numbers_that_python_makes(name, tmp_path):
     load = st.loads.Inertia(2e-3) + st.loads.Coulomb(0.02) + st.loads.Constant(0.01)
-    c = CServo(export.c(model_of(name, 0), load, name="servo", parameters=True), tmp_path, COMPILERS[0], ("-O1",))
+    c = CServo(export.c(model_of(name, 0), load, name="servo", parameters=True), tmp_path, COMPILERS[0], ("-O0",))
     for draw in range(5):
         assert c.make(model_of(name, draw).given) == 0
         assert c.numbers == list(table_for(model_of(name, draw), load))
