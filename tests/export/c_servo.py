@@ -54,6 +54,15 @@ class CServo:
         function.argtypes, function.restype = arguments, result
         return function
 
+    def make(self, given):
+        """Make the table of parameters; return what the function says."""
+        given = np.array(given, np.float64)
+        return self._function("make", ctypes.c_void_p, ctypes.c_void_p)(self.table, given.ctypes.data)
+
+    @property
+    def numbers(self):
+        return self._numbers[:len(self._code.table)].tolist()
+
     @property
     def table(self):
         return self._numbers.ctypes.data

@@ -10,11 +10,12 @@ import pytest
 
 import servotwin as st
 from export.c_servo import STRICT, CServo, Events
-from export.structures import STRUCTURES, commands, model_of
+from export.structures import HEAT, INDUCTANCE, STRUCTURES, commands, model_of
 from servotwin import export
 from servotwin.errors import InputError, OutputError, OutputExistsError
 from servotwin.export.c_code import table_for
 from servotwin.models.engine.events.kinds import NAMES
+from servotwin.models.terms.given import given_of
 
 COMPILERS = [compiler for compiler in ("gcc", "clang") if shutil.which(compiler)]
 pytestmark = pytest.mark.skipif(not COMPILERS, reason="needs gcc or clang")
@@ -187,6 +188,35 @@ def test_what_a_servo_lacks_is_not_in_its_code():
     assert not [line for line in lines if "(" not in line and "const" not in line and "typedef" not in line]
 
 
+LACKS = {  # what asks for what the code of a structure leaves out
+    "plain": (INDUCTANCE, HEAT, {"gear.backlash": 0.02, "gear.output_inertia": 1e-4},
+              {"electronics.off_state": "coast"}, {"friction.load_friction": 0.1}),
+    "bounded": (INDUCTANCE,), "on a bus": (INDUCTANCE, HEAT)}
+
+
+@pytest.mark.parametrize("name", FEW)
+def test_c_makes_the_numbers_that_python_makes(name, tmp_path):
+    load = st.loads.Inertia(2e-3) + st.loads.Coulomb(0.02) + st.loads.Constant(0.01)
+    c = CServo(export.c(model_of(name, 0), load, name="servo", parameters=True), tmp_path, COMPILERS[0], ("-O0",))
+    for draw in range(5):
+        assert c.make(model_of(name, draw).given) == 0
+        assert c.numbers == list(table_for(model_of(name, draw), load))
+    before, own = c.numbers, STRUCTURES[name]
+    for changes in LACKS[name]:
+        given = given_of(st.load_servo(own.servo).replace(own.changes | changes),
+                         (*own.kind.requires, *own.kind.optional, *changes))
+        assert c.make(given) == -4
+        assert c.numbers == before
+
+
+def test_all_names_of_the_header_begin_with_that_of_the_servo():
+    for name in ("on a bus", "everything"):
+        header = export.c(model_of(name, 0), name="servo", parameters=True).header
+        types = re.findall(r"^\} (\w+);", header, re.MULTILINE)
+        assert len(types) == len(set(types)) > 20
+        assert all(each.startswith("servo_") for each in types)
+
+
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("name", FEW)
 def test_no_compiler_complains(compiler, name, tmp_path):
@@ -194,6 +224,14 @@ def test_no_compiler_complains(compiler, name, tmp_path):
     code.write(tmp_path)
     subprocess.run([compiler, *STRICT, "-O1", "-Wmissing-prototypes", "-c", "-o", str(tmp_path / "servo.o"),
                     str(tmp_path / "servo.c")], check=True)
+
+
+@pytest.mark.slow
+def test_no_compiler_complains_of_any_structure(tmp_path):
+    for name, own in STRUCTURES.items():
+        export.c(model_of(name, 0), own.load, name="servo", parameters=True).write(tmp_path, overwrite=True)
+        for compiler in COMPILERS:
+            subprocess.run([compiler, *STRICT, "-fsyntax-only", str(tmp_path / "servo.c")], check=True)
 
 
 def test_the_header_is_one_for_cpp_too(tmp_path):

@@ -42,13 +42,10 @@ def told(tmp_path_factory):
 
 
 def lines_of(folder, compiler, runner):
-    """Return what the program tells; None where it cannot be compiled here."""
+    """Return what the program tells."""
     program = folder / "program"
     texts = str(folder / "servo.c"), str(PROGRAM)
-    made = subprocess.run([*compiler, "-o", str(program), *texts, "-I", str(folder), "-lm"], capture_output=True,
-                          text=True, check=False)
-    if made.returncode != 0:
-        return None
+    subprocess.run([*compiler, "-o", str(program), *texts, "-I", str(folder), "-lm"], check=True)
     return subprocess.run([*runner, str(program)], capture_output=True, text=True, check=True).stdout.splitlines()
 
 

@@ -46,6 +46,9 @@ def c(
         rich_help_panel=shared.PLANT)] = None,
     register: shared.RegisterOption = None,
     supply: shared.SupplyOption = None,
+    parameters: Annotated[bool, typer.Option(
+        "--parameters", help="Add a function that makes the table of other parameters.",
+        rich_help_panel=shared.OUTPUT)] = False,
     accuracy: shared.AccuracyOption = _ACCURACY,
     force: Annotated[bool, typer.Option(
         "--force", help="Replace existing files.", rich_help_panel=shared.OUTPUT)] = False,
@@ -59,7 +62,7 @@ def c(
     chosen = model_of(servo, model, change or [], None, register or [], supply)
     hangs = load_from(load or [], chosen)
     with patience(f"printing {chosen.servo.name}"):
-        code = exported(chosen, hangs, name=name, accuracy=accuracy)
+        code = exported(chosen, hangs, name=name, parameters=parameters, accuracy=accuracy)
         files = code.write(out, overwrite=force)
     facts = _facts(code) | {"model": type(chosen).__name__, "files": [str(path) for path in files]}
     if as_json:

@@ -30,17 +30,20 @@ from servotwin.models import (
     PulseServoInductive,
 )
 from servotwin.models.engine.alone import Alone, Happened, Seen
-from servotwin.models.engine.memory import ACCURACY, Inputs, Memories, Memory
+from servotwin.models.engine.memory import ACCURACY, Inputs, Memories, Memory, Point
 from servotwin.models.outputs import SIGNALS
+from servotwin.models.state.modes import Mode, Vector
 from servotwin.models.state.records import numbers_in, record_of
 from servotwin.models.terms import wiring
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.control import Firm
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
+from servotwin.models.terms.frame import Decision, Frame
 from servotwin.models.terms.given import Given
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import table_of
 from servotwin.models.terms.wiring import Wiring
+from servotwin.physics.pieces import Piece
 from servotwin.simulation.compile.kinds import FLOAT64, INT64, Array, Kind, Record, Tuple
 from servotwin.simulation.compile.signatures import named
 from servotwin.simulation.compile.standalone import Standalone
@@ -56,6 +59,9 @@ _NAME = re.compile(r"[a-z][a-z0-9_]*")
 _KNOWN = (AveragedServo, AveragedServoInductive, BoundedServo, PulseServo, PulseServoInductive, DigitalServo)
 _TABLE = Array(FLOAT64, 2)
 _PROGRAM, _FIRM, _MEMORY, _EVENT = (Record(record_of(kind)) for kind in (Firmware, Firm, Memory, Happened))
+_RECORDS: dict[Kind, str] = {Record(record_of(kind)): kind.__name__ for kind in (
+    Firmware, Firm, Memory, Happened, Point, Vector, Mode, Frame, Decision, Piece)}
+_OWN_NAMES = {"Numbers": "plant", "Alone": "numbers", "Firmware": "program", "Happened": "event"}
 
 
 @dataclass(frozen=True)
@@ -179,9 +185,9 @@ class _Writing:
     def code(self) -> CCode:
         """Return header and source."""
         flags = features_of_model(self._model, self._load)
-        text = Standalone(dict(self._public()))
-        names = text.add(recipe_of(flags), _signatures())
-        made = making(text, self._model, self._load, self._alone, name=self._name) if self._makes else ""
+        text, recipe = Standalone(self._public()), recipe_of(flags)
+        names = text.add(recipe, _signatures())
+        made = making(text, recipe, self._model, self._load, self._alone, name=self._name) if self._makes else ""
         shared = {
             "name": self._name, "guard": self._name.upper(), "version": __version__, "id": self._model.servo.name,
             "title": f"{self._name}: {self._model.servo.name} as a {type(self._model).__name__}."}
@@ -193,19 +199,15 @@ class _Writing:
         """All numbers of the table in its order."""
         return tuple(map(float, numbers_in((self._alone, *((self._program,) if self._digital else ())))))
 
-    def _public(self) -> Iterator[tuple[str, Kind]]:
-        """Return the structs of the header, each after those in it."""
-        name, seen = self._name, set[Kind]()
-        roots: list[tuple[str, Kind]] = [("numbers", named(Alone)), ("memory", _MEMORY), ("event", _EVENT)]
+    def _public(self) -> dict[str, Kind]:
+        """Return the structs of the header by their names, each after those in it."""
+        roots: list[Kind] = [named(Alone), _MEMORY, _EVENT]
         if self._digital:
-            roots += [("program", _PROGRAM), ("firm", _FIRM)]
+            roots += [_PROGRAM, _FIRM]
         if self._makes:
-            roots.append(("given", named(Given)))
-        for own, root in roots:
-            for inner, kind in (*_within(root), (own, root)):
-                if kind not in seen:
-                    seen.add(kind)
-                    yield f"{name}_{inner}", kind
+            roots.append(named(Given))
+        structs = dict.fromkeys(kind for root in roots for kind in (*_within(root), root))
+        return {f"{self._name}_{_name_of(kind)}": kind for kind in structs}
 
     def _of_header(self, text: Standalone, flags: int) -> dict[str, str]:
         name, structs = self._name, text.public
@@ -217,7 +219,8 @@ class _Writing:
             "command": "a goal [rad]" if goals else "the width of a pulse [s]",
             "example": f"{self._alone.wiring.at_zero + self._alone.wiring.per_angle:.6g}",
             "absent": textwrap.fill(f"{left_out(flags)}.", 110, initial_indent=" * ", subsequent_indent=" * "),
-            "making": MADE.substitute(name=name) if self._makes else "", "signals": signals_of(self._signals()),
+            "making": MADE.substitute(name=name, guard=name.upper()) if self._makes else "",
+            "signals": signals_of(self._signals()),
             "more": self._members((f"    {name}_program program;\n", self._digital),
                                   ("    const double *curve; /* of the potentiometer: angle [rad] and error [V] */\n"
                                    "    int64_t curve_rows;\n", len(self._curve) > 0)),
@@ -300,19 +303,22 @@ def _signatures() -> dict[str, tuple[Kind, ...]]:
             "answer": (alone, FLOAT64, FLOAT64), "observe": (alone, _INPUTS, _MEMORIES)}
 
 
-def _within(kind: Kind) -> Iterator[tuple[str, Kind]]:
-    """Return the structs within a struct, each after those in it, with the names of their places."""
+def _within(kind: Kind) -> Iterator[Kind]:
+    """Return the structs within a struct, each after those in it."""
+    inner: list[Kind] = []
     if isinstance(kind, Tuple):
-        for place, inner in zip(kind.fields, kind.elements, strict=True):
-            if isinstance(inner, Tuple):
-                yield from _within(inner)
-                yield place, inner
+        inner = [each for each in kind.elements if isinstance(each, Tuple)]
     elif isinstance(kind, Record):
-        for place in kind.dtype.names or ():
-            inner_type = kind.dtype[place]
-            if inner_type.names:
-                yield from _within(Record(inner_type))
-                yield place, Record(inner_type)
+        inner = [Record(kind.dtype[place]) for place in kind.dtype.names or () if kind.dtype[place].names]
+    for each in inner:
+        yield from _within(each)
+        yield each
+
+
+def _name_of(kind: Kind) -> str:
+    """Return what a struct is called, behind the name of the servo."""
+    name = kind.name if isinstance(kind, Tuple) else _RECORDS[kind]
+    return _OWN_NAMES.get(name, name.lower())
 
 
 def _laid_out(struct: str) -> str:

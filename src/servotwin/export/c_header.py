@@ -41,7 +41,8 @@ enum {
     ${guard}_CROWDED = 5,        /* pulses that come before two others are decided upon */
     ${guard}_NOT_FINITE = -1,    /* a time or a torque is no number */
     ${guard}_BAD_COMMAND = -2,   /* a command that the servo does not take, or no number */
-    ${guard}_IN_THE_PAST = -3    /* the servo is further already */
+    ${guard}_IN_THE_PAST = -3,   /* the servo is further already */
+    ${guard}_OTHER_CODE = -4     /* parameters that ask for what was left out of this code */
 };
 
 /* What happens, of an event. */
@@ -109,8 +110,9 @@ MADE = Template('''
 /* The parameters of the servo file, SI, words as their places among those allowed; NAN: not given. */
 extern const ${name}_given ${name}_given_table;
 
-/* Make a servo of parameters, with the load of the table. They are not checked. */
-void ${name}_make(${name}_servo *servo, const ${name}_given *given);
+/* Make a servo of parameters, with the load of the table; ${guard}_OTHER_CODE, and nothing changes, where they ask
+ * for what was left out. They are not checked otherwise. */
+int ${name}_make(${name}_servo *servo, const ${name}_given *given);
 ''')
 
 

@@ -39,7 +39,7 @@ from servotwin.physics.pieces import Piece
 from servotwin.simulation.compile import Recipe
 
 ENTRIES = ("start", "advance", "answer", "observe")
-_APART = ("heat.T_amb",)  # stands apart too, for where nothing gets warm
+APART = ("heat.T_amb",)  # stands apart too, for where nothing gets warm
 _ALWAYS = STRAIGHT | DRY | AT_STOPS | SHOWN
 
 
@@ -51,7 +51,7 @@ def features_of(numbers: Numbers, chip: Chip, program: Firmware, table: bool) ->
     rooms = numbers._asdict() | {"chip": chip, "firmware": program}
     for path, acts in ACTS.items():
         room, *fields = path.split(".")
-        if path not in _APART and room in rooms and not acts & flags and reduce(getattr, fields, rooms[room]) != reduce(
+        if path not in APART and room in rooms and not acts & flags and reduce(getattr, fields, rooms[room]) != reduce(
                 getattr, fields, NOTHING[room]):
             flags |= acts
     return flags

@@ -12,7 +12,7 @@ from servotwin.models.terms.given import field_of
 _NAMES = ("servo", "state", "signals", "given", "table", "given_table", "make", "init", "advance", "observe",
           "command")
 _CODES = ("DONE", "DIVERGED", "STEP_TOO_SMALL", "CHATTER", "TOO_FAST", "CROWDED", "NOT_FINITE", "BAD_COMMAND",
-          "IN_THE_PAST")
+          "IN_THE_PAST", "OTHER_CODE")
 _LESS = (("stops.lower_angle", "stops.upper_angle"),
          ("electronics.pulse_width_min", "electronics.pulse_width_max"),
          ("firmware.lower_goal", "firmware.upper_goal"))

@@ -35,6 +35,7 @@ static bool outcome(component *c, int status) {
     case MODEL_CHATTER: return refuse(c, "the servo cannot go on: events without time going on");
     case MODEL_TOO_FAST: return refuse(c, "the servo cannot go on: more oscillations than can be followed");
     case MODEL_CROWDED: return refuse(c, "the servo cannot go on: pulses before others are decided upon");
+    case MODEL_OTHER_CODE: return refuse(c, "the parameters ask for something that was left out of this FMU");
     default: return refuse(c, "the servo cannot go on: numbers beyond what a double holds");
     }
 }
@@ -56,7 +57,8 @@ bool component_ready(component *c) {
         if (!(low < high))
             return refuse_number(c, model_relations[k].name, low, model_relations[k].allowed);
     }
-    model_make(&now->servo, &now->given);
+    if (!outcome(c, model_make(&now->servo, &now->given)))
+        return false;
     const double period = MODEL_FRAMES(&now->servo);
     if (!(now->frames_begin >= 0.0 && (now->frames_begin < period || now->frames_begin == 0.0)))
         return refuse_number(c, model_names[FRAMES_BEGIN], now->frames_begin, "from 0 to less than a frame period");
@@ -164,6 +166,5 @@ bool component_read(component *c, condition *kept, const uint8_t *bytes, size_t 
     if (size != component_size() || memcmp(bytes, MODEL_TOKEN, sizeof MODEL_TOKEN) != 0)
         return refuse(c, "a state: it is of another model");
     memcpy(kept, bytes + sizeof MODEL_TOKEN, sizeof *kept);
-    model_make(&kept->servo, &kept->given); /* whose addresses are those of this process */
-    return true;
+    return outcome(c, model_make(&kept->servo, &kept->given)); /* whose addresses are those of this process */
 }

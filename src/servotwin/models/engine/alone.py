@@ -50,7 +50,7 @@ READY, NOT_FINITE, NOT_POSSIBLE, BEFORE = 0, -1, -2, -3  # what a call is answer
 class Alone(NamedTuple):
     """What a servo is, its program and its table apart."""
 
-    numbers: Numbers
+    plant: Numbers
     chip: Chip
     wiring: Wiring
     reduction: float  # motor turns per output turn
@@ -80,9 +80,9 @@ def start(servo: Alone, curve: Floats, memories: Memories, command: float) -> in
     if not possible(servo.wiring, command):
         return NOT_POSSIBLE
     q, T = rest_angle(servo.wiring, curve, followed(servo.wiring, command)), servo.ambient
-    if duty.present(servo.numbers.bridge):
+    if duty.present(servo.plant.bridge):
         put_firm(memories.firms[0], control.AT_START)
-    mesh = INSIDE if play.present(servo.numbers.play) else RIGID
+    mesh = INSIDE if play.present(servo.plant.play) else RIGID
     put_memory(memories.rows[0], started(Vector(q, 0.0, 0.0, T, T, q, 0.0), mesh, memories.firms[0:1]))
     return READY
 
@@ -113,7 +113,7 @@ def advance(servo: Alone, inputs: Inputs, memories: Memories, until: float, comm
         return status
     if until < time_of(memory) - SAME * memory.beat:  # of which the instant of an edge may be off
         return BEFORE
-    memory, status = run(servo.numbers, servo.chip, inputs, memory, until, rows, used)
+    memory, status = run(servo.plant, servo.chip, inputs, memory, until, rows, used)
     if status == COMPLETED:
         put_memory(memories.rows[0], memory)
     return status
@@ -206,8 +206,8 @@ def observe(servo: Alone, inputs: Inputs, memories: Memories) -> Seen:
     """Return all signals of a servo as it stands, under what it is told now."""
     memory = memory_at(memories, 0)
     point, now, time = memory.point, memory.chip, time_of(memory)
-    u, tau = told(servo.numbers, pulsed_chip(servo.chip), inputs, memory)
-    numbers = as_now(servo.numbers, inputs, memory)
+    u, tau = told(servo.plant, pulsed_chip(servo.chip), inputs, memory)
+    numbers = as_now(servo.plant, inputs, memory)
     mode = mode_under(numbers, u, tau, memory)
     shown = observed(warm(numbers, point.y), inputs.curve, mode, piece_value(u, time), piece_value(tau, time), point.y,
                      point.wiper, now.drive, now.error)

@@ -5,11 +5,18 @@ from __future__ import annotations
 import math
 
 from servotwin.models.engine.alone import Alone
+from servotwin.models.engine.demands import demanded
 from servotwin.models.terms import chip, firmware, packing, wiring
 from servotwin.models.terms.chip import NO_CHIP
 from servotwin.models.terms.firmware import Firmware
 from servotwin.models.terms.given import Given
 from servotwin.models.terms.hung import Hung
+from servotwin.physics.pieces import Piece
+
+
+def asks(servo: Alone, own: Firmware) -> int:
+    """Return all that a servo asks of the code that follows it: flags of `terms.dependence`."""
+    return demanded(servo.plant, servo.chip, own, Piece())
 
 
 def pulsed(given: Given, hung: Hung, error: float, torque: float, accuracy: float) -> Alone:

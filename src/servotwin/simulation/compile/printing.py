@@ -236,6 +236,8 @@ class _Text(CallExpressions):
 
     def _single(self, target: ast.expr, value: ast.expr) -> list[str]:
         kind = self.kind(value)
+        if isinstance(target, ast.Name) and isinstance(value, ast.Name) and target.id == value.id:
+            return []  # what is left of a choice
         if isinstance(target, ast.Name) and target.id not in self._variables.read:
             return [f"(void){bracketed(self.of(value))};"] if _calls(value) else []
         if isinstance(target, ast.Name) and isinstance(there := self._own.local[target.id], Scalar):
