@@ -8,7 +8,7 @@ import warnings
 import numpy as np
 import pytest
 
-from bench_made import benches, unpacked
+from bench_made import benches, unpacked, wild
 from bench_scenes import by_python, drawn
 from servotwin.web.alone import kernel
 from servotwin.web.live import LiveBench, read_scene
@@ -106,3 +106,15 @@ def test_texts_are_refused_in_the_same_words(folder):
             read_scene(text)
         words = re.sub(r"; did you mean [^?]*\?", "", " ".join(str(error.value).split()))
         assert one["refused"] == [words], json.dumps(text)
+
+
+@pytest.mark.parametrize("model", ["BoundedServo", "PulseServo", "PulseServoInductive", "AveragedServo"])
+def test_no_number_lets_the_kernel_trap(folder, model):
+    text = f'format = 1\nservo = [{{id = "hitec-hs-755hb", model = "{model}"}}]\n[load]\ninertia = 1e-4\n'
+    assert wild(folder, [text]) == 36
+
+
+def test_no_number_lets_the_kernel_of_a_program_or_a_bus_trap(folder):
+    digital = 'format = 1\nservo = [{id = "feetech-sts3215-12v"}]\n[load]\ninertia = 1e-4\n'
+    bus = 'format = 1\nservo = [{id = "hitec-hs-755hb"}, {id = "hitec-hs-755hb"}]\n[load]\ninertia = 1e-4\n[supply]\n'
+    assert wild(folder, [digital, bus + "open_circuit_voltage = 6.0\ninternal_resistance = 0.5\n"]) == 72
