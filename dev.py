@@ -28,6 +28,7 @@ TASKS = {
     "examples": "set up, then run every script of examples/",
     "docs": "set up, then build the documentation to docs/_build/",
     "bench": "set up, then print the benchmark tables",
+    "page": "set up, then write the bench as one file to page/index.html (or the folder that is named)",
     "wheel": "set up, then make the wheel for this machine in dist/, and try it where nothing compiles; --all: for all",
 }
 
@@ -103,6 +104,13 @@ def examples(arguments: list[str]) -> None:
             sys.exit(done.returncode)
 
 
+def page(arguments: list[str]) -> None:
+    """Write the bench as one file into a folder."""
+    folder = Path(arguments[0]) if arguments else ROOT / "page"
+    folder.mkdir(parents=True, exist_ok=True)
+    run("servotwin", "web", "--export", str(folder / "index.html"), "--force")
+
+
 def wheel(arguments: list[str]) -> None:
     """Make the wheel for this machine and try it; with `--all` make those for all machines, and try none."""
     install("wheels,compile")
@@ -133,7 +141,7 @@ def main(arguments: list[str]) -> None:
             run("python", str(script), *rest)
     elif task != "setup":
         {"test": test, "validation": validation, "sanitize": sanitize, "check": check, "examples": examples,
-         "wheel": wheel}[task](rest)
+         "page": page, "wheel": wheel}[task](rest)
 
 
 if __name__ == "__main__":

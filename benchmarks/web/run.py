@@ -1,16 +1,17 @@
-"""What the bench in the browser costs: visitors, scenes, watchers, and the page in a browser.
+"""What the bench in the browser costs: visitors, scenes, watchers, the page in a browser, and the page as one file.
 
-`run.py` has five parts; `run.py one browser` runs only those named.
+`run.py` has six parts; `run.py one browser` runs only those named.
 """
 
 import os
 import sys
 
+import alone
 import browser
 import visitors
 
 PARTS = {"one": visitors.one, "eight": visitors.eight, "scenes": visitors.scenes, "watchers": visitors.watchers,
-         "browser": browser.main}
+         "browser": browser.main, "alone": alone.main}
 
 
 def main() -> None:

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from servotwin.errors import InputError
+from servotwin.physics.converter import counted
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +65,7 @@ class Converter:
         """
         if not math.isfinite(voltage):
             raise InputError("voltage at a converter", got=voltage, allowed="a finite number [V]")
-        return min(max(math.floor(self.gain * voltage + self.offset), 0), self.highest)
+        return counted(self.gain, self.offset, self.highest, voltage)
 
 
 INPUT_CONVERTER = Converter(bits=10, reference=2.5, offset=-0.82)

@@ -30,13 +30,20 @@ def web(
     scene: Annotated[Path | None, typer.Option(
         metavar="FILE.toml", help="A bench that was saved on the page.")] = None,
     lesson: Annotated[str | None, typer.Option(metavar="NAME", help="Begin with a lesson, such as deadband.")] = None,
+    export: Annotated[Path | None, typer.Option(
+        metavar="FILE.html", help="Write the bench as one file instead, which computes in any browser, without a "
+        "server or a network. Wants clang and lld, or the package ziglang.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that exists.")] = False,
     browser: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in a browser.")] = True,
     as_json: shared.JsonOption = False,
 ) -> None:
-    """Serve the page until Ctrl-C."""
+    """Serve the page until Ctrl-C, or write it as one file."""
+    shown = _first(servo, scene, lesson)
+    if export is not None:
+        _export(shown, export, force=force, as_json=as_json)
+        return
     from servotwin.web.server.serve import serve
 
-    shown = _first(servo, scene, lesson)
     _check(port, host, classroom=classroom)
 
     def ready(links: Links) -> None:
@@ -49,6 +56,23 @@ def web(
             _open(links.teacher or links.page)
 
     serve(shown, host=host, port=port, classroom=classroom, ready=ready)
+
+
+def _export(first: Scene, path: Path, *, force: bool, as_json: bool) -> None:
+    """Write the bench as one file."""
+    from servotwin.cli.outputs import Target, check_targets, staged
+    from servotwin.web.alone.page import page, sizes
+
+    target = Target(option="--export", path=path, endings=(".html", ".htm"))
+    check_targets([target], force=force)
+    text = page(first)
+    with staged([target], force=force) as (draft,):
+        draft.write_text(text, encoding="utf-8")
+    if as_json:
+        emit_json({"file": str(path), "bytes": sizes(text)})
+    else:
+        size = sizes(text)["page"] / 1000
+        emit(f"the bench is in {path}, {size:.0f} kB: open it in a browser, or put it on any server")
 
 
 def _check(port: int, host: str, *, classroom: bool) -> None:

@@ -34,6 +34,7 @@ class Firmware(Group):
     """The control loop of a digital or bus servo, tick by tick; angles at the output shaft."""
 
     title = "firmware"
+    less = (("lower_goal", "upper_goal"),)
     control_period: float | None = parameter(
         "T_c", "time", POSITIVE, "time between two ticks of the control loop", PROGRAMS.of(2e-05, 0.1))
     control_phase: float | None = parameter(
@@ -128,7 +129,7 @@ class Firmware(Group):
         "", "time", NOT_NEGATIVE, "for so long after the first goal", PROGRAMS.of(0.0, 100.0))
 
     def _relations(self) -> Iterator[Relation]:
-        yield from self._less("lower_goal", "upper_goal")
+        yield from super()._relations()
         T_c, most = self.control_period, MOST_WAITING - 1
         for name, time in (("compute_delay", self.compute_delay), ("bus_latency", self.bus_latency)):
             if T_c is not None and time is not None:

@@ -5,7 +5,8 @@ They check themselves; a field that is None is absent: the effect is off, or not
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar, NamedTuple
 
@@ -21,13 +22,21 @@ ANY = "a finite number"
 AT_LEAST_ONE = "a number of at least 1"
 FRACTION = "a number from 0 to 1"
 
-RULES: dict[str, Callable[[Any], Any]] = {  # of a number, or of each number of a column
-    POSITIVE: lambda x: x > 0.0,
-    NOT_NEGATIVE: lambda x: x >= 0.0,
-    ANY: lambda x: x == x,
-    AT_LEAST_ONE: lambda x: x >= 1.0,
-    FRACTION: lambda x: (x >= 0.0) & (x <= 1.0),
-}
+class Range(NamedTuple):
+    """Between which numbers a value has to be."""
+
+    low: float = -math.inf
+    high: float = math.inf
+    open: bool = False  # whether `low` is not possible itself
+
+    def __call__(self, x: Any) -> Any:
+        """Tell whether a number, or each number of a column, is there."""
+        return (x > self.low if self.open else x >= self.low) & (x <= self.high)
+
+
+RULES = {POSITIVE: Range(0.0, open=True), NOT_NEGATIVE: Range(0.0), ANY: Range(), AT_LEAST_ONE: Range(1.0),
+         FRACTION: Range(0.0, 1.0)}
+"""What numbers each rule allows."""
 
 
 class Relation(NamedTuple):
@@ -104,6 +113,8 @@ class Group:
     """Base of all groups: checks every field once, and the relations between fields."""
 
     title: ClassVar[str]
+    less: ClassVar[tuple[tuple[str, str], ...]] = ()
+    """Fields of which the first has to be less than the second."""
 
     def __post_init__(self) -> None:
         for f in fields(self):
@@ -133,7 +144,8 @@ class Group:
 
     def _relations(self) -> Iterator[Relation]:
         """Return what has to hold between several fields."""
-        return iter(())
+        for pair in self.less:
+            yield from self._less(*pair)
 
     def _only_with(self, name: str, partners: tuple[str, ...]) -> Iterator[Relation]:
         """Yield that a field may be given only where all its partners are."""

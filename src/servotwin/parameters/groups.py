@@ -167,6 +167,7 @@ class Electronics(Group):
     """Pulse-to-voltage converter, comparator and bridge (paper, eq. 38), and the chip at pulse level."""
 
     title = "electronics"
+    less = (("pulse_width_min", "pulse_width_max"),)
     bridge_gain: float | None = parameter(
         "A", "voltage gain", POSITIVE, "gain of the bridge (38)", CATALOG.of(0.1, 10000.0))
     comparator_gain: float | None = parameter(
@@ -205,15 +206,13 @@ class Electronics(Group):
     pulse_width_min: float | None = parameter("", "time", POSITIVE, "shortest pulse accepted", CATALOG.of(1e-05, 0.02))
     pulse_width_max: float | None = parameter("", "time", POSITIVE, "longest pulse accepted", CATALOG.of(0.0001, 0.05))
 
-    def _relations(self) -> Iterator[Relation]:
-        yield from self._less("pulse_width_min", "pulse_width_max")
-
 
 @dataclass(frozen=True, kw_only=True)
 class Supply(Group):
     """Battery or regulator, and what the bridge takes of it."""
 
     title = "supply"
+    less = (("bridge_drop_voltage", "open_circuit_voltage"),)
     open_circuit_voltage: float | None = parameter(
         "V_oc", "voltage", POSITIVE, "voltage without load", CATALOG.of(0.5, 100.0))
     internal_resistance: float | None = parameter(
@@ -251,22 +250,17 @@ class Supply(Group):
 
         return cls(**supply_numbers(text, what))
 
-    def _relations(self) -> Iterator[Relation]:
-        yield from self._less("bridge_drop_voltage", "open_circuit_voltage")
-
 
 @dataclass(frozen=True, kw_only=True)
 class Stops(Group):
     """End stops of the output shaft."""
 
     title = "stops"
+    less = (("lower_angle", "upper_angle"),)
     lower_angle: float | None = parameter("", "angle", ANY, "lowest output angle", TURNS.of(-20.0, 20.0))
     upper_angle: float | None = parameter("", "angle", ANY, "highest output angle", TURNS.of(-20.0, 20.0))
     restitution: float | None = parameter(
         "", "number", FRACTION, "speed after over speed before an impact", SHARE.of(0.0, 1.0))
-
-    def _relations(self) -> Iterator[Relation]:
-        yield from self._less("lower_angle", "upper_angle")
 
 
 _MASSES = ("winding_capacity", "housing_capacity", "winding_to_housing", "housing_to_ambient")

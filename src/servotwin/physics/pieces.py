@@ -84,7 +84,7 @@ def piece_range(piece: Piece, end: float) -> tuple[float, float]:
     >>> piece_range(Piece(value=1.0, slope=2.0), 3.0)
     (1.0, 7.0)
     """
-    start, first, slope, amplitude, *_ = piece
+    start, first, slope, amplitude, _, _, _ = piece
     if slope == 0.0:
         return first - abs(amplitude), first + abs(amplitude)
     last = first + slope * (end - start)

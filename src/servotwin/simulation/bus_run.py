@@ -21,7 +21,7 @@ from servotwin.models.engine.bus.event_log import Tape
 from servotwin.models.engine.demands import demanded
 from servotwin.models.engine.memory import Memories, Memory, forgotten, resumed
 from servotwin.models.engine.step import DIVERGED
-from servotwin.models.state.records import TILE, fields_of, numbers_in, object_of, record_of, room, rows_of
+from servotwin.models.state.records import TILE, numbers_in, object_of, put_fields, record_of, room, rows_of
 from servotwin.models.terms import control
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.dependence import CURVED_Q, SPRING
@@ -144,39 +144,48 @@ class Plainly:
     """
 
     def __init__(self, plans: Sequence[Plan], states: Sequence[State], source: Source) -> None:
-        self._shared = object_of(Shared)
-        put_shared(self._shared, at_start(source))
-        self._seats, self._mates = ([object_of(kind) for _ in range(n * len(plans))] for kind, n in (
+        self.shared = object_of(Shared)
+        put_shared(self.shared, at_start(source))
+        self.seats, self.mates = ([object_of(kind) for _ in range(n * len(plans))] for kind, n in (
             (Seat, 1), (Mate, 2)))
-        for k, seat in enumerate(self._seats):
+        for k, seat in enumerate(self.seats):
             seat.place, seat.joined = k, -1
         self.begin(plans, states)
 
     def begin(self, plans: Sequence[Plan], states: Sequence[State]) -> None:
         """Take up what servos are told and remember; what they are in together goes on."""
-        self._inputs = [plan.inputs for plan in plans]
+        self.inputs = [plan.inputs for plan in plans]
         self.memories = [begun(plan, state) for plan, state in zip(plans, states, strict=True)]
-        for seat, plan in zip(self._seats, plans, strict=True):
+        for seat, plan in zip(self.seats, plans, strict=True):
             bus_unit.sit(seat, plan.numbers, plan.chip, plan.inputs)
 
     def break_up(self, source: Source) -> None:
         """Let nobody move together, and every motion begin anew: numbers of a servo, or the source, are others now."""
         self.memories = [forgotten(memory) for memory in self.memories]
-        for seat in self._seats:
+        for seat in self.seats:
             seat.joined = -1
-        put_shared(self._shared, at_start(source))
+        put_shared(self.shared, at_start(source))
 
     def go_on(self, until: float, written: Tape) -> tuple[int, float]:
         """Go on to a time [s]; return a status and when."""
-        for seat, memory in zip(self._seats, self.memories, strict=True):
-            bus_unit.remember(seat, memory)
+        firms = self.seated()
+        for seat in self.seats:
             seat.until = until - seat.origin
-        firms = [memory.firm[0] for memory in self.memories]
-        status, when = event_queue.through(self._inputs, firms, len(firms), self._shared, self._seats, self._mates,
+        status, when = event_queue.through(self.inputs, firms, len(firms), self.shared, self.seats, self.mates,
                                            written)
-        self.memories = [bus_unit.memory_in(seat, firms)._replace(firm=memory.firm)
-                         for seat, memory in zip(self._seats, self.memories, strict=True)]
+        self.risen(firms)
         return status, when
+
+    def seated(self) -> list[Any]:
+        """Let all servos take their seats; return what their programs remember."""
+        for seat, memory in zip(self.seats, self.memories, strict=True):
+            bus_unit.remember(seat, memory)
+        return [memory.firm[0] for memory in self.memories]
+
+    def risen(self, firms: list[Any]) -> None:
+        """Take note of what all servos remember by now."""
+        self.memories = [bus_unit.memory_in(seat, firms)._replace(firm=memory.firm)
+                         for seat, memory in zip(self.seats, self.memories, strict=True)]
 
 
 class _Compiled:
@@ -211,7 +220,7 @@ def shared_of(sources: Sequence[Source]) -> NDArray[Any]:
     """Return what servos on each of some sources remember together at their start."""
     records = np.zeros(len(sources), SHARED)
     for record, source in zip(records, sources, strict=True):
-        _put(record, at_start(source))
+        put_fields(record, at_start(source))
     return records
 
 
@@ -266,15 +275,8 @@ def _records_of(memories: Sequence[Memory]) -> Memories:
     """Return memories as records."""
     found = nothing_yet(len(memories))
     for record, firm, memory in zip(*found, memories, strict=True):
-        _put(record, memory)
+        put_fields(record, memory)
         own = memory.firm[0]
-        _put(firm, own if hasattr(own, "_fields") else control.frozen(own))
+        put_fields(firm, own if hasattr(own, "_fields") else control.frozen(own))
     return found
 
-
-def _put(record: Any, values: Any) -> None:
-    for (name, _), value in zip(fields_of(type(values)), values, strict=True):
-        if hasattr(value, "_fields"):
-            _put(record[name], value)
-        elif name in (record.dtype.names or ()):  # what programs remember stands elsewhere
-            record[name] = value

@@ -1,27 +1,23 @@
-"""Servos on one supply that stop and go on, in plain Python: what is shown live."""
+"""Servos on one supply that stop and go on, in plain Python, and are looked at on the way: what is shown live."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any
 
+import numpy as np
+
+from servotwin.errors import InputError
 from servotwin.models.engine import controller
-from servotwin.models.engine.step import COMPLETED
+from servotwin.models.engine.live import together
+from servotwin.models.engine.live.screen import NEXT, USED, Looks
+from servotwin.models.engine.step import COMPLETED, DIVERGED
 from servotwin.models.terms import control
 from servotwin.models.terms.source import Source
-from servotwin.simulation.bus_rows import Segments, events_of, segments_of
-from servotwin.simulation.bus_run import Plainly, Rows, tape_of, taped
-from servotwin.simulation.engine import Event, Plan, State, failure
+from servotwin.simulation.bus_run import Plainly, tape_of
+from servotwin.simulation.engine import Plan, State, failure
 from servotwin.simulation.status import Status
-
-
-class Stretch(NamedTuple):
-    """What servos did in a stretch of time: their states at its end, and, of each, segments and events."""
-
-    states: list[State]
-    segments: list[Segments]
-    events: list[tuple[Event, ...]]
 
 
 class BusSteps:
@@ -29,28 +25,36 @@ class BusSteps:
 
     Splitting an interval into several calls changes nothing beyond rounding.
 
+    Parameters
+    ----------
+    posts : sequence
+        What shows of each servo, as `models.engine.live.posts.Post` has it.
+
     Examples
     --------
     >>> import servotwin as st
     >>> from servotwin.simulation.bus_supply import on_supply, source_of
+    >>> from servotwin.web.live.station import Endless, post_of
     >>> supply = st.Supply(open_circuit_voltage=6.0, internal_resistance=0.5)
     >>> sim = st.Simulator(on_supply(st.PulseServo(st.load_servo("hitec-hs-755hb")), supply))
-    >>> command, steps = st.signals.step(0.0, 60.0, unit="deg"), BusSteps()
-    >>> states = [sim.initial(command), sim.initial(command)]
+    >>> command = st.signals.step(0.0, 60.0, unit="deg")
+    >>> steps, states = BusSteps([post_of(sim.model), post_of(sim.model)]), [sim.initial(command), sim.initial(command)]
     >>> for until in (0.1, 0.15, 0.2):
-    ...     states = steps.go_on(source_of(supply), [sim.plan(command)] * 2, states, until).states
+    ...     shown = [Endless() for _ in states], [Endless() for _ in states]
+    ...     states = steps.go_on(source_of(supply), [sim.plan(command)] * 2, states, Looks(1, 1e3, until, 1, 0), *shown)
     >>> fleet = st.simulate_bus({"a": (sim.model, command), "b": (sim.model, command)}, supply=supply, duration=0.2)
     >>> abs(states[1]["output_angle"] - float(fleet["b"]["output_angle"][-1])) < 1e-12
     True
     """
 
-    def __init__(self) -> None:
+    def __init__(self, posts: Sequence[Any]) -> None:
+        self._posts = posts
         self._way: Plainly | None = None
         self._source: Source | None = None
 
-    def go_on(self, source: Source, plans: Sequence[Plan], states: Sequence[State], until: float,
-              tell: Callable[[float], object] | None = None) -> Stretch:
-        """Let all servos go on to a time.
+    def go_on(self, source: Source, plans: Sequence[Plan], states: Sequence[State], looks: Looks,
+              rows: Sequence[Any], events: Sequence[Any]) -> list[State]:
+        """Let all servos go on to the end of the looks; return their states there.
 
         Parameters
         ----------
@@ -58,40 +62,53 @@ class BusSteps:
             That they share.
         plans, states : sequence of Plan, of State
             Of the servos, always in the same order.
-        until : float
-            [s]
-        tell : callable, optional
-            Is told the time [s] now and then; the servos cannot go on after it has raised.
+        looks : Looks
+        rows, events : sequence
+            Room for what shows of each.
 
         Raises
         ------
         SimulationError
             If the run cannot go on.
         """
+        way = self._begun(source, plans, states)
+        used = np.zeros(USED * len(plans), np.int64)
+        used[NEXT] = looks.next
+        firms = way.seated()
+        try:
+            status = together.go_on(way.inputs, self._posts, firms, way.shared, way.seats, way.mates, looks, self._tape,
+                                    rows, events, used)
+        except InputError:
+            raise  # of whoever is told the time
+        except (ArithmeticError, ValueError):  # numbers beyond what a float holds
+            status = DIVERGED
+        way.risen(firms)
+        if status != COMPLETED:
+            raise failure(Status.of_code(status), max(seat.origin + seat.clock for seat in way.seats))
+        return self._states(way, plans, states, looks.until)
+
+    def _begun(self, source: Source, plans: Sequence[Plan], states: Sequence[State]) -> Plainly:
         if self._way is None:
             self._way, self._tape = Plainly(plans, states, source), tape_of(len(plans))
         else:
             self._way.begin(plans, states)
-            if source != self._source or self._are_others(plans, states):
+            if source != self._source or self._are_others(self._way, plans, states):
                 self._way.break_up(source)
         self._source = source
-        rows = taped(self._way, until, self._tape, tell)
-        if rows.status != COMPLETED:
-            raise failure(Status.of_code(rows.status), rows.ended)
-        return self._stretch(plans, states, until, rows)
+        return self._way
 
-    def _are_others(self, plans: Sequence[Plan], states: Sequence[State]) -> bool:
+    @staticmethod
+    def _are_others(way: Plainly, plans: Sequence[Plan], states: Sequence[State]) -> bool:
         """Tell whether numbers of a servo are others than before, or its clock is."""
-        memories = self._way.memories if self._way is not None else []
         return any(plan.numbers != state.numbers or memory.beat != state.memory.beat
-                   for plan, state, memory in zip(plans, states, memories, strict=True))
+                   for plan, state, memory in zip(plans, states, way.memories, strict=True))
 
-    def _stretch(self, plans: Sequence[Plan], states: Sequence[State], until: float, rows: Rows) -> Stretch:
+    @staticmethod
+    def _states(way: Plainly, plans: Sequence[Plan], states: Sequence[State], until: float) -> list[State]:
         found = []
-        memories = self._way.memories if self._way is not None else []
-        for plan, state, memory in zip(plans, states, memories, strict=True):
+        for plan, state, memory in zip(plans, states, way.memories, strict=True):
             if plan.digital:
                 controller.pause(plan.inputs, memory)
                 memory = memory._replace(firm=(control.frozen(memory.firm[0]),))
             found.append(replace(state, time=until, memory=memory, numbers=plan.numbers))
-        return Stretch(found, segments_of(plans, rows), list(events_of(plans, rows)))
+        return found

@@ -9,6 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from servotwin.web.alone.kernel import NoCompilerError
+from servotwin.web.alone.page import page as one_file
+from servotwin.web.server.first import first_scene
+
 HERE = Path(__file__).parent
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
@@ -56,10 +60,28 @@ def opened(browser):
     assert wrong == []
 
 
+@pytest.fixture(scope="session")
+def bench_file(tmp_path_factory):
+    """The page as one file, as its address on this disk."""
+    try:
+        text = one_file(first_scene())
+    except NoCompilerError as error:
+        pytest.skip(str(error))
+    path = tmp_path_factory.mktemp("page") / "bench.html"
+    path.write_text(text, encoding="utf-8")
+    return path.as_uri()
+
+
+@pytest.fixture(params=["server", "file"])
+def home(request):
+    """The address of a page: a server's, and that of the page as one file, which has to do the same."""
+    return request.getfixturevalue("server" if request.param == "server" else "bench_file")
+
+
 @pytest.fixture
-def page(opened, server):
+def page(opened, home):
     """The page, with time going on."""
-    made = opened(server)
+    made = opened(home)
     made.wait_for_function("bench.time > 0.3")
     return made
 

@@ -39,8 +39,8 @@ def wrong(page, axe) -> list[str]:
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_axe_has_nothing_to_say(opened, server, axe, scheme):
-    page = opened(server, color_scheme=scheme)
+def test_axe_has_nothing_to_say(opened, home, axe, scheme):
+    page = opened(home, color_scheme=scheme)
     page.wait_for_function("bench.time > 0.3")
     assert wrong(page, axe) == []
     page.evaluate(OPEN_ALL)
@@ -116,8 +116,8 @@ def test_tab_reaches_every_control_there_and_back_and_shows_where_it_is(page):
     assert back == wanted - 1
 
 
-def test_a_phone_scrolls_one_way_and_fits_fingers(opened, server):
-    page = opened(server, viewport=PHONE)
+def test_a_phone_scrolls_one_way_and_fits_fingers(opened, home):
+    page = opened(home, viewport=PHONE)
     page.wait_for_function("bench.time > 0.3")
     tops = page.evaluate("""['.horn-panel', '.side.command', '.lcd-panel', '.scope-panel', '.traces-panel',
         '.side.load'].map((name) => document.querySelector(name).getBoundingClientRect().top)""")
@@ -171,9 +171,9 @@ def test_what_is_said_is_what_is_shown_and_only_when_asked(page):
     assert page.locator(".words-panel tbody tr").count() == 20
 
 
-def test_without_motion_the_drawings_change_a_few_times_a_second(opened, server):
+def test_without_motion_the_drawings_change_a_few_times_a_second(opened, home):
     def changes(**options) -> int:
-        page = opened(server, **options)
+        page = opened(home, **options)
         page.evaluate("bench.do('command', {shape: 'sine', unit: 'us', mean: 1500, amplitude: 200, frequency: 1})")
         page.wait_for_function("bench.time > 1")
         page.evaluate("""() => { window.turns = 0; new MutationObserver(() => { window.turns += 1; }).observe(

@@ -24,6 +24,11 @@ def saved(page, name: str, folder):
     return path
 
 
+def alone(page) -> bool:
+    """Tell whether a page is that as one file, which neither writes nor reads servo files."""
+    return page.url.startswith("file:")
+
+
 @pytest.fixture
 def done(page):
     """A page at which something was done, and which stands."""
@@ -44,8 +49,9 @@ def test_table_servo_file_and_script_have_the_numbers_of_the_page(done, tmp_path
     assert table["time_s"][-1] == pytest.approx(time, abs=1e-9)
     assert math.radians(table["output_angle_deg"][-1]) == pytest.approx(angle, abs=1e-9)
     assert 1e-6 * table["pulse_width_us"][-1] == pytest.approx(1.712e-3, abs=1e-12)
-    servo = st.load_servo(saved(done, "Servo file", tmp_path))
-    assert servo.get("electronics.deadband") == 1.2e-5
+    if not alone(done):
+        servo = st.load_servo(saved(done, "Servo file", tmp_path))
+        assert servo.get("electronics.deadband") == 1.2e-5
     script = saved(done, "Python script", tmp_path)
     ran = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False, timeout=60)
     assert ran.stderr == ""
@@ -67,22 +73,25 @@ def test_the_picture_shows_all_instruments(done, tmp_path):
     assert len(data) > 20_000  # there is something in it
 
 
-def test_a_bench_and_a_servo_file_open_again(done, opened, server, tmp_path):
-    bench, servo = saved(done, "Bench (TOML)", tmp_path), saved(done, "Servo file", tmp_path)
+def test_a_bench_and_a_servo_file_open_again(done, opened, home, tmp_path):
+    bench = saved(done, "Bench (TOML)", tmp_path)
     time, angle = done.evaluate("bench.time"), latest(done, "output_angle")
-    again = opened(server)
+    again = opened(home)
     opened_panel(again, "Save and share")
     again.get_by_label("open a bench or a servo file").set_input_files(bench)
     again.wait_for_function(f"Math.abs(bench.time - {time}) < 1e-9")
     assert latest(again, "output_angle") == pytest.approx(angle, abs=1e-9)
-    again.get_by_label("open a bench or a servo file").set_input_files(servo)
-    again.wait_for_function("bench.facts.length === 1")
-    until(again, 0.1)
-    numbers = again.evaluate("bench.facts[0].parameters.find((one) => one.name === 'electronics.deadband').value")
-    assert numbers == 1.2e-5
+    if not alone(done):
+        servo = saved(done, "Servo file", tmp_path)
+        again.get_by_label("open a bench or a servo file").set_input_files(servo)
+        again.wait_for_function("bench.facts.length === 1")
+        until(again, 0.1)
+        numbers = again.evaluate("bench.facts[0].parameters.find((one) => one.name === 'electronics.deadband').value")
+        assert numbers == 1.2e-5
+    servos = again.evaluate("bench.facts.length")
     wrong = tmp_path / "broken.toml"
     wrong.write_text("format = 1\nservo = [")
     again.get_by_label("open a bench or a servo file").set_input_files(wrong)
     again.wait_for_selector("#notice:not([hidden])")
     assert "TOML" in again.locator("#notice").inner_text()
-    assert again.evaluate("bench.facts.length") == 1  # the bench stays
+    assert again.evaluate("bench.facts.length") == servos  # the bench stays

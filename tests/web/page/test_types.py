@@ -35,6 +35,15 @@ def test_typescript_finds_nothing_and_would_find_a_mistake(tools, tmp_path):
     assert "TS2345" in checked(tools, tmp_path, "units").stdout
 
 
+def test_typescript_finds_nothing_in_the_page_as_one_file(tools, tmp_path):
+    shutil.copytree(PAGE / "js", tmp_path / "page/js")
+    for path in (PAGE.parent / "alone/js").glob("*.js"):
+        shutil.copy(path, tmp_path / "page/js")
+    (tmp_path / "page/js/toml_parse.d.ts").write_text("export function parse(text: string): any;\n")
+    done = checked(tools, tmp_path)
+    assert (done.stdout, done.returncode) == ("", 0)
+
+
 def test_the_chart_library_is_the_published_one(tools):
     ours = (PAGE / "vendor/uPlot.js").read_text()
     theirs = (tools / "uplot/dist/uPlot.iife.min.js").read_text()

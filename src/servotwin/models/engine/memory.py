@@ -183,11 +183,14 @@ def with_bodies(memory: Memory, half_play: float, sprung: bool) -> Memory:
     mesh = p.mode.mesh if half_play > 0.0 and RIGID < p.mode.mesh <= ON_BACKWARD else INSIDE
     y = p.y
     if not sprung:  # a spring may have been twisted beyond a play that is there now
-        y = y._replace(q_m=min(max(y.q_m, y.q - half_play), y.q + half_play))
+        q_m = min(max(y.q_m, y.q - half_play), y.q + half_play)
+        y = Vector(y.q, y.w, y.i, y.T_w, y.T_h, q_m, y.w_m)
     if half_play == 0.0 and not sprung:
         mesh, y = RIGID, one_body(y.q, y.w, y)
     mode = Mode(p.mode.zone, p.mode.contact, mesh, p.mode.motor, p.mode.share)
-    return forgotten(memory._replace(point=p._replace(y=y, mode=mode)))
+    point = Point(p.time, y, mode, p.anchor_time, p.anchor, p.step, p.wiper)
+    return forgotten(Memory(memory.frames, memory.beat, point, memory.chip, memory.u, memory.u_end, memory.tau,
+                            memory.tau_end, memory.firm))
 
 
 def due(memory: Memory) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from servotwin.physics.elementary import cos, log
+from servotwin.physics.elementary import cos, log, power
 
 _MASK = 0xFFFFFFFF
 _UNIT = 2.3283064365386963e-10  # 2^-32
@@ -47,3 +47,26 @@ def gaussian(seed: int, frame: int) -> float:
     b = scrambled(a ^ 0x5BD1E995)
     radius = math.sqrt(-2.0 * log((a + 0.5) * _UNIT))
     return radius * cos(_TURN * ((b + 0.5) * _UNIT))
+
+
+def uniform(seed: int, number: int) -> float:
+    """Return a draw from 0 to 1, both excluded, by its number, independent of those of `gaussian`.
+
+    Examples
+    --------
+    >>> uniform(1, 0) == uniform(1, 0), 0.0 < uniform(1, 1) < 1.0
+    (True, True)
+    """
+    a = scrambled(number + scrambled(seed + scrambled(seed >> 32)))
+    return (scrambled(a ^ 0x2545F491) + 0.5) * _UNIT
+
+
+def drawn(seed: int, number: int, low: float, high: float) -> float:
+    """Return a draw from low to high, both positive, evenly over their logarithm.
+
+    Examples
+    --------
+    >>> 2.0 < drawn(7, 0, 2.0, 8.0) < 8.0
+    True
+    """
+    return low * power(high / low, uniform(seed, number))

@@ -171,6 +171,15 @@ def _nothing(hint: Any) -> Any:
     return 0 if hint is int else 0.0 if hint is float else [0.0] * len(get_args(hint))
 
 
+def put_fields(record: Any, values: Any) -> None:
+    """Put a named tuple into a record of numpy's; sequences stand elsewhere."""
+    for (name, _), value in zip(fields_of(type(values)), values, strict=True):
+        if hasattr(value, "_fields"):
+            put_fields(record[name], value)
+        elif name in (record.dtype.names or ()):
+            record[name] = value
+
+
 def record_reader(name: str, kind: type[Kind]) -> Callable[..., Kind]:
     """Return the function `name(record)` that reads a named tuple with those in it; a compiler gets it as text.
 

@@ -19,6 +19,7 @@ from servotwin.models.state.records import record_of, rows_of
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.control import Firm
 from servotwin.models.terms.firmware import Firmware
+from servotwin.models.terms.given import Given
 from servotwin.models.terms.numbers import Numbers
 from servotwin.simulation.compile.kinds import (
     BOOL,
@@ -110,9 +111,38 @@ def _of_buses() -> Mapping[str, tuple[Kind, ...]]:
             "bus_batch:look": (*own, *room, _TABLE), "cosim_lanes:break_up": (_INDICES, shared, _ROWS)}
 
 
+@cache
+def _of_the_bench() -> Mapping[str, tuple[Kind, ...]]:
+    """Return what entries are called with that let servos go on at a bench that is looked at."""
+    from servotwin.models.engine.bus.bus_inputs import Tables
+    from servotwin.models.engine.bus.bus_records import Mate, Seat, Shared
+    from servotwin.models.engine.bus.event_log import Tape
+    from servotwin.models.engine.live.making import Weights
+    from servotwin.models.engine.live.posts import Post, Told
+    from servotwin.models.engine.live.sender import Sender
+
+    posts, sender, programs = _records(record_of(Post)), _records(record_of(Sender)), _records(record_of(Firmware))
+    told = _tuple(Told, _TABLE, edges=_FLOATS)
+    tables = _tuple(Tables, _INDICES, torques=_TABLE, curves=_TABLE)
+    bus = (_LANES, tables, _records(record_of(Shared)), _records(record_of(Seat)), _records(record_of(Mate)),
+           _tuple(Tape, _TABLE, numbers=_FLOATS, used=_INDICES))
+    going = (FLOAT64, FLOAT64, INT64, _CUBE, _CUBE, _CUBE, _INDICES)
+    return {"bench:make": (posts, programs, INT64, INT64, _records(record_of(Given)), _records(record_of(Weights))),
+            "bench:begin": (posts, INT64, told, _MEMORIES), "bench:change": (posts, INT64, _MEMORIES),
+            "bench:take": (posts, INT64, INT64, INT64, _FLOATS, _FLOATS, _FLOATS, FLOAT64, _TABLE, _FLOATS),
+            "bench:count": (FLOAT64, FLOAT64, INT64, FLOAT64),
+            "bench:draw": (INT64, INT64, FLOAT64, FLOAT64),
+            "bench:look": (posts, INT64, told, programs, _MEMORIES, _CUBE, _INDICES),
+            "bench:tune": (sender, FLOAT64), "bench:snapped": (sender, FLOAT64), "bench:next_edge": (sender,),
+            "bench:advance": (posts, told, programs, _MEMORIES, sender, *going),
+            "bench:advance_together": (posts, told, programs, _MEMORIES, sender, *bus, *going)}
+
+
+_OF_BENCH = ("make", "begin", "change", "take", "count", "draw", "look", "tune", "snapped", "next_edge", "advance",
+             "advance_together")
 _ELSEWHERE: Mapping[str, Callable[[], Mapping[str, tuple[Kind, ...]]]] = {  # where kinds take more than lanes have
     "digital_batch:go_on": _of_ticks, "leg_runs:go_on": _of_ticks, "leg_runs:go_on_nearly": _of_ticks,
-    "coupled_runs:go_on": _of_ticks,
+    "coupled_runs:go_on": _of_ticks, **{f"bench:{name}": _of_the_bench for name in _OF_BENCH},
     "bus_batch:go_on": _of_buses, "bus_batch:look": _of_buses, "cosim_lanes:break_up": _of_buses}
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import random
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.errors import InputError, UnknownNameError
+from servotwin.models.state.noise import drawn
 from servotwin.parameters import load_servo
 from servotwin.parameters.servo import unit_of
 from servotwin.units import is_finite
@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 
 BASE = "hitec-hs-755hb"
 """The servo that it is made of."""
-_GOOD, _FAIR = 0.05, 0.15  # of the truth
+FRICTION = "friction.coulomb_torque"
+SEEDS = 2**31 - 1
+GOOD, FAIR = 0.05, 0.15  # of the truth
 
 
 class Hidden(NamedTuple):
@@ -35,10 +37,10 @@ HIDDEN = (
     Hidden("electronics.stretcher_gain", "drive time per pulse error", 0.4, 1.8),
     Hidden("motor.armature_resistance", "resistance of motor and bridge", 0.7, 1.6),
     Hidden("motor.rotor_inertia", "inertia of the rotor", 0.4, 3.0),
-    Hidden("friction.coulomb_torque", "friction at the motor, both ways alike", 0.5, 2.0),
+    Hidden(FRICTION, "friction at the motor, both ways alike", 0.5, 2.0),
 )
 """What is hidden."""
-_BOTH_WAYS = ("friction.coulomb_torque_forward", "friction.coulomb_torque_backward")
+BOTH_WAYS = ("friction.coulomb_torque_forward", "friction.coulomb_torque_backward")
 
 
 def mystery_servo(seed: int) -> Servo:
@@ -51,7 +53,7 @@ def mystery_servo(seed: int) -> Servo:
     """
     values: dict[str, float | str | tuple[float, ...] | None] = {}
     for name, value in truth(seed).items():
-        values |= dict.fromkeys(_BOTH_WAYS, value) if name == "friction.coulomb_torque" else {name: value}
+        values |= dict.fromkeys(BOTH_WAYS, value) if name == FRICTION else {name: value}
     return replace(load_servo(BASE), name="mystery", title=f"Mystery servo {seed}").replace(values)
 
 
@@ -67,18 +69,13 @@ def mystery_scene(seed: object) -> Scene:
     from servotwin.web.live.scene_servo import SceneServo
 
     if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**31:
-        raise InputError("seed of a mystery servo", got=seed, allowed="a whole number from 0 to 2147483647")
+        raise InputError("seed of a mystery servo", got=seed, allowed=f"a whole number from 0 to {SEEDS}")
     return Scene(servos=(SceneServo(mystery=seed, model="PulseServo"),), name=f"Mystery servo {seed}")
 
 
 def truth(seed: int) -> dict[str, float]:
     """Return the hidden numbers behind a seed (SI), each drawn evenly over the logarithm of its range."""
-    base, draw = load_servo(BASE), random.Random(f"mystery {seed}")
-    found = {}
-    for name, _, low, high in HIDDEN:
-        usual: Any = base.get(_BOTH_WAYS[0] if name == "friction.coulomb_torque" else name)
-        found[name] = float(usual) * low * (high / low) ** draw.random()
-    return found
+    return {one["name"]: drawn(seed, k, one["low"], one["high"]) for k, one in enumerate(unknowns())}
 
 
 def unknowns() -> list[dict[str, Any]]:
@@ -91,7 +88,7 @@ def unknowns() -> list[dict[str, Any]]:
     """
     base, found = load_servo(BASE), []
     for name, meaning, low, high in HIDDEN:
-        own = _BOTH_WAYS[0] if name == "friction.coulomb_torque" else name
+        own = BOTH_WAYS[0] if name == FRICTION else name
         usual: Any = base.get(own)
         found.append({"name": name, "meaning": meaning, "unit": unit_of(own), "low": low * usual, "high": high * usual})
     return found
@@ -127,7 +124,7 @@ def compare(seed: int, guess: object) -> list[dict[str, Any]]:
     rows = []
     for name, value in hidden.items():
         error = None if name not in guess else float(guess[name]) / value - 1.0
-        said = ("not guessed" if error is None else "found" if abs(error) <= _GOOD else "near" if abs(error) <= _FAIR
+        said = ("not guessed" if error is None else "found" if abs(error) <= GOOD else "near" if abs(error) <= FAIR
                 else "off")
         rows.append({"name": name, "truth": value if error is not None else None, "guess": guess.get(name),
                      "error": error, "said": said})
@@ -142,7 +139,7 @@ def is_hidden(name: str) -> bool:
     >>> is_hidden("electronics.deadband"), is_hidden("gear.gear_reduction")
     (True, False)
     """
-    return name in _BOTH_WAYS or any(name == one.name for one in HIDDEN)
+    return name in BOTH_WAYS or any(name == one.name for one in HIDDEN)
 
 
 def known_of(now: Servo) -> Servo:
@@ -177,7 +174,7 @@ def sought() -> dict[str, tuple[float, float]]:
     reduction: Any = load_servo(BASE).get("gear.gear_reduction")
     found = {}
     for one in unknowns():
-        at_output = one["name"] == "friction.coulomb_torque"
+        at_output = one["name"] == FRICTION
         times = reduction if at_output else 1.0
         found["output_coulomb_torque" if at_output else one["name"]] = (times * one["low"], times * one["high"])
     return found
@@ -193,8 +190,8 @@ def guess_of(servo: Servo, unsure: Collection[str] = ()) -> dict[str, float]:
     """
     found = {}
     for name, *_ in HIDDEN:
-        friction = name == "friction.coulomb_torque"
-        value: Any = servo.get(_BOTH_WAYS[0] if friction else name)
+        friction = name == FRICTION
+        value: Any = servo.get(BOTH_WAYS[0] if friction else name)
         if ("output_coulomb_torque" if friction else name) not in unsure and isinstance(value, float):
             found[name] = value
     return found

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,10 +9,8 @@ from servotwin.errors import InputError
 from servotwin.units import is_finite
 from servotwin.web.live.commands import checked_command
 from servotwin.web.live.control_circuit import checked_control
-
-_MOST_PUSH = 1e3  # N m: beyond any servo
-RATES = (1.0, 2000.0)
-"""Lowest and highest frame rate of the transmitter [Hz]."""
+from servotwin.web.live.rules import checked as by_rule
+from servotwin.web.live.said import ACTIONS, FOR_ALL
 
 
 @dataclass(frozen=True)
@@ -86,58 +83,15 @@ def checked(time: float, kind: Any, value: Any, servo: Any, servos: int) -> Acti
     InputError
         If there is no such action.
     """
-    if not isinstance(kind, str) or kind not in _CHECKS:
-        raise InputError("kind of action", got=kind, allowed=", ".join(_CHECKS))
+    if not isinstance(kind, str) or kind not in ACTIONS:
+        raise InputError("kind of action", got=kind, allowed=", ".join(ACTIONS))
     if servo is not None and (isinstance(servo, bool) or not isinstance(servo, int) or not 0 <= servo < servos):
         raise InputError("servo of an action", got=servo, allowed=f"a whole number from 0 to {servos - 1}")
-    if servo is not None and kind in ("frames", "control"):
+    if servo is not None and kind in FOR_ALL:
         raise InputError("servo of an action", got=servo, allowed="none: all servos hear one transmitter")
-    return Action(time, kind, _CHECKS[kind](value), servo)
+    return Action(time, kind, _LOOKS[kind](value) if kind in _LOOKS else by_rule(ACTIONS[kind], value), servo)
 
 
-def _numbers(value: Any) -> dict[str, Any]:
-    if not isinstance(value, Mapping) or not value:
-        raise InputError("numbers to set", got=value, allowed="a table of dotted names and values in SI")
-    for name, one in value.items():
-        if not isinstance(name, str) or not (is_finite(one) or isinstance(one, str)):
-            raise InputError(f"{name}", got=one, allowed="a finite number in SI, or a word")
-    return {name: one if isinstance(one, str) else float(one) for name, one in value.items()}
-
-
-def _push(value: Any) -> float:
-    if not (is_finite(value) and abs(value) <= _MOST_PUSH):
-        raise InputError("push", got=value, allowed=f"a torque of at most {_MOST_PUSH:g} N m")
-    return float(value)
-
-
-def _frames(value: Any) -> dict[str, float]:
-    if not isinstance(value, Mapping) or not value or set(value) - {"rate", "lost"}:
-        raise InputError("frames", got=value, allowed="a table of rate [Hz] and lost [share]")
-    found = {}
-    for name, (low, high) in (("rate", RATES), ("lost", (0.0, 1.0))):
-        if name in value:
-            if not (is_finite(value[name]) and low <= value[name] <= high):
-                raise InputError(f"frames: {name}", got=value[name], allowed=f"a number from {low:g} to {high:g}")
-            found[name] = float(value[name])
-    return found
-
-
-def _registers(value: Any) -> dict[str, int]:
-    if not isinstance(value, Mapping) or not value:
-        raise InputError("registers", got=value, allowed="a table of the maker's names and whole numbers")
-    for name, one in value.items():
-        if not isinstance(name, str) or not is_finite(one) or one != int(one):
-            raise InputError(f"register {name}", got=one, allowed="a whole number")
-    return {name: int(one) for name, one in value.items()}
-
-
-def _torque(value: Any) -> bool:
-    if not isinstance(value, bool):
-        raise InputError("torque", got=value, allowed="true or false")
-    return value
-
-
-_CHECKS = {"command": checked_command, "set": _numbers, "push": _push, "frames": _frames, "register": _registers,
-           "torque": _torque, "control": checked_control}
-KINDS = tuple(_CHECKS)
+_LOOKS = {"command": checked_command, "control": checked_control}  # which make something of it, too
+KINDS = tuple(ACTIONS)
 """Kinds of actions."""

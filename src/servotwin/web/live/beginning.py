@@ -82,7 +82,7 @@ def first_commands(scene: Scene, models: Sequence[Model]) -> list[Action]:
     if any(action.servo is None for action in said):
         return []
     told = {action.servo for action in said}
-    found = [(k, _middle(model)) for k, model in enumerate(models) if k not in told]
+    found = [(k, middle_of(model)) for k, model in enumerate(models) if k not in told]
     if not told and len({value for _, value in found}) == 1:
         return [Action(0.0, "command", _hold(found[0][1]))]
     return [Action(0.0, "command", _hold(value), k) for k, value in found]
@@ -94,7 +94,8 @@ def first_of(actions: Sequence[Action], servo: int) -> dict[str, Any]:
                 if action.kind == "command" and action.servo in (None, servo))
 
 
-def _middle(model: Model) -> float:
+def middle_of(model: Model) -> float:
+    """Return the middle of a model's travel, as a first command has it [deg]."""
     return round(math.degrees(mid_travel(model)), 3)
 
 

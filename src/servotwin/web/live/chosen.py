@@ -7,7 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 from servotwin.errors import InputError
-from servotwin.web.live.scene import MOST_SERVOS, SUPPLY_FIELDS, Scene
+from servotwin.web.live.said import SUPPLY_FIELDS
+from servotwin.web.live.scene import MOST_SERVOS, Scene
 from servotwin.web.live.scene_servo import SceneServo, read_scene_servo
 
 

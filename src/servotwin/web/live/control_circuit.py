@@ -7,11 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from servotwin.bench import INPUT_CONVERTER, ControlSupply, PulseGenerator
-from servotwin.errors import InputError
-from servotwin.units import is_finite
+from servotwin.web.live.rules import checked
+from servotwin.web.live.said import CONTROL
 
-CONTROL_FIELDS = ("command_share", "reference_share", "sampling_delay")
-"""What a control circuit can be given: as `servotwin.bench.ControlSupply` [1], [1], [s]."""
 _GENERATOR = PulseGenerator()
 
 
@@ -28,13 +26,7 @@ def checked_control(value: Any) -> dict[str, float]:
     >>> checked_control({"command_share": 0})
     {'command_share': 0.0}
     """
-    if not isinstance(value, Mapping) or not value or set(value) - set(CONTROL_FIELDS):
-        raise InputError("control circuit", got=value, allowed=f"a table of {', '.join(CONTROL_FIELDS)}")
-    for name, one in value.items():
-        if not is_finite(one):
-            raise InputError(f"{name} of the control circuit", got=one, allowed="a finite number")
-    found = {name: float(one) for name, one in value.items()}
-    ControlSupply(**found)
+    found: dict[str, float] = checked(CONTROL, value)
     return found
 
 

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
 KINDS = ("csv", "script", "servo", "scene")
 """Kinds of files."""
-_STEP = 1e-3  # s
-_APART = 1e-9  # s: times that are nearer are one
-_SCRIPT = '''"""{title}: what was done at the bench, once more.
+STEP = 1e-3  # s
+APART = 1e-9  # s: times that are nearer are one
+SCRIPT = '''"""{title}: what was done at the bench, once more.
 
 It needs servotwin and nothing else: python {name}
 """
@@ -103,11 +103,11 @@ def script(scene: Scene) -> str:
     if "'''" in text:
         raise InputError("script of this bench", got="three quotes in a name", allowed="texts without them")
     title = (scene.name or "A bench").replace("\\", "/").replace('"', "'")
-    return _SCRIPT.format(title=title, name="bench.py", text=text)
+    return SCRIPT.format(title=title, name="bench.py", text=text)
 
 
 def _table(scene: Scene, servo: int, progress: Callable[[float], object] | None) -> str:
-    run = replay(scene, output_step=_STEP, switches=False, progress=progress)
+    run = replay(scene, output_step=STEP, switches=False, progress=progress)
     out = io.StringIO()
     write_csv(out, _as_heard(run[servo], run.pulses[servo]), run.units)
     return out.getvalue()
@@ -119,10 +119,10 @@ def _as_heard(columns: Mapping[str, Array], pulses: Array) -> dict[str, Array]:
     A bench that stands at an edge has not heard its pulse yet; of a log this is the first sample of the new one.
     """
     time = columns["time"]
-    keep = np.append(np.diff(time) > _APART, True)
+    keep = np.append(np.diff(time) > APART, True)
     table = {name: values[keep] for name, values in columns.items()}
     sent = pulses[pulses[:, 1] > 0.0]
     if "pulse_width" in table and len(sent):
-        frame = np.searchsorted(sent[:, 0], table["time"] + _APART, side="right") - 1
+        frame = np.searchsorted(sent[:, 0], table["time"] + APART, side="right") - 1
         table["pulse_width"] = np.where(frame >= 0, sent[np.maximum(frame, 0), 1], table["pulse_width"])
     return table

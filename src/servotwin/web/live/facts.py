@@ -12,9 +12,9 @@ from servotwin.models import DigitalServo
 from servotwin.models.outputs import SIGNALS
 from servotwin.models.terms.wiring import PULSE_RANGE
 from servotwin.parameters import GROUPS
-from servotwin.simulation.sight import names_of
 from servotwin.units import factor, si_unit
 from servotwin.web.live.beginning import load_of
+from servotwin.web.live.lines import names_of
 from servotwin.web.live.registers import register_facts
 from servotwin.web.live.scene_servo import SERVO_MODELS, model_named
 

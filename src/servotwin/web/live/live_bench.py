@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -16,7 +16,8 @@ from servotwin.units import is_finite
 from servotwin.web.live.actions import Action, checked
 from servotwin.web.live.beginning import first_commands, first_of, load_of, models_of
 from servotwin.web.live.rest_watch import RestWatch
-from servotwin.web.live.scene import LONGEST, MOST_ACTIONS, Scene
+from servotwin.web.live.said import LONGEST
+from servotwin.web.live.scene import MOST_ACTIONS, Scene
 from servotwin.web.live.scene_servo import family_of, with_registers
 from servotwin.web.live.shared_supply import SharedSupply
 from servotwin.web.live.station import Row, Seen, Station
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from servotwin.parameters import Servo
 
 _AT_FIRST = 200  # actions at t = 0 that are done at once: what scenes have
-_WHOLE = ("command", "push", "torque")  # of these the last at an instant is all that counts
+WHOLE = ("command", "push", "torque")  # of these the last at an instant is all that counts
 
 
 class ServoPush(NamedTuple):
@@ -207,10 +208,10 @@ class LiveBench:
     def _go_on(self, until: float, rate: float, switches: bool, rows: list[list[Row]],
                pulses: list[list[tuple[float, float]]], events: list[tuple[float, str, int]]) -> None:
         if until > self.time:
-            edges, times = self._sender.until(until), looks(self.time, until, rate)
+            edges = self._sender.until(until)
             for k, station in enumerate(self._stations):
                 pulses[k] += station.told.hear(edges)
-            for k, seen in enumerate(self._seen(until, times, switches)):
+            for k, seen in enumerate(self._seen(until, rate, switches)):
                 rows[k] += seen.rows
                 self.rows[k] = rows[k][-1] if rows[k] else self.rows[k]
                 events += [(time, kind, k) for time, kind in seen.events]
@@ -229,10 +230,10 @@ class LiveBench:
                 full = station.model.value("supply.open_circuit_voltage")
                 station.told.look(self.time, row[columns.index("bus_voltage")], full)
 
-    def _seen(self, until: float, times: Sequence[float], switches: bool) -> list[Seen]:
+    def _seen(self, until: float, rate: float, switches: bool) -> list[Seen]:
         if self._supply is not None:
-            return self._supply.advance(until, times, switches=switches)
-        return [station.advance(until, times, switches=switches) for station in self._stations]
+            return self._supply.advance(until, rate, switches=switches)
+        return [station.advance(until, rate, switches=switches) for station in self._stations]
 
     def _catch_up(self, most: float = math.inf) -> None:
         """Do what the scene says was done by now, or, in a hurry, some of it."""
@@ -249,7 +250,7 @@ class LiveBench:
         for watch in self._watches:
             watch.begin(self.time)
         last = self._done[-1] if len(self._done) > self._begun else None
-        if last is not None and action.kind in _WHOLE and (last.time, last.kind, last.servo) == (
+        if last is not None and action.kind in WHOLE and (last.time, last.kind, last.servo) == (
                 action.time, action.kind, action.servo):
             self._done.pop()  # a slider that is dragged while time stands
         self._done.append(action)
@@ -303,7 +304,8 @@ class LiveBench:
         def put() -> None:
             if "rate" in action.value:
                 self._sender.tune(action.value["rate"])
-            self._sender.lost = action.value.get("lost", self._sender.lost)
+            if "lost" in action.value:
+                self._sender.lose(action.value["lost"])
         self._check_rate(action.value.get("rate", 0.0))
         return [put]
 
@@ -332,18 +334,6 @@ _WAYS: dict[str, Callable[[LiveBench, Action], list[Callable[[], object]]]] = {
     "command": LiveBench._command, "set": LiveBench._set, "push": LiveBench._push, "frames": LiveBench._frames,
     "register": LiveBench._register, "torque": LiveBench._torque,
     "control": LiveBench._control}
-
-
-def looks(start: float, until: float, rate: float) -> list[float]:
-    """Return the times of a regular grid after `start`, and `until` itself [s]; `rate` is in Hz.
-
-    Examples
-    --------
-    >>> looks(0.0, 0.25, 10.0)
-    [0.1, 0.2, 0.25]
-    """
-    first, last = math.floor(start * rate) + 1, math.ceil(until * rate)
-    return [k / rate for k in range(first, last) if start < k / rate < until] + [until]
 
 
 def numbers_for(model: Model, values: dict[str, Any]) -> dict[str, Any]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import binascii
-import re
 import tomllib
 import zlib
 from collections.abc import Mapping
@@ -13,9 +12,9 @@ from itertools import pairwise
 from typing import Any
 
 from servotwin.errors import InputError, UnknownNameError
-from servotwin.units import is_finite
-from servotwin.web.live.actions import RATES, Action, action_of
-from servotwin.web.live.control_circuit import checked_control
+from servotwin.web.live.actions import Action, action_of
+from servotwin.web.live.rules import checked
+from servotwin.web.live.said import SCENE, VIEW
 from servotwin.web.live.scene_servo import SceneServo, read_scene_servo
 from servotwin.web.live.toml_text import toml_line, toml_value
 
@@ -23,14 +22,9 @@ FORMAT = 1
 MOST_SERVOS = 6
 LONGEST_TEXT = 16_000_000  # characters
 MOST_ACTIONS = 100_000
-LONGEST = 1e6  # s
-_MOST_VIEW = 4000  # characters
-_TABLES = ("load", "supply", "control", "view", "lesson")
-_TOP = ("format", "name", "seed", "frame_rate", "end", "actions", "servo", *_TABLES)
-LOAD_FIELDS = ("inertia", "viscous_friction", "torque", "coulomb_torque", "mass", "arm", "hanging_angle")
-"""What a load can have: [kg m²], [N m s/rad], [N m], [N m], [kg], [m], [rad]."""
-SUPPLY_FIELDS = ("open_circuit_voltage", "internal_resistance", "current_limit")
-"""What a supply that all share can have: [V], [ohm], [A]."""
+MOST_VIEW = 4000  # characters
+TABLES = ("load", "supply", "control", "view", "lesson")
+TOP = ("format", "name", "seed", "frame_rate", "end", "actions", "servo", *TABLES)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +83,7 @@ class Scene:
             lines += ["actions = [", *(f"  {toml_value(action.row())}," for action in self.actions), "]"]
         for servo in self.servos:
             lines += ["", "[[servo]]", *servo.lines()]
-        for key in _TABLES:
+        for key in TABLES:
             table = getattr(self, key)
             if table:
                 lines += ["", f"[{key}]", *(toml_line(name, value) for name, value in table.items())]
@@ -133,8 +127,8 @@ def read_scene(text: str) -> Scene:
         raise InputError("scene", got=f"{len(text)} characters", allowed=f"at most {LONGEST_TEXT}")
     content = _content(text)
     for key in content:
-        if key not in _TOP:
-            raise UnknownNameError("key of a scene", key, _TOP)
+        if key not in TOP:
+            raise UnknownNameError("key of a scene", key, TOP)
     if content.get("format") != FORMAT:
         raise InputError("format of a scene", got=content.get("format"), allowed=f"{FORMAT}")
     servos = content.get("servo")
@@ -148,13 +142,10 @@ def read_scene(text: str) -> Scene:
     done = tuple(action_of(row, len(servos)) for row in actions)
     if any(b.time < a.time for a, b in pairwise(done)):
         raise InputError("actions of a scene", got="times that go back", allowed="the order of their times")
-    return Scene(
-        servos=tuple(read_scene_servo(servo) for servo in servos), name=_word(content, "name"),
-        seed=_seed(content), frame_rate=_number(content, "frame_rate", 50.0, *RATES),
-        end=_number(content, "end", 0.0, 0.0, LONGEST), load=_numbers(content, "load", LOAD_FIELDS),
-        supply=_numbers(content, "supply", SUPPLY_FIELDS),
-        control=checked_control(content["control"]) if "control" in content else {},
-        actions=done, view=_view(content), lesson=_lesson(content))
+    own = {key: checked(rule, content[key]) if key in content else rule.get("usual", {})
+           for key, rule in SCENE.items()}
+    return Scene(servos=tuple(read_scene_servo(servo) for servo in servos), actions=done, view=_view(content),
+                 lesson=_lesson(content), **own)
 
 
 def checked_view(view: Any) -> dict[str, Any]:
@@ -170,13 +161,10 @@ def checked_view(view: Any) -> dict[str, Any]:
     >>> checked_view({"window": 5.0})
     {'window': 5.0}
     """
-    if not isinstance(view, Mapping) or not all(
-            isinstance(name, str) and re.fullmatch(r"[\w.-]{1,60}", name)
-            and (isinstance(one, bool | str) or is_finite(one)) for name, one in view.items()):
-        raise InputError("view", got=type(view).__name__, allowed="a table of words, numbers, true and false")
-    if sum(len(name) + len(str(one)) for name, one in view.items()) > _MOST_VIEW:
-        raise InputError("view", got="more than that", allowed=f"{_MOST_VIEW} characters in all")
-    return dict(view)
+    found: dict[str, Any] = checked(VIEW, view)
+    if sum(len(name) + len(str(one)) for name, one in found.items()) > MOST_VIEW:
+        raise InputError("view", got="more than that", allowed=f"{MOST_VIEW} characters in all")
+    return found
 
 
 def _content(text: str) -> dict[str, Any]:
@@ -188,43 +176,11 @@ def _content(text: str) -> dict[str, Any]:
         raise InputError(f"scene: not valid TOML: {error}") from None
 
 
-def _word(content: Mapping[str, Any], key: str) -> str:
-    value = content.get(key, "")
-    if not isinstance(value, str) or len(value) > 200:
-        raise InputError(f"{key} of a scene", got=value, allowed="a text of at most 200 characters")
-    return value
-
-
-def _seed(content: Mapping[str, Any]) -> int:
-    value = content.get("seed", 0)
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 2**53:
-        raise InputError("seed of a scene", got=value, allowed="a whole number of at least 0")
-    return value
-
-
-def _number(content: Mapping[str, Any], key: str, usual: float, low: float, high: float) -> float:
-    value = content.get(key, usual)
-    if not (is_finite(value) and low <= value <= high):
-        raise InputError(f"{key} of a scene", got=value, allowed=f"a number from {low:g} to {high:g}")
-    return float(value)
-
-
 def _table(content: Mapping[str, Any], key: str) -> dict[str, Any]:
     value = content.get(key, {})
     if not isinstance(value, dict):
         raise InputError(f"{key} of a scene", got=value, allowed=f"a table [{key}]")
     return value
-
-
-def _numbers(content: Mapping[str, Any], key: str, names: tuple[str, ...]) -> dict[str, float]:
-    found = {}
-    for name, value in _table(content, key).items():
-        if name not in names:
-            raise UnknownNameError(f"{key} of a scene", name, names)
-        if not is_finite(value):
-            raise InputError(f"{key}.{name} of a scene", got=value, allowed="a finite number in SI")
-        found[name] = float(value)
-    return found
 
 
 def _lesson(content: Mapping[str, Any]) -> dict[str, Any]:

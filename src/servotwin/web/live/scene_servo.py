@@ -11,16 +11,14 @@ from servotwin.errors import InputError, ParameterError, UnknownNameError
 from servotwin.parameters import REGISTER_FAMILIES, load_servo
 from servotwin.parameters.catalog import catalog_names
 from servotwin.parameters.servo_file import read_servo_text
-from servotwin.units import is_finite
+from servotwin.web.live.rules import checked
+from servotwin.web.live.said import SERVO, SOURCES
 from servotwin.web.live.toml_text import toml_line
 
 if TYPE_CHECKING:
     from servotwin.models import Model
     from servotwin.parameters import Servo
 
-_KEYS = ("id", "file", "mystery", "model", "parameters", "registers")
-_SOURCES = ("id", "file", "mystery")
-_MOST_FILE = 200_000  # characters of a servo file
 SERVO_MODELS = tuple(kind.__name__ for name, kind in models.MODELS.items() if not name.endswith("motor"))
 """Fidelities that a bench can hold."""
 
@@ -54,7 +52,7 @@ class SceneServo:
 
     def lines(self) -> list[str]:
         """Return its lines in a scene."""
-        return [toml_line(name, getattr(self, name)) for name in _KEYS
+        return [toml_line(name, getattr(self, name)) for name in SERVO["fields"]
                 if getattr(self, name) is not None and getattr(self, name) not in ("", {})]
 
     def servo(self) -> Servo:
@@ -148,32 +146,10 @@ def read_scene_servo(table: Any) -> SceneServo:
     InputError
         Or one of its kinds, if it describes none.
     """
-    if not isinstance(table, dict):
-        raise InputError("servo of a scene", got=table, allowed="a table [[servo]]")
-    for key in table:
-        if key not in _KEYS:
-            raise UnknownNameError("key of a servo of a scene", key, _KEYS)
-    if sum(key in table for key in _SOURCES) != 1:
-        raise InputError("servo of a scene", got=", ".join(key for key in _SOURCES if key in table) or "none of them",
+    found: dict[str, Any] = checked(SERVO, table)
+    if sum(key in found for key in SOURCES) != 1:
+        raise InputError("servo of a scene", got=", ".join(key for key in SOURCES if key in found) or "none of them",
                          allowed="one of id, file, mystery")
-    for key in ("id", "file", "model"):
-        if key in table and (not isinstance(table[key], str) or len(table[key]) > _MOST_FILE):
-            raise InputError(f"{key} of a servo of a scene", got=type(table[key]).__name__, allowed="a text")
-    if table.get("model", "") not in ("", *SERVO_MODELS):
-        raise UnknownNameError("model", str(table["model"]), SERVO_MODELS)
-    seed = table.get("mystery")
-    if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**53):
-        raise InputError("mystery of a servo of a scene", got=seed, allowed="a whole number of at least 0")
-    return SceneServo(id=table.get("id"), file=table.get("file"), mystery=seed, model=table.get("model", ""),
-                      parameters=_values(table, "parameters"), registers=_values(table, "registers"))
-
-
-def _values(table: dict[str, Any], key: str) -> dict[str, Any]:
-    values = table.get(key, {})
-    if not isinstance(values, dict):
-        raise InputError(f"{key} of a servo of a scene", got=values, allowed="a table of names and values")
-    for name, value in values.items():
-        if not is_finite(value) and not (key == "parameters" and isinstance(value, str)):
-            raise InputError(f"{key}: {name}", got=value, allowed="a finite number in SI, or a word")
-    return {name: int(value) if key == "registers" else value if isinstance(value, str) else float(value)
-            for name, value in values.items()}
+    if found["model"] not in ("", *SERVO_MODELS):
+        raise UnknownNameError("model", found["model"], SERVO_MODELS)
+    return SceneServo(**found)

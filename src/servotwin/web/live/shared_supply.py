@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 from servotwin.errors import InputError
 from servotwin.loads import Load
+from servotwin.models.engine.live.screen import Looks, first_look
 from servotwin.parameters.groups import Supply
 from servotwin.simulation.bus_steps import BusSteps
 from servotwin.simulation.bus_supply import MODEL_NAMES, MODELS, check_rigid, check_supply, on_supply, source_of
-from servotwin.simulation.bus_voltage import BusVoltage
-from servotwin.web.live.station import Seen, Station, with_switches
+from servotwin.web.live.station import Endless, Seen, Station
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -29,9 +29,9 @@ class SharedSupply:
     """
 
     def __init__(self, stations: Sequence[Station]) -> None:
-        self._stations, self._steps = stations, BusSteps()
+        self._stations, self._steps = stations, BusSteps([one.post for one in stations])
 
-    def advance(self, until: float, times: Sequence[float], *, switches: bool = True) -> list[Seen]:
+    def advance(self, until: float, rate: float, *, switches: bool = True) -> list[Seen]:
         """Let all go on to a time [s]; return what shows of each, as `Station.advance` does.
 
         Raises
@@ -40,17 +40,13 @@ class SharedSupply:
             If they cannot go on.
         """
         those = self._stations
-        plans, source = [one.plan for one in those], source_of(those[0].model.servo.supply)
-        stretch = self._steps.go_on(source, plans, [one.state for one in those], until, those[0].tell)
-        runs = list(zip(those, plans, stretch.segments, stretch.events, strict=True))
-        switched = {time for one, _, segments, _ in runs for time in one.switched(segments)} if switches else set()
-        looked = with_switches(times, sorted(switched))
-        bus = BusVoltage(source, len(those))
-        standing = [one.states(segments, looked) for one, _, segments, _ in runs]
-        volts = [bus.under(plans, places) for places in zip(*standing, strict=True)]
-        for one, state in zip(those, stretch.states, strict=True):
+        rows, events = [Endless(one.tell) for one in those], [Endless() for _ in those]
+        looks = Looks(first_look(those[0].state.time, rate), rate, until, 1, int(switches))
+        states = self._steps.go_on(source_of(those[0].model.servo.supply), [one.plan for one in those],
+                                   [one.state for one in those], looks, rows, events)
+        for one, state in zip(those, states, strict=True):
             one.state = state
-        return [one.seen(plan, segments, events, looked, volts) for one, plan, segments, events in runs]
+        return [one.seen(*shown) for one, *shown in zip(those, rows, events, strict=True)]
 
 
 def hung(models: Sequence[Model], load: Load, supply: Mapping[str, float]) -> tuple[Model, ...]:

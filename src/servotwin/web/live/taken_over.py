@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 from servotwin.errors import InputError
 from servotwin.units import is_finite
 from servotwin.web.live.actions import Action
-from servotwin.web.live.scene import MOST_SERVOS, SUPPLY_FIELDS, Scene
+from servotwin.web.live.said import SUPPLY_FIELDS
+from servotwin.web.live.scene import MOST_SERVOS, Scene
 from servotwin.web.live.scene_servo import SceneServo
 
 if TYPE_CHECKING:

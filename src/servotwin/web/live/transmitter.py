@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import random
-from typing import NamedTuple
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
-_SAME = 1e-9  # of a frame: instants that are nearer are one
+from servotwin.models.engine.live import sender
+from servotwin.models.engine.live.sender import Sender
 
 
 class FrameEdge(NamedTuple):
@@ -33,33 +34,34 @@ class Transmitter:
     """
 
     def __init__(self, rate: float, seed: int) -> None:
-        self.rate, self.lost, self._seed = rate, 0.0, seed
-        self._base, self._count, self._number = 0.0, 0, 0  # frames since `_base`, and in all
+        self._clock: Any = SimpleNamespace(**Sender(rate, 0.0, seed, 0.0, 0, 0, 0.0)._asdict())
+
+    @property
+    def rate(self) -> float:
+        """Frames per second [Hz]."""
+        return float(self._clock.rate)
 
     @property
     def next_edge(self) -> float:
         """When the next frame begins [s]."""
-        return self._base + self._count / self.rate
+        return sender.next_edge(self._clock)
 
     def snapped(self, time: float) -> float:
         """Return a time, or that of the edge right next to it: what is a billionth of a frame away is the edge [s]."""
-        period = 1.0 / self.rate
-        edge = self._base + round((time - self._base) / period) / self.rate
-        return edge if abs(time - edge) <= _SAME * period and edge >= self.next_edge else time
+        return sender.snapped(self._clock, time)
 
     def tune(self, rate: float) -> None:
         """Take another rate [Hz] from the next edge on."""
-        self._base, self._count, self.rate = self.next_edge, 0, rate
+        sender.tune(self._clock, rate)
+
+    def lose(self, share: float) -> None:
+        """Let a share of the frames get lost from now on."""
+        self._clock.lost = share
 
     def until(self, time: float) -> list[FrameEdge]:
         """Return the frames that begin before a time [s] and were not returned yet."""
         edges = []
         while (edge := self.next_edge) < time:
-            edges.append(FrameEdge(edge, not self._is_lost(self._number)))
-            self._count, self._number = self._count + 1, self._number + 1
+            edges.append(FrameEdge(edge, not sender.is_lost(self._clock)))
+            sender.pass_edge(self._clock)
         return edges
-
-    def _is_lost(self, number: int) -> bool:
-        if self.lost in (0.0, 1.0):
-            return self.lost == 1.0
-        return random.Random(f"{self._seed}:{number}").random() < self.lost  # the same whatever came before

@@ -11,8 +11,8 @@ from servotwin.units import is_finite
 SPEEDS = (1e-6, 10.0)
 """Slowest and fastest speed that may be asked for [s of the bench per s]."""
 UNPACED = "unpaced"
-_OVER = 1.0  # s on the wall over which the pace is measured
-_LATE = 0.1  # s on the wall: a debt of more is dropped
+OVER = 1.0  # s on the wall over which the pace is measured
+LATE = 0.1  # s on the wall: a debt of more is dropped
 
 
 class Pace:
@@ -73,10 +73,10 @@ class Pace:
 
     def went(self, *, now: float, bench: float) -> None:
         """Take note of how far bench time has come; a debt that is too large is dropped, and told."""
-        if math.isfinite(self.speed) and self.target(now=now, bench=bench) - bench > _LATE * self.speed:
-            self._from, self._late_until = (now, bench), now + _OVER
+        if math.isfinite(self.speed) and self.target(now=now, bench=bench) - bench > LATE * self.speed:
+            self._from, self._late_until = (now, bench), now + OVER
         self._went.append((now, bench))
-        while len(self._went) > 2 and self._went[1][0] <= now - _OVER:
+        while len(self._went) > 2 and self._went[1][0] <= now - OVER:
             self._went.popleft()
 
     @property

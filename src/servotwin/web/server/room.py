@@ -25,8 +25,12 @@ if TYPE_CHECKING:
 
 RATE = 60.0
 """Pushes a second."""
-_POINTS = 3.0  # of a push: 180 a second are more than a screen has columns
-_COARSEST = 120.0  # Hz: of points, however fast time goes
+POINTS = 3.0  # of a push: 180 a second are more than a screen has columns
+COARSEST = 120.0  # Hz: of points, however fast time goes
+FRAME_POINTS = 20.0  # of a single frame
+TICK = 1e-3  # s, of a bus servo
+ROUNDING = 1e-12  # of an instant: the share that does not count
+FAR = 1e3  # s, at most at once
 _TOLD_AGAIN = 0.2  # s between two messages of what has changed, at least
 _ASIDE = 5.0  # times as long as it takes to put such a message together
 _MOST_LOOKS = 3  # at a bench that changes while its state is put together
@@ -136,7 +140,7 @@ class Room:
                              allowed="one that stands")
         self.pace.run(False, now=_now(), bench=self.bench.time)
         until = self._next_frame()
-        push = self._stint.to(until, max(_COARSEST, 20.0 / (until - self.bench.time)))
+        push = self._stint.to(until, max(COARSEST, FRAME_POINTS / (until - self.bench.time)))
         self._stand_if_broken()
         self._push(push)
 
@@ -148,9 +152,9 @@ class Room:
     def _next_frame(self) -> float:
         bench = self.bench
         if not any("pulse_width" in columns for columns in bench.columns):
-            return bench.time + 1e-3
+            return bench.time + TICK
         edge = bench.next_edge
-        return edge if edge > bench.time * (1.0 + 1e-12) else edge + 1.0 / bench.frame_rate
+        return edge if edge > bench.time * (1.0 + ROUNDING) else edge + 1.0 / bench.frame_rate
 
     # --- time ---------------------------------------------------------------------------------------------------------
 
@@ -172,12 +176,12 @@ class Room:
         bench, pace = self.bench, self.pace
         if self.replaying:
             if all(box.free for box in self.outboxes):
-                self._push(self._stint.until(self._end, _COARSEST))
+                self._push(self._stint.until(self._end, COARSEST))
                 pace.begin(now=_now(), bench=bench.time)
         elif pace.running:
-            target = min(pace.target(now=_now(), bench=bench.time), bench.time + 1e3)
+            target = min(pace.target(now=_now(), bench=bench.time), bench.time + FAR)
             speed = pace.speed if math.isfinite(pace.speed) else 1.0
-            pushed = self._stint.until(target, max(_COARSEST, _POINTS * RATE / speed))
+            pushed = self._stint.until(target, max(COARSEST, POINTS * RATE / speed))
             pace.went(now=_now(), bench=bench.time)
             self._push(pushed)
         self._stand_if_broken()

@@ -12,10 +12,10 @@ from servotwin.web.server.wire import line_of
 if TYPE_CHECKING:
     from servotwin.web.live import LiveBench
 
-_BUDGET = 0.010  # s of computing in a turn
-_SHORT, _LONG = 0.2 * _BUDGET, 0.5 * _BUDGET  # s of computing: a stretch of less, and of more, is given another length
-_FIRST = 5e-4  # s of bench time: the first stretch, of which nothing is known yet
-_LONGEST = 0.1  # s: one that begins at rest may go on in motion, which costs a thousand times as much
+BUDGET = 0.010  # s of computing in a turn
+SHORT, LONG = 0.2 * BUDGET, 0.5 * BUDGET  # s of computing: a stretch of less, and of more, is given another length
+FIRST = 5e-4  # s of bench time: the first stretch, of which nothing is known yet
+LONGEST = 0.1  # s: one that begins at rest may go on in motion, which costs a thousand times as much
 PATIENCE = 1.0
 """How long a stretch may take [s]: then the bench stands."""
 
@@ -38,7 +38,7 @@ class Stint:
 
     def __init__(self, bench: LiveBench) -> None:
         self._bench = bench
-        self._stretch = _FIRST
+        self._stretch = FIRST
         self._ends = self._stands = 0.0
         self.broken: str | None = None
         """Why it cannot go on, in a line."""
@@ -46,19 +46,19 @@ class Stint:
 
     def begin(self) -> None:
         """Forget how fast it was: its numbers are others."""
-        self._stretch = _FIRST
+        self._stretch = FIRST
 
     def until(self, target: float, points: float) -> Push:
         """Let it go on to a time [s], but for no longer than a turn may take; return what shows, at a rate [Hz]."""
-        self._ends, pushes = _now() + _BUDGET, [self._nothing()]
+        self._ends, pushes = _now() + BUDGET, [self._nothing()]
         while (self._bench.due or not self._bench.reached(target)) and self.broken is None and _now() < self._ends:
             before, at = self._bench.time, _now()
             pushes.append(self.to(max(min(target, before + self._stretch), before), points))
             spent = _now() - at
-            if spent < _SHORT:
-                self._stretch = min(4.0 * self._stretch, _LONGEST)
-            elif spent > _LONG:
-                self._stretch = max(0.5 * self._stretch, _FIRST)
+            if spent < SHORT:
+                self._stretch = min(4.0 * self._stretch, LONGEST)
+            elif spent > LONG:
+                self._stretch = max(0.5 * self._stretch, FIRST)
         return joined(pushes)
 
     def to(self, until: float, points: float) -> Push:

@@ -70,6 +70,7 @@ class Seat(NamedTuple):
     period: float  # of its frames; 0: as listed
     accuracy: float  # of what is integrated [rad]
     clock: float  # its time now
+    before: float  # the same, while it is looked at ahead of it
     late: float  # by how much its clock is ahead of that of the bus
     until: float  # when it has gone far enough
     end: float  # when the run is over: then, or before

@@ -70,7 +70,7 @@ def through(told: Any, firms: Any, count: int, shared: Any, seats: Any, mates: A
     status, when = COMPLETED, seats[0].origin + seats[0].point.time
     while status == COMPLETED and seats[0].point.time < seats[0].until:
         for j in range(count):
-            _be_ready(inputs_at(told, seats[j]), seats[j], firms, shared, j == 0)
+            be_ready(inputs_at(told, seats[j]), seats[j], firms, shared, j == 0)
         first = seats[0].point.time
         last = seats[0].until <= first + _SPAN
         for j in range(count):
@@ -83,7 +83,7 @@ def through(told: Any, firms: Any, count: int, shared: Any, seats: Any, mates: A
     return status, when
 
 
-def _be_ready(inputs: Inputs, seat: Any, firms: Any, shared: Any, first: bool) -> None:
+def be_ready(inputs: Inputs, seat: Any, firms: Any, shared: Any, first: bool) -> None:
     """Let a servo be ready to go on, and its clock count from later on where that is due; the bus has the first's."""
     memory = resumed(True, inputs, bus_unit.memory_in(seat, firms), False)
     while due(memory):
@@ -99,24 +99,24 @@ def run(told: Any, firms: Any, count: int, shared: Any, seats: Any, mates: Any, 
     """Go on to the end of the run, or until the tape is full; return a status and when, by the clock of the bus [s]."""
     idle, status = 0, COMPLETED
     time, until = seats[0].clock, seats[0].end
-    _take_up(count, shared, seats, mates)
+    take_up(count, shared, seats, mates)
     for j in range(count):
         bus_unit.plan_ahead(seats[j], bus_unit.edge_of(seats[j], inputs_at(told, seats[j]), firms), until)
     while time < until:
         if event_log.is_full(written, count):
             status = PAUSED
             break
-        status = _act(told, firms, count, shared, seats, mates, written, time, until)
+        status = act(told, firms, count, shared, seats, mates, written, time, until)
         if status == COMPLETED:
-            status = _go_on(count, shared, seats, mates, written, time, until)
+            status = carry_on(count, shared, seats, mates, written, time, until)
         if status != COMPLETED:
             return status, time
-        following = _next_time(count, shared, seats, until)
+        following = next_time(count, shared, seats, until)
         idle = idle + 1 if following == time else 0
         if idle > MOST_IDLE * count:
             return CHATTER, time
         time = following
-        status = _come(count, shared, seats, mates, written, time, until)
+        status = come(count, shared, seats, mates, written, time, until)
         if status != COMPLETED:
             return status, time
     for j in range(count):
@@ -126,7 +126,7 @@ def run(told: Any, firms: Any, count: int, shared: Any, seats: Any, mates: Any, 
     return status, time
 
 
-def _take_up(count: int, shared: Any, seats: Any, mates: Any) -> None:
+def take_up(count: int, shared: Any, seats: Any, mates: Any) -> None:
     """Take up the common motion that those who have joined are in, if they are told the same as then."""
     for j in range(count):
         if seats[j].joined >= 0 and seats[j].point.anchor_time == math.inf:
@@ -139,7 +139,7 @@ def _take_up(count: int, shared: Any, seats: Any, mates: Any) -> None:
         coupled_motion.resume(shared, mates)
 
 
-def _next_time(count: int, shared: Any, seats: Any, until: float) -> float:
+def next_time(count: int, shared: Any, seats: Any, until: float) -> float:
     """Return when anything happens next, by the clock of the bus [s]."""
     following = min(shared.end, until) if shared.phase == TOGETHER else until
     for j in range(count):
@@ -148,7 +148,7 @@ def _next_time(count: int, shared: Any, seats: Any, until: float) -> float:
     return float(following)
 
 
-def _come(count: int, shared: Any, seats: Any, mates: Any, written: Tape, time: float, until: float) -> int:
+def come(count: int, shared: Any, seats: Any, mates: Any, written: Tape, time: float, until: float) -> int:
     """Let all clocks show a time of the bus [s], and those arrive that have got somewhere; return a status."""
     for j in range(count):
         seat = seats[j]
@@ -174,7 +174,7 @@ def _come(count: int, shared: Any, seats: Any, mates: Any, written: Tape, time: 
 # --- what chips and loads do ------------------------------------------------------------------------------------------
 
 
-def _act(told: Any, firms: Any, count: int, shared: Any, seats: Any, mates: Any, written: Tape, time: float,
+def act(told: Any, firms: Any, count: int, shared: Any, seats: Any, mates: Any, written: Tape, time: float,
          until: float) -> int:
     """Do what is due at a time of the bus [s]: first switch, then measure, then put new duties on; return a status."""
     busy = False
@@ -318,7 +318,7 @@ def bus_voltage(count: int, shared: Any, seats: Any, mates: Any, time: float) ->
 # --- motions ----------------------------------------------------------------------------------------------------------
 
 
-def _go_on(count: int, shared: Any, seats: Any, mates: Any, written: Tape, time: float, until: float) -> int:
+def carry_on(count: int, shared: Any, seats: Any, mates: Any, written: Tape, time: float, until: float) -> int:
     """Take up motions where there are none, or no longer the right ones; return a status."""
     status, kept, before, connected = COMPLETED, True, False, 0
     for j in range(count):

@@ -1,11 +1,12 @@
 // The bench as the page knows it: what it is, what it has shown, and how to do something at it.
 
 import { History } from "./history.js";
+import { connect } from "./line.js";
 
 const AGAIN = [500, 1000, 2000, 4000, 8000]; // ms until the next attempt
 const LOOKS = 400; // ms of rest until what is looked at is kept
 
-/** @typedef {{n: number, m: number, columns: string[]}} Part */
+/** @typedef {import("./line.js").Part} Part */
 /** @typedef {{t: number, pace: number, speed: number|string, running: boolean, behind: boolean, replaying: number|null,
  *             lcd: Record<string, number|null>[], events: [number, string, number][], servos: Part[]}} Header */
 
@@ -37,24 +38,14 @@ export class Bench extends EventTarget {
     this.looks = 0;
     this.full = "";
     this.kept = ""; // the text of the bench, to go on with after the line was cut
-    /** @type {WebSocket|null} */
-    this.socket = null;
+    /** @type {ReturnType<typeof connect>|null} */
+    this.line = null;
   }
 
   get role() { return this.hello.role ?? "own"; }
   get running() { return this.header ? this.header.running : Boolean(this.state.running); }
 
-  open() {
-    const link = new URL("/live", location.href);
-    link.protocol = location.protocol === "https:" ? "wss:" : "ws:";
-    link.search = location.search;
-    const socket = new WebSocket(link);
-    socket.binaryType = "arraybuffer";
-    this.socket = socket;
-    socket.onmessage = (event) => (typeof event.data === "string"
-      ? this.told(JSON.parse(event.data)) : this.pushed(event.data));
-    socket.onclose = (event) => this.closed(event);
-  }
+  open() { this.line = connect(this); }
 
   /**
    * Do something now.
@@ -75,7 +66,7 @@ export class Bench extends EventTarget {
     this.number += 1;
     const id = this.number;
     const answer = new Promise((done, failed) => this.waiting.set(id, { done, failed }));
-    if (this.socket && this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify({ ...message, id }));
+    if (this.line?.open) this.line.say({ ...message, id });
     else this.answered(id, null, "the bench is not connected");
     return answer;
   }
@@ -130,7 +121,7 @@ export class Bench extends EventTarget {
     Object.assign(this.view, changes);
     clearTimeout(this.looks);
     this.looks = window.setTimeout(() => {
-      if (this.role !== "watcher" && this.socket?.readyState === WebSocket.OPEN) this.tell({ view: this.view });
+      if (this.role !== "watcher" && this.line?.open) this.tell({ view: this.view });
     }, LOOKS);
   }
 
@@ -155,10 +146,15 @@ export class Bench extends EventTarget {
     const again = this.attempt > 0;
     this.attempt = 0;
     this.emit("hello", hello);
-    const packed = location.hash.slice(1);
     if (hello.role === "watcher") return;
     if (again && this.kept) this.tell({ scene: this.kept });
-    else if (packed.startsWith("lesson=")) this.tell({ lesson: decodeURIComponent(packed.slice(7)) });
+    else this.begin();
+  }
+
+  /** Begin with what the link of the page carries. */
+  begin() {
+    const packed = location.hash.slice(1);
+    if (packed.startsWith("lesson=")) this.tell({ lesson: decodeURIComponent(packed.slice(7)) });
     else if (packed.startsWith("mystery=")) this.tell({ mystery: Number(packed.slice(8)) });
     else if (packed) this.tell({ fragment: packed });
   }
@@ -177,20 +173,12 @@ export class Bench extends EventTarget {
     this.emit("scene", state);
   }
 
-  /** @param {ArrayBuffer} data */
-  pushed(data) {
-    const length = new DataView(data).getUint32(0, true);
-    /** @type {Header} */
-    const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
-    let at = Math.ceil((4 + length) / 8) * 8;
+  /** @param {Header} header @param {import("./line.js").Numbers[]} parts */
+  pushed(header, parts) {
     if (header.servos.length !== this.history.length) return;
-    header.servos.forEach((part, k) => {
-      const rows = new Float64Array(data, at, part.n * part.columns.length);
-      at += rows.byteLength;
-      const pulses = new Float64Array(data, at, 2 * part.m);
-      at += pulses.byteLength;
-      if (this.history[k].width !== part.columns.length) this.history[k] = new History(part.columns);
-      this.history[k].add(rows, pulses);
+    header.servos.forEach(({ columns }, k) => {
+      if (this.history[k].width !== columns.length) this.history[k] = new History(columns);
+      this.history[k].add(parts[k].points, parts[k].pulses);
     });
     this.header = header;
     this.time = header.t;
@@ -223,7 +211,7 @@ export class Bench extends EventTarget {
 
   /** Keep the text of the bench, for when the line is cut. */
   async keep() {
-    if (this.role === "watcher" || !this.socket || this.socket.readyState !== WebSocket.OPEN) return;
+    if (this.role === "watcher" || !this.line?.open) return;
     const found = await this.tell({ text: true });
     if (found) this.kept = found.text;
   }

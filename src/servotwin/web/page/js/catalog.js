@@ -1,6 +1,7 @@
 // Which servos are on the bench: one, two beside each other, or up to six.
 
 import { choice, el, panel, svg, unique } from "./dom.js";
+import { asked } from "./line.js";
 import { engineering, plain } from "./units.js";
 
 const MOST = 6;
@@ -54,9 +55,14 @@ export function mount(root, bench) {
   /** @param {string} id */
   const curves = async (id) => {
     if (own.some((one) => one.id === id)) { picture.replaceChildren(); return; }
-    const answer = await fetch(`/api/curves/${encodeURIComponent(id)}`);
-    const found = await answer.json();
-    if (!answer.ok) { picture.replaceChildren(el("p", { class: "soft", text: found.error })); return; }
+    /** @type {any} */
+    let found;
+    try {
+      found = await asked("curves", id);
+    } catch (error) {
+      picture.replaceChildren(el("p", { class: "soft", text: error instanceof Error ? error.message : String(error) }));
+      return;
+    }
     const servo = all.find((one) => one.id === id);
     picture.replaceChildren(el("h3", { text: `${servo.title} at full drive, ${plain(found.voltage)} V` }),
       chart(found.speed, found.torque, found.current),
@@ -65,7 +71,7 @@ export function mount(root, bench) {
   };
 
   bench.on("scene", async () => {
-    if (!all.length) all = await (await fetch("/api/catalog")).json();
+    if (!all.length) all = await asked("catalog");
     const state = bench.state; // of now: it may have changed meanwhile
     own = bench.facts.flatMap((facts, keep) => (state.of_catalog[keep] ? []
       : [{ id: `here ${keep}`, title: `${facts.title} (here)`, models: facts.models, keep }]));

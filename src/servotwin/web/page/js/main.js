@@ -65,6 +65,14 @@ const settle = () => {
 narrow.addEventListener("change", settle);
 settle();
 
+const alone = el("p", { class: "alone-says soft", hidden: true });
+place("controls").append(alone);
+bench.on("hello", (hello) => { // the page as one file, which has no server
+  document.body.classList.toggle("alone", Boolean(hello.alone));
+  alone.hidden = !hello.alone;
+  alone.textContent = hello.alone ?? "";
+});
+
 const notice = place("notice");
 let quiet = 0;
 bench.on("said", (line) => {
@@ -78,5 +86,6 @@ bench.on("scene", () => {
   document.body.classList.toggle("many", bench.facts.length > 2);
 });
 setInterval(() => { if (bench.header?.running) bench.keep(); }, 5000);
+addEventListener("hashchange", () => { if (bench.role !== "watcher") bench.begin(); }); // a link that is pasted into the open page
 bench.open();
 Object.assign(window, { bench });

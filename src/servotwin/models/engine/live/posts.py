@@ -1,0 +1,201 @@
+"""Servos at a bench as kernels keep them: a record for each, the pulses that they hear, and where they begin."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from servotwin.models.engine.live import shapes
+from servotwin.models.engine.live.screen import USED, Lines, Said, Switch
+from servotwin.models.engine.live.sender import is_lost, next_edge, pass_edge
+from servotwin.models.engine.memory import Inputs, Memories, in_force, memory_at, put_memory, put_started, with_bodies
+from servotwin.models.state.modes import INSIDE, RIGID, Vector
+from servotwin.models.state.records import record_reader, record_writer
+from servotwin.models.terms import play
+from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.numbers import Numbers
+from servotwin.physics.pieces import piece_value
+
+if TYPE_CHECKING:
+    from servotwin.models.engine.live.screen import Floats
+
+UNITS = ("us", "deg", "V")
+"""Units of commands."""
+_SI = (1e-6, math.pi / 180.0, 1.0)
+NEVER = 1e9  # s: when the pulse begins that stands for those before the first
+NONE_BEFORE = Switch(0.0, 0.0, -1)
+NOTHING_SAID = Said(0.0, 0.0, -1, 0.0, 0.0, 0.0, 0)
+
+
+class Follow(NamedTuple):
+    """How a servo follows a kind of command: by a straight line, if it takes it."""
+
+    gain: float
+    offset: float
+
+
+class Post(NamedTuple):
+    """A servo at a bench."""
+
+    numbers: Numbers
+    chip: Chip
+    lines: Lines
+    width: Follow  # in the order of `UNITS`
+    angle: Follow
+    voltage: Follow
+    said: Said  # what showed of chip or program at the end of the latest stretch, on a shared supply
+    was: Switch  # how its bridge drove at the end of the latest stretch
+    lowest: float  # where it may begin [rad]
+    highest: float
+    torque: float  # of its load, constant [N m]
+    push: float  # by hand, beside it [N m]
+    accuracy: float  # of what is integrated [rad]
+    seed: int  # of its noise
+    pulsed: int  # 1: it hears a pulse a frame; 0: the command as it is
+    changed: int  # 1: its numbers are others than in the latest stretch
+    command_first: int  # its rows in the table of commands
+    command_count: int
+    curve_first: int  # in that of potentiometers
+    curve_count: int
+    heard: int  # rows of its train of pulses
+    zone: int  # its mode before its bridge switches, on a shared supply
+    contact: int
+    mesh: int
+    motor: int
+    share: int
+
+
+class Told(NamedTuple):
+    """What servos at a bench are told: a table of pieces, one of potentiometers, and edges of pulses [s]."""
+
+    commands: Floats  # the first rows are for trains, as many for each servo as there are edges
+    curves: Floats
+    edges: Floats
+
+
+numbers_of = record_reader("numbers_of", Numbers)
+chip_of = record_reader("chip_of", Chip)
+lines_of = record_reader("lines_of", Lines)
+was_of = record_reader("was_of", Switch)
+said_of = record_reader("said_of", Said)
+put_said = record_writer("put_said", Said)
+put_was = record_writer("put_was", Switch)
+put_numbers = record_writer("put_numbers", Numbers)
+put_chip = record_writer("put_chip", Chip)
+put_lines = record_writer("put_lines", Lines)
+put_follow = record_writer("put_follow", Follow)
+
+
+def take(post: Any, unit: int, shape: int, given: Floats, time: Floats, value: Floats, start: float, table: Floats,
+         ends: Floats) -> int:
+    """Put a command from a time on [s] into a table as a servo follows it; return how many pieces there are.
+
+    `ends` gets its lowest and highest value, the same of what the servo follows (SI), and of the first two their
+    pieces, and when these start [s].
+    """
+    follow = post.width if unit == 0 else post.angle if unit == 1 else post.voltage
+    count = shapes.shaped(shape, given, time, value, table)
+    shapes.scaled(table, count, _SI[unit], 0.0)
+    low, high, lowest, highest = shapes.extremes(table, count)
+    ends[0], ends[1], ends[4], ends[5] = low, high, 1.0 * lowest, 1.0 * highest
+    shapes.scaled(table, count, follow.gain, follow.offset)
+    ends[2], ends[3], _, _ = shapes.extremes(table, count)
+    for n in range(count):
+        table[n, 0] += start
+    ends[6], ends[7] = table[lowest, 0], table[highest, 0]
+    return count
+
+
+def train_of(told: Told, servos: int, k: int) -> tuple[int, int]:
+    """Return where the train of a servo begins among commands and edges, and where it ends."""
+    room = len(told.edges) // servos
+    return k * room, (k + 1) * room
+
+
+def asked(post: Any, told: Told, time: float) -> float:
+    """Return what a command asks for at a time [s]."""
+    rows = told.commands[post.command_first:post.command_first + post.command_count]
+    piece, _ = in_force(rows, 0.0, time, 0.0)
+    return piece_value(piece, time)
+
+
+def begin(posts: Any, k: int, told: Told, memories: Memories) -> None:
+    """Let a servo stand, without drive, where its first command asks for."""
+    post = posts[k]
+    first = asked(post, told, 0.0)
+    at, _ = train_of(told, len(posts), k)
+    _put_pulse(told, at, NEVER, first)
+    post.heard = 1
+    angle = min(max(post.lines.per_angle * first + post.lines.angle, post.lowest), post.highest)
+    warm = post.numbers.heat.T_amb
+    put_started(memories, k, Vector(angle, 0.0, 0.0, warm, warm, angle, 0.0),
+                INSIDE if play.present(numbers_of(post.numbers).play) else RIGID)
+    put_was(post.was, NONE_BEFORE)
+    put_said(post.said, NOTHING_SAID)
+    post.changed = 1
+
+
+def change(posts: Any, k: int, memories: Memories) -> None:
+    """Let a servo go on with the numbers that its record has by now."""
+    post = posts[k]
+    memory = with_bodies(memory_at(memories, k), post.numbers.play.half, post.numbers.elastic.k > 0.0)
+    put_memory(memories.rows[k], memory)
+    post.changed = 1
+
+
+def hear(sender: Any, posts: Any, told: Told, pulses: Any, used: Any, until: float) -> None:
+    """Let all servos hear the pulses of the frames that begin before a time [s], which are written down.
+
+    A pulse is edge and width [s], width 0 of one that is lost.
+    """
+    fresh = True
+    edge = next_edge(sender)
+    while edge < until:
+        lost = is_lost(sender)
+        for k in range(len(posts)):
+            if posts[k].pulsed == 1:
+                width = asked(posts[k], told, edge)
+                if not lost:
+                    _take(posts[k], told, train_of(told, len(posts), k)[0], edge, width, fresh)
+                n = used[USED * k + 2]
+                if n < len(pulses[k]):
+                    pulses[k][n, 0], pulses[k][n, 1] = edge, 0.0 if lost else width
+                    used[USED * k + 2] = n + 1
+        fresh = fresh and lost
+        pass_edge(sender)
+        edge = next_edge(sender)
+
+
+def _take(post: Any, told: Told, at: int, edge: float, width: float, fresh: bool) -> None:
+    """Put a pulse behind those of a stretch; the first of it comes behind the latest of the stretch before."""
+    if fresh:
+        last = at + post.heard - 1
+        post.heard = 0
+        if told.edges[last] < edge:
+            _put_pulse(told, at, told.edges[last], told.commands[last, 1])
+            post.heard = 1
+    _put_pulse(told, at + post.heard, edge, width)
+    post.heard += 1
+
+
+def _put_pulse(told: Told, n: int, edge: float, width: float) -> None:
+    told.commands[n, 0], told.commands[n, 1], told.edges[n] = edge, width, edge
+    for place in range(2, 7):
+        told.commands[n, place] = 0.0
+
+
+def pieces_of(post: Any, k: int, servos: int, told: Told) -> tuple[int, int]:
+    """Return where the pieces that a servo follows begin in the table, and how many there are."""
+    if post.pulsed == 1:
+        return train_of(told, servos, k)[0], post.heard
+    return post.command_first, post.command_count
+
+
+def inputs_of(post: Any, k: int, servos: int, told: Told, programs: Any) -> Inputs:
+    """Return what a servo is told now."""
+    curve = told.curves[post.curve_first:post.curve_first + post.curve_count]
+    first, count = pieces_of(post, k, servos, told)
+    at = train_of(told, servos, k)[0]
+    edges = told.edges[at:at + (post.heard if post.pulsed == 1 else 0)]
+    return Inputs(told.commands[first:first + count], told.curves[0:0], post.torque + post.push, 0.0, edges, curve,
+                  post.seed, post.accuracy, programs[k:k + 1])

@@ -1,0 +1,190 @@
+"""What shows of a servo at a bench: rows of all its signals at the looks and where its bridge switches, and events."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from servotwin.models.engine.events import guards
+from servotwin.models.engine.memory import Inputs, Memory, in_force, origin_of
+from servotwin.models.engine.motions import motion
+from servotwin.models.engine.motions.motion import Motion
+from servotwin.models.engine.observe import Observed, observed, told_by
+from servotwin.models.engine.step import at_pulses
+from servotwin.models.state.modes import CORE, Mode, Vector, at_rest
+from servotwin.models.terms import duty
+from servotwin.models.terms.numbers import Numbers, warm
+from servotwin.models.terms.sensor import wiper_at
+from servotwin.physics.pieces import piece_value
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Indices = NDArray[np.int64]
+
+USED, NEXT = 4, 3  # numbers of what is used: rows, events, pulses, and the number of the next look
+COMMANDS = ("command_voltage", "command_angle", "pulse_width")
+COLUMNS = ("time", *Observed._fields, "output_angle", "output_speed", *COMMANDS)
+"""What a row has, before one picks what a servo really shows (SI)."""
+WIDTH = len(COLUMNS)
+_ANGLE, _SPEED, _TORQUE = (COLUMNS.index(name) for name in ("motor_angle", "motor_speed", "motor_torque"))
+_OUTPUT = COLUMNS.index("output_angle")
+_LATE = 1e-12  # of an instant: so much before a tick it is the tick
+
+# Events besides those of guards
+STICK, REVERSAL, HELD, REFUSED, SILENCE, TRIPS = 100, 101, 102, 103, 104, 110
+SHOWN = {
+    STICK: "stick", REVERSAL: "reversal", HELD: "gear held", REFUSED: "pulse refused", SILENCE: "silence ends",
+    SILENCE + 1: "silence begins", TRIPS: "trip ends", TRIPS + 1: "trips by overload", TRIPS + 2: "trips by current",
+    TRIPS + 3: "trips by heat", TRIPS + 4: "trips by undervoltage",
+    **{code: name for code, name in enumerate(guards.EVENT_NAMES)
+       if code not in guards.KINKS and name != "zone"}}
+"""What events are called that do not come with every pulse, by their codes."""
+
+
+class Lines(NamedTuple):
+    """How what a servo follows stands for commands: straight lines, and the reduction of its gear."""
+
+    per_volt: float  # command_voltage = per_volt x + volts
+    volts: float
+    per_angle: float  # command_angle
+    angle: float
+    per_width: float  # pulse_width
+    width: float
+    reduction: float  # of the motor's shaft
+
+
+class Switch(NamedTuple):
+    """How a bridge drives: −1, 0 or +1; what it does without torque, else 0; whether pulses stay away, 1 or 0."""
+
+    drive: float
+    off: float
+    silent: int
+
+
+class Screen(NamedTuple):
+    """Room for what shows: rows of `COLUMNS`, events (time, code); how much is used, and at `NEXT` what comes."""
+
+    rows: Any
+    events: Any
+    used: Indices
+
+
+class Looks(NamedTuple):
+    """When to look: at k/rate for k from `next` on, as long as that is before `until` [s]."""
+
+    next: int
+    rate: float
+    until: float
+    at_end: int  # 1: at `until`, too
+    switches: int  # 1: just before and just after a bridge switches, too
+
+
+def first_look(start: float, rate: float) -> int:
+    """Return the number of the first look after a time [s]."""
+    k = math.floor(start * rate) + 1
+    return k + 1 if k / rate <= start else k
+
+
+class Said(NamedTuple):
+    """What shows of a chip or a program, by the names of what it remembers."""
+
+    drive: float
+    error: float
+    silent: int
+    duty: float
+    goal: float
+    r: float
+    trip: int
+
+
+def told_of(memory: Memory, program: bool) -> Said:
+    """Return what shows of a chip or a program now; it may change in place."""
+    chip = memory.chip
+    if not program:
+        return Said(chip.drive, chip.error, chip.silent, 0.0, 0.0, 0.0, 0)
+    firm = memory.firm[0]
+    drive = math.copysign(1.0, firm.duty) if duty.drives(firm.duty) else 0.0
+    return Said(drive, chip.error, chip.silent, firm.duty, firm.goal, firm.r, firm.trip)
+
+
+def switch_of(told: Said) -> Switch:
+    """Return how a bridge drives now."""
+    return Switch(told.drive, told.duty if abs(told.duty) > 1.0 else 0.0, told.silent)
+
+
+def see(screen: Screen, lines: Lines, inputs: Inputs, memory: Memory, told: Said, m: Motion, wiper: float,
+        time: float) -> Motion:
+    """Write a row of a time [s] on a motion that began with a wiper there [rad]; return the motion, prepared for it."""
+    if screen.used[0] >= len(screen.rows):
+        return m
+    local = time - origin_of(memory)
+    age = local - m.t0
+    if motion.is_step(m) and 0.0 < age < m.length:
+        m = motion.prepared(m)
+    y = motion.state(m, age)
+    write(screen, lines, inputs, told, warm(m.numbers, y), m.mode, piece_value(m.u, local), piece_value(m.tau, local),
+          y, wiper_at(m.numbers.sensor, wiper, y.q), time)
+    return m
+
+
+def see_before(screen: Screen, lines: Lines, inputs: Inputs, numbers: Numbers, before: Memory, told: Said) -> None:
+    """Write a row of a servo as it stood at the end of a motion, before its bridge switches."""
+    if screen.used[0] >= len(screen.rows):
+        return
+    point = before.point
+    time = origin_of(before) + point.time
+    now = duty.at_duty(numbers, told.duty) if duty.present(numbers.bridge) else at_pulses(numbers, told.silent)
+    write(screen, lines, inputs, told, warm(now, point.y), point.mode, piece_value(before.u, time),
+          piece_value(before.tau, time), point.y, point.wiper, time)
+
+
+def write(screen: Screen, lines: Lines, inputs: Inputs, told: Said, numbers: Numbers, mode: Mode, u: float, tau: float,
+          y: Vector, wiper: float, time: float) -> None:
+    """Write a row of a servo that stands at y, whose numbers are those of this instant."""
+    n = screen.used[0]
+    shown = observed(numbers, inputs.curve, mode, u, tau, y, wiper, told.drive, told.error)
+    if duty.present(numbers.bridge):
+        shown = told_by(numbers.bridge, told, shown)
+    piece, _ = in_force(inputs.command, 0.0, time, 0.0)
+    put_row(screen.rows, n, time, shown, y, lines, piece_value(piece, time))
+    screen.used[0] = n + 1
+
+
+def put_row(rows: Any, n: int, time: float, shown: Observed, y: Vector, lines: Lines, command: float) -> None:
+    """Fill a row."""
+    rows[n, 0] = time
+    for k in range(len(shown)):
+        rows[n, 1 + k] = shown[k]
+    rows[n, _ANGLE] *= lines.reduction
+    rows[n, _SPEED] *= lines.reduction
+    rows[n, _TORQUE] /= lines.reduction
+    rows[n, _OUTPUT], rows[n, _OUTPUT + 1] = y.q, y.w
+    rows[n, _OUTPUT + 2] = lines.per_volt * command + lines.volts
+    rows[n, _OUTPUT + 3] = lines.per_angle * command + lines.angle
+    rows[n, _OUTPUT + 4] = lines.per_width * command + lines.width
+
+
+def note(screen: Screen, time: float, code: int) -> None:
+    """Write an event down."""
+    n = screen.used[1]
+    if n < len(screen.events):
+        screen.events[n, 0], screen.events[n, 1] = time, 1.0 * code
+        screen.used[1] = n + 1
+
+
+def code_of(event: int, after: Mode) -> int:
+    """Return the code of an event after which a mode holds."""
+    if event == guards.SPEED and at_rest(after.contact):
+        return STICK
+    if event == guards.SPEED and after.contact != CORE:
+        return REVERSAL
+    return event
+
+
+def reached(inputs: Inputs, memory: Memory, time: float, program: bool) -> bool:
+    """Tell whether a motion that has come as far as a memory says has gone beyond a time [s]."""
+    now = origin_of(memory) + memory.point.time
+    return time * (1.0 + _LATE) < now if program else time < now

@@ -1,0 +1,169 @@
+// The servos of a bench: what is given of them, what the panels show of them, and between what commands may be.
+
+import { Refused, filled, refuse, tidy, unknown, within, wrong } from "./check.js";
+
+/** @typedef {{time: number, kind: string, value: any, servo: number|null}} Action */
+
+export class Servo {
+  /**
+   * @param {any} world
+   * @param {any} one a servo of a scene
+   * @param {any} scene
+   * @param {import("./kernel.js").Kernel} kernel
+   */
+  constructor(world, one, scene, kernel) {
+    this.world = world;
+    this.mystery = "mystery" in one;
+    const id = this.mystery ? world.mystery.base : one.id ?? refuse("only_with_server");
+    const known = world.servos[id];
+    if (!known) unknown("servo", id, Object.keys(world.servos));
+    this.known = this.mystery ? { ...known, id: "mystery", title: filled(world.words.mystery, { seed: one.mystery }) } : known;
+    this.id = this.known.id;
+    this.model = one.model || known.model;
+    this.own = known.of[this.model] ?? refuse("no_such_model", this.model, known);
+    const { reads, family } = world.models[this.model];
+    this.family = family;
+    this.reads = new Set(reads);
+    /** @type {Map<string, any>} */
+    this.values = new Map(world.parameters.map((/** @type {any[]} */ [name], /** @type {number} */ n) => [name, known.values[n][world.of_each.indexOf("value")]]));
+    /** @type {Map<string, {value: any, source: string}>} values that are others than the catalog's */
+    this.changed = new Map();
+    this.load = { ...world.no_load, ...scene.load };
+    if (this.mystery) for (const [name, value] of Object.entries(hidden(world, kernel, one.mystery))) this.hide(name, value);
+    if (Object.keys(one.registers).length) {
+      const written = world.written[`${id} ${JSON.stringify(one.registers)}`] ?? refuse("only_with_server");
+      for (const [name, value] of Object.entries(written.values)) { this.values.set(name, value); this.changed.set(name, value); }
+      this.own = { ...this.own, loop: written.loop };
+    }
+    this.change(one.parameters);
+  }
+
+  /**
+   * Take a supply that several servos share in the place of its own.
+   * @param {Record<string, number>} supply
+   * @param {number} number of the servo, from 1 on
+   */
+  hang(supply, number) {
+    const { world } = this;
+    const [volts] = world.of_bus;
+    const given = Object.fromEntries(Object.entries(supply).map(([name, value]) => [`supply.${name}`, value]));
+    for (const name of world.of_bus) this.values.set(name, null);
+    this.change(given);
+    if (!(volts in given)) refuse("no_supply");
+    if (!world.switched.includes(this.model)) wrong(`model of servo ${number} on a shared supply`, this.model, world.words.bus_models);
+    if (this.reads.has("gear.stiffness") && Number.isFinite(this.value("gear.stiffness"))) wrong(`servo ${number} on a shared supply`, "gear.stiffness", world.words.rigid);
+  }
+
+  get columns() { return this.own.columns; }
+
+  /** @param {string} name @param {number} value */
+  hide(name, value) {
+    const { friction, both_ways: both } = this.world.mystery;
+    for (const one of name === friction ? both : [name]) this.values.set(one, value);
+  }
+
+  /** @param {string} name @returns {boolean} whether a number is not shown */
+  hides(name) {
+    const { hidden: those, both_ways: both } = this.world.mystery;
+    return this.mystery && (both.includes(name) || those.some((/** @type {any} */ one) => one.name === name));
+  }
+
+  /** @param {string} name @returns {any} a value, or the usual one */
+  value(name) { return this.values.get(name); }
+
+  /** @param {Record<string, any>} values by dotted names; nothing has changed where one is refused */
+  change(values) {
+    const next = new Map(this.values);
+    for (const [name, value] of Object.entries(values)) {
+      const place = this.world.parameters.findIndex((/** @type {any[]} */ own) => own[0] === name);
+      if (place < 0) unknown("parameter", name, this.world.parameters.map((/** @type {any[]} */ own) => own[0]));
+      this.looked(name, value, this.world.parameters[place]);
+      next.set(name, value);
+    }
+    for (const [low, high] of this.world.less) {
+      const [a, b] = [next.get(low), next.get(high)];
+      if (Number.isFinite(a) && Number.isFinite(b) && !(a < b)) wrong(low, a, `less than ${high} = ${b}`);
+    }
+    this.values = next;
+    for (const [name, value] of Object.entries(values)) this.changed.set(name, value);
+  }
+
+  /** @param {string} name @param {any} value @param {any[]} own what is alike of all servos */
+  looked(name, value, own) {
+    const { of_all: names, ranges } = this.world;
+    const [rule, choices, unit] = ["rule", "choices", "unit"].map((one) => own[names.indexOf(one)]);
+    if (choices) { if (!choices.includes(value)) wrong(name, value, choices.join(" or ")); }
+    else if (!(rule in ranges)) refuse("only_with_server");
+    else if (!Number.isFinite(value) || !within(ranges[rule], value)) wrong(name, value, `${rule} [${unit}]`);
+  }
+
+  /** @returns {[string, number][]} fields of what is given, as the kernel takes them */
+  given() {
+    const { given, parameters, of_all: names } = this.world;
+    return parameters.map((/** @type {any[]} */ own) => {
+      const value = this.reads.has(own[0]) ? this.values.get(own[0]) : null;
+      const choices = own[names.indexOf("choices")];
+      return [given[own[0]], value === null || value === undefined || Array.isArray(value) ? NaN : choices ? choices.indexOf(value) : value];
+    });
+  }
+
+  /**
+   * Refuse a command that goes beyond bounds.
+   * @param {any} command
+   * @param {number[][]} ends lowest and highest of the command, and of what the servo follows; their pieces, and when these start [s]
+   */
+  bound(command, ends) {
+    const bounds = this.own.bounds[command.unit] ?? this.untold(this.world.kinds[command.unit]);
+    const end = (/** @type {any} */ one, /** @type {number} */ none) => {
+      const [name, usual] = Array.isArray(one) ? one : [null, one];
+      return (name && this.value(name)) ?? usual ?? none;
+    };
+    for (const one of bounds) {
+      const [[lowest, highest], followed, pieces, starts] = ends;
+      const [least, most] = one.of === "command" ? [lowest, highest] : followed;
+      const [low, high] = [end(one.low, -Infinity), end(one.high, Infinity)];
+      const slack = one.slack ?? 0;
+      const below = one.open ? least <= low : least < low - slack;
+      if (!below && !(one.open ? most >= high : most > high + slack)) continue;
+      const [got, from, to] = [below ? least : most, low, high].map((x) => tidy(x * one.factor));
+      throw new Refused(filled(one.words, { got, low: from, high: to, name: this.id, piece: pieces[below ? 0 : 1], start: tidy(starts[below ? 0 : 1]) }));
+    }
+  }
+
+  /** Refuse a kind of command that it does not take. @param {string} word @returns {never} */
+  untold(word) {
+    const goals = this.values.get("firmware.command_kind") === "goal" && this.reads.has("firmware.command_kind");
+    return refuse(goals ? "takes_goals" : "no_such_command", null, { name: this.id, word, kind: word.replaceAll("_", " ") });
+  }
+
+  /** @param {number} k @returns {any} what the panels know of it */
+  facts(k) {
+    const { world, known, own } = this;
+    return { servo: k, id: known.id, title: known.title, kind: known.kind, model: this.model, models: known.models,
+      horn: known.horn, registers: null, columns: own.columns, travel_deg: own.travel_deg, pulse_us: own.pulse_us,
+      voltage: own.voltage, loop: own.loop,
+      signals: Object.fromEntries(own.columns.slice(1).map((/** @type {string} */ name) => [name, world.signals[name]])),
+      parameters: world.parameters.map((/** @type {any[]} */ alike, /** @type {number} */ n) => {
+        const name = alike[0];
+        const set = this.changed.has(name) ? { value: this.changed.get(name), ...world.set } : {};
+        return { ...joined(world.of_all, alike), ...joined(world.of_each, known.values[n]), ...set, read: this.reads.has(name) };
+      }).filter((/** @type {any} */ one) => !this.hides(one.name)) };
+  }
+
+  /** @returns {Servo} the same, of which something may change */
+  copy() {
+    const copy = Object.assign(Object.create(Servo.prototype), this);
+    copy.load = { ...this.load };
+    copy.values = new Map(this.values);
+    copy.changed = new Map(this.changed);
+    return copy;
+  }
+}
+
+/** @param {any} world @param {import("./kernel.js").Kernel} kernel @param {number} seed @returns {Record<string, number>} what is hidden behind a seed (SI) */
+export function hidden(world, kernel, seed) {
+  return Object.fromEntries(world.mystery.hidden.map((/** @type {any} */ one, /** @type {number} */ k) => [one.name, kernel.call("draw", seed, k, one.low, one.high)]));
+}
+
+/** @param {string[]} names @param {any[]} values */
+function joined(names, values) { return Object.fromEntries(names.map((name, k) => [name, values[k]])); }

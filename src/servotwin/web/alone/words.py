@@ -1,0 +1,40 @@
+"""What the page as one file says, beside the refusals of the rules."""
+
+from __future__ import annotations
+
+from servotwin.parameters import GROUPS
+from servotwin.simulation.bus_supply import MODEL_NAMES
+
+ONLY_WITH_SERVER = "only with the server: servotwin web"
+WORDS = {
+    "alone": "This bench computes here, without a server. Only with one (servotwin web): logs, fits, servo "
+             "files, registers but those of lessons, and the control circuit.",
+    "only_with_server": ONLY_WITH_SERVER,
+    "types": {"number": "float", "whole": "int", "string": "str", "boolean": "bool", "array": "list", "object": "dict"},
+    "digits": 6, "smallest": -4,
+    "known": {"parameter": "GROUP.NAME, with a group of " + ", ".join(GROUPS)},
+    "stands": "the bench stands: ",
+    "repeating": "action: got 'while the bench is being repeated', allowed: a moment later",
+    "no_single_frame": "single frame: got 'a bench that is being repeated', allowed: one that stands",
+    "new_beginning": "bench: got {got}, allowed: a new beginning",
+    "speed": "speed: got {got}, allowed: a number from 1e-06 to 10, or unpaced",
+    "mystery": "Mystery servo {seed}",
+    "mystery_scene": 'format = 1\nname = "Mystery servo {seed}"\n[[servo]]\nmystery = {seed}\nmodel = "PulseServo"\n',
+    "no_such_model": "model of {id}: got {got}, allowed: one that the servo has numbers for",
+    "takes_goals": "{kind} command of {name}: got '{word}', allowed: angles: it takes goals on a bus "
+                   "(firmware.command_kind)",
+    "no_such_command": "command of {name}: allowed: none of this unit",
+    "no_supply": "supply of a scene: allowed: a Supply with open_circuit_voltage, such as "
+                 "Supply(open_circuit_voltage=6.0, internal_resistance=0.5)",
+    "bus_models": MODEL_NAMES,
+    "rigid": "a stiff gear and shaft: on a shared supply there are no springs between two bodies",
+    "mixed": "servos on a shared supply: got 'some with programs, some without', allowed: one kind; "
+             "both " + ONLY_WITH_SERVER,
+    "no_inertia": "gear.backlash: got {got}, allowed: play only with inertia behind it: gear.output_inertia, or a load "
+                  "that has some",
+    "frame_rate": "frame rate: got {got}, allowed: frames that a pulse fits into",
+    "no_torque": "torque_enable of {model}: got {got}, allowed: nothing: an analog servo has no such switch",
+    "no_torque_switch": "torque: got {got}, allowed: nothing: no servo here has such a switch",
+    "too_many_actions": "record of the bench: got '100000 actions', allowed: no more: start it anew",
+}
+"""Messages by their names; {got} is what was given."""

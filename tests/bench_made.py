@@ -1,0 +1,37 @@
+"""The page as one file, made once, and its benches in node."""
+
+import json
+import shutil
+import subprocess
+from functools import cache
+from pathlib import Path
+
+from servotwin.web.alone import kernel
+from servotwin.web.alone.pack import world
+from servotwin.web.alone.page import modules
+from servotwin.web.server.first import first_scene
+
+HARNESS = Path(__file__).parent / "web" / "alone" / "harness" / "bench.mjs"
+
+
+@cache
+def known() -> dict:
+    """Return what the page knows, with the layout of its kernel."""
+    return {**world(first_scene()), "layout": kernel.layout()}
+
+
+def unpacked(folder: Path) -> Path:
+    """Put the modules and the kernel of the page into a folder, for node."""
+    (folder / "package.json").write_text('{"type": "module"}')
+    for name, text in modules().items():
+        (folder / name.removeprefix("bench/")).write_text(text.replace('"bench/', '"./'), encoding="utf-8")
+    (folder / "bench.wasm").write_bytes(kernel.module())
+    return folder
+
+
+def benches(folder: Path, jobs: list[dict]) -> list[dict]:
+    """Let benches go on in node; return what shows of each."""
+    done = subprocess.run([shutil.which("node"), "--no-warnings", str(HARNESS), str(folder)], check=False,
+                          capture_output=True, text=True, input=json.dumps({"world": known(), "jobs": jobs}))
+    assert done.returncode == 0, done.stderr[-3000:]
+    return json.loads(done.stdout)
