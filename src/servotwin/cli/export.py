@@ -69,7 +69,12 @@ def c(
         emit_json(facts)
         return
     show(pairs([("model", type(chosen).__name__), ("left out", facts["left_out"]),
-                *(("written", path) for path in facts["files"])]))
+                *(("written", _sized(path)) for path in files)]))
+
+
+def _sized(path: Path) -> str:
+    """Return a path with the size of its file."""
+    return f"{path} ({path.stat().st_size / 1000:.0f} kB)"
 
 
 def _facts(code: CCode) -> dict[str, Any]:
@@ -124,7 +129,7 @@ def fmu(
         return
     show(pairs([("model", type(chosen).__name__), ("FMI", made.version), ("inputs", ", ".join(of["input"])),
                 ("outputs", ", ".join(of["output"])), ("parameters", f"{len(of['parameter'])} of the servo file"),
-                ("written", str(path))]))
+                ("written", _sized(path))]))
 
 
 export.command("fmu", help="Write a servo as an FMU for co-simulation, FMI 2.0 or 3.0, with library and sources.",
