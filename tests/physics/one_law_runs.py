@@ -16,6 +16,7 @@ import numpy as np
 
 ON_A_BUS = "on a bus"
 POINTS = 40  # at which a law is compared with itself, compiled
+POSITIVE = ("stribeck_speed",)  # of whose logarithm a law is made
 TICKS, TICK = 15, 7e-3  # s
 SECONDS = 0.11  # five frames: a drive, its end, plugging back
 PULSES = {"electronics.back_emf_injection": 0.01, "electronics.supply_coupling": 0.02, "potentiometer.noise": 1e-3,
@@ -170,12 +171,14 @@ def laws_compiled(names):
         kinds = {key: parameter.annotation for key, parameter in inspect.signature(law).parameters.items()}
         results = []
         while len(results) < POINTS:
-            given = {key: bool(x > 0.0) if kinds[key] == "bool" else float(x)
+            given = {key: bool(x > 0.0) if kinds[key] == "bool" else abs(float(x)) if key in POSITIVE else float(x)
                      for key, x in zip(kinds, rng.uniform(-3.0, 3.0, len(kinds)), strict=True)}
             try:
-                results.append((law(**given), getattr(compiled, law.__name__)(**given)))
-            except (ArithmeticError, ValueError):  # numbers for which the law says nothing
+                plain = law(**given)
+            except (ArithmeticError, ValueError):
                 continue
+            if not np.isnan(plain).any():  # else numbers for which the law says nothing
+                results.append((plain, getattr(compiled, law.__name__)(**given)))
         found[f"plain/laws/{name}"], found[f"batch/laws/{name}"] = (
             np.array(each, dtype=np.float64) for each in zip(*results, strict=True))
     return found
