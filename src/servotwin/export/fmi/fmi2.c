@@ -8,7 +8,6 @@
 typedef struct {
     component own;
     fmi2CallbackFunctions tool;
-    fmi2Boolean logs;
     char *name;
 } instance;
 
@@ -31,14 +30,13 @@ const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 const char *fmi2GetVersion(void) { return fmi2Version; }
 
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean logs, size_t count, const fmi2String categories[]) {
-    (void)count, (void)categories;
-    ((instance *)c)->logs = logs;
+    (void)c, (void)logs, (void)count, (void)categories;
     return fmi2OK;
 }
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String token, fmi2String resources,
                               const fmi2CallbackFunctions *tool, fmi2Boolean visible, fmi2Boolean logs) {
-    (void)resources, (void)visible;
+    (void)resources, (void)visible, (void)logs;
     if (tool == NULL || name == NULL)
         return NULL;
     if (type != fmi2CoSimulation || token == NULL || strcmp(token, MODEL_TOKEN) != 0) {
@@ -53,7 +51,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String token, 
         free(one), free(own);
         return NULL;
     }
-    one->name = strcpy(own, name), one->tool = *tool, one->logs = logs;
+    one->name = strcpy(own, name), one->tool = *tool;
     one->own.tell = tell, one->own.of = one;
     component_reset(&one->own);
     return one;
