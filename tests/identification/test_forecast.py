@@ -394,3 +394,16 @@ def test_what_no_servo_is_counts_as_failed_and_harms_no_other():
     assert np.isnan(bad.shared).all()
     assert np.isfinite(good.residual).all()
     assert np.isfinite(good.shared).all()
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("central", [False, True])
+def test_a_shaft_that_starts_on_a_stop_has_derivatives(side, central):
+    """They are those from within: no difference starts beyond the stop."""
+    servo = TRUTH.replace({"stops.lower_angle": -1.3, "stops.upper_angle": 1.3})
+    f = forecast([moving(servo=servo)], servo=servo)
+    part, = f.at(point(f, offset=0.0, own=(1.3 * side, 0.0, 0.0)), central=central)
+    inside, = f.at(point(f, offset=0.0, own=(1.29 * side, 0.0, 0.0)), central=central)
+    assert np.isfinite(part.residual).all()
+    k = f.names_of_own(f.cases[0]).index("output_angle")
+    assert part.own[:, k] == pytest.approx(inside.own[:, k], abs=0.02 * np.abs(inside.own[:, k]).max())

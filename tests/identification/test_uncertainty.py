@@ -9,7 +9,7 @@ import pytest
 from servotwin.identification.fitting.arrow import Loss, Prior
 from servotwin.identification.fitting.memory import memory_of
 from servotwin.identification.fitting.point import LogPart
-from servotwin.identification.fitting.uncertainty import Counts, Rows, rows_of, uncertainty
+from servotwin.identification.fitting.uncertainty import Counts, Rows, _widest, rows_of, uncertainty
 
 NONE = Prior(np.zeros(1), np.zeros(1))
 
@@ -252,3 +252,9 @@ def test_what_stands_is_read_wrong_by_the_same():
     # The noise that its residuals have beside, which is chance here, adds little
     assert u.std[0] == pytest.approx(q / math.sqrt(12.0 * 20.0), rel=0.5)
     assert u.std[0] > 0.95 * q / math.sqrt(12.0 * 20.0)
+
+
+def test_what_does_not_vary_is_no_wider_than_nothing():
+    varies, stands = np.diag([4.0, 1e12]), np.diag([1.0, 0.0])
+    with np.errstate(all="raise"):
+        assert np.array_equal(_widest([stands, varies]), np.diag([4.0, 0.0]))

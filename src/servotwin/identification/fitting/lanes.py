@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from servotwin.identification.fitting.batches import Bundle
 from servotwin.identification.fitting.frames import signal
-from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.point import (
     DELAY_SCALE,
     LATER,
@@ -60,7 +59,12 @@ class LogLanes:
         self.tick = np.full(self.count, own.get("control_phase", 0.0))
         columns = {"output_angle": (self.angle, OFFSET_SCALE), "output_speed": (self.speed, SPEED_SCALE),
                    "control_phase": (self.tick, 1.0)}
-        self.steps = _steps(forecast.space, point.shared[:p], numbers, sides, step)
+        own_lower, own_upper = self._room(own)
+        open_ = np.full(len(self.shaped), np.inf)
+        self.steps = _steps(
+            np.concatenate([point.shared[:p], [own[name] for name in self.varied], np.zeros(len(open_))]),
+            np.concatenate([forecast.space.lower, own_lower, -open_]),
+            np.concatenate([forecast.space.upper, own_upper, open_]), sides, step)
         if self.shaped:  # a period that is much longer would have other pulses carry the commands
             self.steps[:, -1] = np.clip(self.steps[:, -1], -STEP, STEP)
         for side in range(sides):
@@ -78,6 +82,17 @@ class LogLanes:
         self.later = LATER if needs_rate else 0.0
         self.times = self.case.times - self.delay
         self.part: LogPart
+
+    def _room(self, own: Mapping[str, float]) -> tuple[Array, Array]:
+        """Return the ends of the log's own numbers that are varied: no shaft starts beyond a stop."""
+        forecast, log = self.forecast, self.case.log
+        columns = forecast.space.columns(self.x[:1])
+        lower, upper = np.full(len(self.varied), -np.inf), np.full(len(self.varied), np.inf)
+        for end, name, none in ((lower, "stops.lower_angle", -np.inf), (upper, "stops.upper_angle", np.inf)):
+            stop = log.parameters.get(name, forecast.model.value_or(name, none))
+            at = float(columns[name][0]) if name in columns else stop
+            end[[one == "output_angle" for one in self.varied]] = (at + self.offset) / OFFSET_SCALE
+        return lower, upper
 
     def _send_pulses(self, k: int, point: Point, first: float, numbers: int) -> None:
         """Give every lane its pulses; those of one whose period is varied come a little later one by one."""
@@ -210,14 +225,12 @@ class LogLanes:
         return np.asarray((y[1:1 + n] - y[1 + n:]) / (self.steps[0] - self.steps[1])[:, None])
 
 
-def _steps(space: Space, x: Array, numbers: int, sides: int, step: float) -> Array:
-    """Return the steps of all varied numbers, one row a side; none leaves the bounds of the search."""
-    steps = np.full((sides, numbers), step)
-    p = len(x)
+def _steps(x: Array, lower: Array, upper: Array, sides: int, step: float) -> Array:
+    """Return the steps of all varied numbers, one row a side; none leaves its bounds."""
+    steps = np.full((sides, len(x)), step)
     if sides == 1:
-        steps[0, :p] = np.where(x + step > space.upper, -step, step)
+        steps[0] = np.where(x + step > upper, -step, step)
     elif sides:
-        steps[0, :p] = np.where(x + step > space.upper, 0.0, step)
-        steps[1] = -step
-        steps[1, :p] = np.where(x - step < space.lower, 0.0, -step)
+        steps[0] = np.where(x + step > upper, 0.0, step)
+        steps[1] = np.where(x - step < lower, 0.0, -step)
     return steps

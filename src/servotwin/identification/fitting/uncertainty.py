@@ -306,8 +306,10 @@ def _widest(covariances: Sequence[Array]) -> Array:
 
 
 def _ratio(one: Array, other: Array) -> Array:
-    """Return the ratio of two covariances' variances, at least 1."""
-    return np.maximum(np.diag(one) / np.maximum(np.diag(other), 1e-300), 1.0)
+    """Return the ratio of two covariances' variances, at least 1; 1 of what does not vary."""
+    upper, lower = np.diag(one), np.diag(other)
+    varies = lower > 1e-300 * np.maximum(upper, 1.0)
+    return np.maximum(np.divide(upper, lower, out=np.ones(len(upper)), where=varies), 1.0)
 
 
 def _times(covariance: Array, wider: Array) -> Array:
