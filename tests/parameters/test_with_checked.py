@@ -1,6 +1,7 @@
 """`Servo.with_checked` is `replace` without the checks: same servo, same quantities, and nothing shared is changed."""
 
 import pickle
+import warnings
 
 import pytest
 
@@ -26,6 +27,12 @@ def test_it_does_what_replace_does(servo, changes):
     assert {name: fast.get(name) for name in changes} == {name: plain.get(name) for name in changes}
     assert pickle.loads(pickle.dumps(fast)) == plain
     assert pickle.dumps(servo) == before
+
+
+def test_nothing_is_warned_of_what_a_search_tries(servo):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert servo.with_checked({"gear.backlash": 0.5}).gear.backlash == 0.5
 
 
 def test_a_batch_still_names_the_lane_whose_number_is_bad(servo):

@@ -183,6 +183,11 @@ class Servo:
         UserWarning
             Of each new value that is not plausible.
         """
+        made = self._with(values, source)
+        warn_of(made, [name for name in values if made.get(name) != self.get(name)])
+        return made
+
+    def _with(self, values: Mapping[str, Value | None], source: str = SET_BY_USER) -> Servo:
         changed: dict[str, dict[str, Value | None]] = {}
         for name, value in values.items():
             group, key = check_name(name)
@@ -194,9 +199,7 @@ class Servo:
             value = getattr(groups[group], key)
             if value is not None:
                 quantities[name] = _replaced(name, value, source)
-        made = replace(self, quantities=quantities, **groups)
-        warn_of(made, [name for name in values if made.get(name) != self.get(name)])
-        return made
+        return replace(self, quantities=quantities, **groups)
 
     def continuous(self, fixed_angle: float) -> Servo:
         """Return the servo rebuilt to turn without end: its potentiometer off the shaft, its stops taken away.
@@ -222,9 +225,12 @@ class Servo:
         return self.replace({"potentiometer.fixed_angle": fixed_angle, **stops})
 
     def with_checked(self, values: Mapping[str, Value | None]) -> Servo:
-        """Return what `replace` does, faster where numbers stand for numbers; all values were checked before."""
+        """Return what `replace` does, faster where numbers stand for numbers; all values were checked before.
+
+        Nothing is warned of: what a search tries is nobody's word.
+        """
         if not all(isinstance(value, float) and name in self.quantities for name, value in values.items()):
-            return self.replace(values)
+            return self._with(values)
         made = object.__new__(Servo)
         made.__dict__.update(self.__dict__)
         for name, value in values.items():
