@@ -40,3 +40,16 @@ def test_doctor_alone_looks_at_the_installation(capsys):
 def test_bad_input_is_one_line(words, capsys):
     assert main(["doctor", *words]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_log_is_read_as_other_commands_read_it(cli, tmp_path):
+    """Without times and commands, torn, and at the end of its travel: on a supply that is said."""
+    rows = [f"{min(3 * k, 60)};0.1" for k in range(100)]
+    rows[50] = "60;0.1;0"
+    (tmp_path / "mine.txt").write_text("\n".join(["angle_deg;current_A", *rows]) + "\n", encoding="utf-8")
+    words = ("doctor", "hitec-hs-422", "mine.txt", "--rate", "50Hz", "--commanded", "60deg@0s", "--supply", "usb")
+    refused = cli(*words)
+    assert refused.code == 2
+    assert "--mend torn" in refused.error
+    assert cli(*words, "--mend", "torn").code == 0
+    assert cli("doctor", "--supply", "usb").code == 2

@@ -1,5 +1,6 @@
 """`servotwin validate`: what it says about a servo and logs, and when it fails."""
 
+import json
 import math
 
 import numpy as np
@@ -115,3 +116,20 @@ def test_errors_are_rms_over_samples(folder, truth):
     found = validate(read_logs(folder), st.load_servo(truth), st.BoundedServo)
     every = np.concatenate([trace.residual for trace in found.traces])
     assert found.total == pytest.approx(math.sqrt(np.mean(every**2)), rel=1e-12)
+
+
+def test_what_is_found_of_columns_is_kept_with_what_was_said(cli, tmp_path):
+    """Commands of servo.write: the sidecar has zero and unit, and the same words may be typed again."""
+    rows = [f"{20 * k} {90 if k < 20 else 150} {90 if k < 20 else min(90 + 3 * (k - 20), 150)}" for k in range(60)]
+    (tmp_path / "mine.txt").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    words = ("validate", "towerpro-mg996r", "mine.txt", "--columns", "time=1:ms command=2:deg angle=3:deg")
+    first, again, untold = cli(*words), cli(*words), cli(*words[:3])
+    assert "written  mine.json, which keeps --columns" in first.out.splitlines()
+    assert json.loads((tmp_path / "mine.json").read_text())["columns"]["command_angle"]["offset"] == -90.0
+    for said in (first, again):
+        assert said.code == 0
+        assert "90 deg is taken for its middle" in " ".join(said.out.split())
+    assert "written" not in again.out
+    assert untold.code == 0
+    assert "is taken for" not in untold.out
+    assert cli(*words[:-1], "time=1:ms command=2:deg-90 angle=3:-deg").code == 2

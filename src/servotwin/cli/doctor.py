@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from servotwin.cli import log_reading
 from servotwin.cli import shared_options as shared
 from servotwin.cli.terminal import emit_json, patience, show
+from servotwin.logs.mend_names import MENDS
 
 if TYPE_CHECKING:
     from servotwin.cli.command_words import CommandWords
     from servotwin.logs import Log
+    from servotwin.models import Model
 
 _LONGEST = 60.0  # s: every cause asks for a run of as much
 _MODELS = ("digital", "pulse", "pulse-inductive", "bounded")
@@ -51,6 +54,7 @@ def doctor(
         "--set", metavar="GROUP.NAME=VALUE", help="Change or add a parameter, such as supply.internal_resistance=2ohm; "
         "repeatable; with a unit, or in SI units.", rich_help_panel=shared.PLANT)] = None,
     register: shared.RegisterOption = None,
+    supply: shared.SupplyOption = None,
     seed: Annotated[int, typer.Option(
         metavar="NUMBER", help="Seed for the noise of the potentiometer.", rich_help_panel=shared.PLANT)] = 0,
     duration: Annotated[float | None, typer.Option(
@@ -58,20 +62,28 @@ def doctor(
         rich_help_panel=shared.OUTPUT)] = None,
     file_format: log_reading.FormatOption = "auto",
     columns: log_reading.ColumnsOption = None,
+    rate: log_reading.RateOption = None,
+    commanded: log_reading.CommandedOption = None,
+    mend: Annotated[list[str] | None, typer.Option(
+        metavar="KIND", help=f"What to put right in the log's file first: {', '.join(MENDS)}; repeatable or with "
+        "commas.", rich_help_panel=log_reading.PANEL)] = None,
     as_json: shared.JsonOption = False,
 ) -> None:
     """Say why a servo buzzes, sags, overshoots, gets warm, trips or does not move; alone: look at this installation."""
     from servotwin.cli.command_words import CommandWords
+    from servotwin.cli.model_words import model_of
 
     words = CommandWords(step=step, ramp=ramp, sine=sine, chirp=chirp, prbs=prbs, constant=constant, pulses=pulses,
                          command=command, unit=unit, at=at, over=over, hold=hold, column=column)
     if servo is None:
-        _look_at_installation(given=words != CommandWords() or bool(load or change or register or model or duration),
-                              as_json=as_json)
+        _look_at_installation(given=words != CommandWords() or bool(load or change or register or supply or model
+                                                                    or duration), as_json=as_json)
         return
-    read = None if log is None else _log(log, file_format, columns, registers=bool(register), quiet=as_json)
-    _diagnose(servo, read, words, {"model": model, "load": load or [], "change": change or [],
-                                   "register": register or []}, duration, seed, as_json=as_json)
+    made = model_of(servo, model, change or [], _MODELS, register or [], supply)
+    read = None if log is None else _log(log, lambda: log_reading.read(
+        [log], file_format, columns, None, [], mend=mend, rate=rate, commanded=commanded, quiet=as_json,
+        registers=bool(register), model=made))
+    _diagnose(made, read, words, load or [], duration, seed, as_json=as_json)
 
 
 def _look_at_installation(*, given: bool, as_json: bool) -> None:
@@ -87,20 +99,19 @@ def _look_at_installation(*, given: bool, as_json: bool) -> None:
     show(*installation.parts(found))
 
 
-def _log(path: Path, file_format: str, columns: list[str] | None, *, registers: bool, quiet: bool) -> Log:
+def _log(path: Path, read: Callable[[], list[Log]]) -> Log:
     from servotwin.errors import InputError
 
-    logs = log_reading.read([path], file_format, columns, None, [], quiet=quiet, registers=registers)
+    logs = read()
     if len(logs) != 1:
         raise InputError(str(path), got=f"{len(logs)} logs", allowed="one, such as a single file")
     return logs[0]
 
 
-def _diagnose(servo: str, log: Log | None, words: CommandWords, plant: dict[str, Any], duration: float | None,
-              seed: int, *, as_json: bool) -> None:
+def _diagnose(made: Model, log: Log | None, words: CommandWords, load: list[str], duration: float | None, seed: int, *,
+              as_json: bool) -> None:
     from servotwin.cli import doctor_words, load_words
     from servotwin.cli.command_words import CommandWords
-    from servotwin.cli.model_words import model_of
     from servotwin.diagnosis import diagnose
     from servotwin.errors import CommandError, InputError
 
@@ -108,13 +119,12 @@ def _diagnose(servo: str, log: Log | None, words: CommandWords, plant: dict[str,
         raise InputError("--duration", got=duration, allowed=f"a positive number of seconds up to {_LONGEST:g}")
     if log is not None and words != CommandWords():
         raise CommandError("a command beside a log", got=f"--{words.shape}", allowed="one of them: a log has its own")
-    made = model_of(servo, plant["model"], plant["change"], _MODELS, plant["register"])
     signal = None if words == CommandWords() else words.signal(duration or _LONGEST)
     with patience("taking causes away"):
-        found = diagnose(made, signal, load=load_words.load_from(plant["load"], made), duration=duration, log=log,
+        found = diagnose(made, signal, load=load_words.load_from(load, made), duration=duration, log=log,
                          seed=seed)
     facts = doctor_words.facts(found, command=None if signal is None else words.described(duration or _LONGEST),
-                               load=load_words.described(plant["load"]), log=None if log is None else log.name)
+                               load=load_words.described(load), log=None if log is None else log.name)
     if as_json:
         emit_json(facts)
         return

@@ -143,8 +143,8 @@ def fit(
                "diagnose": diagnose, "accuracy": accuracy, "within": within}
     chosen = _options(options)
     given = log_reading.read(logs, file_format, columns, joint, leave_out or [], mend=mend, rate=rate,
-                             commanded=commanded, force=force, quiet=as_json, registers=bool(register))
-    given = log_reading.about_the_middle(given, search.model, force=force, quiet=as_json)
+                             commanded=commanded, force=force, quiet=as_json, registers=bool(register),
+                             model=search.model)
     climbs = _climber(search, asked=bool(free), ladder=ladder, structures=structures, springs=spring)
     found = _run(search, given, chosen, scheduler, climbs)
     files = _write(found, targets, force=force)

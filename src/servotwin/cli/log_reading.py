@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -46,69 +47,58 @@ CommandedOption = Annotated[str | None, typer.Option(
 
 def read(paths: Sequence[Path], file_format: str, columns: Sequence[str] | None, joints: Sequence[str] | None,
          leave_out: Sequence[str], *, mend: Sequence[str] | None = None, rate: str | None = None,
-         commanded: str | None = None, force: bool = False, quiet: bool = False, registers: bool = False) -> list[Log]:
-    """Return the logs of files and folders.
+         commanded: str | None = None, force: bool = False, quiet: bool = False, registers: bool = False,
+         model: Model) -> list[Log]:
+    """Return the logs of files and folders, with commands that count from the middle of the servo's travel.
 
-    What was guessed or said of columns is shown, unless `quiet`, and what was said is written into sidecars. Where the
-    user says the registers of the servo (`registers`), those that a dataset's robot has are not assumed.
+    What was guessed, said or found of columns is shown, unless `quiet`, and what was said or found is written into
+    sidecars. Where the user says the registers of the servo (`registers`), those that a dataset's robot has are not
+    assumed.
 
     Raises
     ------
     InputError
-        If one cannot be read, a window is none, or a sidecar says otherwise and `force` is false.
+        If one cannot be read, a window is none, the servo cannot follow a command, or a sidecar says otherwise and
+        `force` is false.
     """
     from servotwin.cli import fit_words
-    from servotwin.errors import OutputError, OutputExistsError
-    from servotwin.identification import keep_columns, read_logs
+    from servotwin.identification import read_logs
     from servotwin.identification.fitting.robot_registers import of_no_robot
+    from servotwin.identification.fitting.suspicions.centre import centred
 
     windows = fit_words.left_out(leave_out)
     said = columns_said(columns, rate, commanded)
     mends = fit_words.reading_mends(mend)
     chosen = None if not joints else ",".join(joints)
-    written: list[str] = []
     with patience("reading"):
         given = [(path, read_logs(path, file_format, columns=said, joints=chosen, mend=mends)) for path in paths]
         logs = fit_words.without([log for _, some in given for log in some], windows)
-        for path, some in given if said else ():
-            try:
-                written += [f"written  {file}, which keeps --columns" for file in keep_columns(
-                    some, path if path.is_dir() else None, overwrite=force)]
-            except OutputExistsError:
-                raise
-            except OutputError as error:  # such as logs on a medium that cannot be written to
-                written.append(f"--columns is not kept: {error}")
-    parts = _parts(logs)
-    if (parts or written) and not quiet:
-        show(*parts, *written, "")
-    for line in written if quiet else ():
-        typer.echo(line, err=True)
-    return of_no_robot(logs) if registers else logs
-
-
-def about_the_middle(logs: Sequence[Log], model: Model, *, force: bool = False, quiet: bool = False) -> list[Log]:
-    """Return logs whose commands count from the middle of the servo's travel; what was found is said, and kept.
-
-    Raises
-    ------
-    InputError
-        If the servo cannot follow a command.
-    """
-    from servotwin.errors import InputError
-    from servotwin.identification import keep_columns
-    from servotwin.identification.fitting.suspicions.centre import centred
-
     found = centred(logs, model)
+    parts = _parts(logs)
     lines = list(found.sentences)
-    try:
-        lines += [f"written  {file}, which keeps this" for file in keep_columns(found.turned, overwrite=force)]
-    except InputError as error:  # the sidecar says otherwise, or cannot be written
-        lines.append(f"this is not kept: {error}")
-    if lines and not quiet:
-        show(*lines, "")
+    rest = iter(found.logs)
+    for path, some in given:
+        lines += _kept(some, list(islice(rest, len(some))), path, said=said is not None, force=force)
+    if (parts or lines) and not quiet:
+        show(*parts, *lines, "")
     for line in lines if quiet else ():
         typer.echo(line, err=True)
-    return list(found.logs)
+    return of_no_robot(found.logs) if registers else list(found.logs)
+
+
+def _kept(read: Sequence[Log], found: Sequence[Log], path: Path, *, said: bool, force: bool) -> list[str]:
+    """Write what was said or found of columns into sidecars, and return what to say of it."""
+    from servotwin.errors import InputError, OutputError
+    from servotwin.identification import keep_columns
+
+    what = "--columns" if said else "this"
+    try:
+        return [f"written  {file}, which keeps {what}" for file in keep_columns(
+            found, path if path.is_dir() else None, overwrite=force, instead_of=read)]
+    except InputError as error:
+        if said and not isinstance(error, OutputError):  # one that cannot be written is no contradiction
+            raise
+        return [f"{what} is not kept: {error}"]
 
 
 def columns_said(columns: Sequence[str] | None, rate: str | None, commanded: str | None) -> str | None:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from servotwin.cli.outputs import Target
     from servotwin.identification import Log
     from servotwin.identification.fitting.validate import Validation
+    from servotwin.models import Model
     from servotwin.parameters import Servo
 
 _EXCEEDED = 1  # exit code
@@ -67,9 +68,9 @@ def validate(
 
     targets = _targets(report, [Path(servo), *logs], force=force)
     changed = servo_of(servo, change or [], register or [], supply)
-    found = _run(changed, model, nuisance, sensors, mend, lambda: log_reading.read(
+    found = _run(changed, model, nuisance, sensors, mend, lambda nominal: log_reading.read(
         logs, file_format, columns, joint, leave_out or [], mend=mend, rate=rate, commanded=commanded, force=force,
-        quiet=as_json, registers=bool(register)), force=force, quiet=as_json)
+        quiet=as_json, registers=bool(register), model=nominal))
     limits = _limits(found, max_error or [])
     files = _write(found, targets, force=force)
     above = exceeded(found, limits)
@@ -87,7 +88,7 @@ def _targets(report: Path | None, inputs: list[Path], *, force: bool) -> list[Ta
 
 
 def _run(servo: Servo, model: str | None, nuisance: list[str] | None, sensors: list[str] | None,
-         mend: list[str] | None, read: Callable[[], list[Log]], *, force: bool, quiet: bool) -> Validation:
+         mend: list[str] | None, read: Callable[[Model], list[Log]]) -> Validation:
     from servotwin.cli import fit_words
     from servotwin.cli.model_words import class_of
     from servotwin.identification.fitting.checks import checked_servo
@@ -97,9 +98,8 @@ def _run(servo: Servo, model: str | None, nuisance: list[str] | None, sensors: l
     kind = None if model is None else class_of(model, fit_words.MODEL_NAMES)
     fitted = fit_words.some_or_none("--nuisance", nuisance, ())
     nominal = checked_servo(servo, recorded_model(servo) if kind is None else kind)
-    logs = log_reading.about_the_middle(read(), nominal, force=force, quiet=quiet)
-    return run(logs, servo, kind, mend=fit_words.kinds(mend), nuisance=fitted, sensors=fit_words.names(sensors),
-               progress=True)
+    return run(read(nominal), servo, kind, mend=fit_words.kinds(mend), nuisance=fitted,
+               sensors=fit_words.names(sensors), progress=True)
 
 
 def _limits(found: Validation, words: list[str]) -> Mapping[str | None, float]:

@@ -15,7 +15,8 @@ from servotwin.logs.sidecar import FOLDER_FILE, FORMAT, column_entries, sidecar_
 from servotwin.units.words import unit_shown
 
 
-def keep_columns(logs: Sequence[Log], folder: Path | None = None, *, overwrite: bool = False) -> list[Path]:
+def keep_columns(logs: Sequence[Log], folder: Path | None = None, *, overwrite: bool = False,
+                 instead_of: Sequence[Log] = ()) -> list[Path]:
     """Write what was said of columns (`columns=` of `read_logs`) into sidecars, so that it need not be said again.
 
     A sidecar that is there keeps all else that it says. The logs of one folder share its `logs.json` if their columns
@@ -29,6 +30,9 @@ def keep_columns(logs: Sequence[Log], folder: Path | None = None, *, overwrite: 
         Where they were read from, if that was a folder.
     overwrite : bool
         Replace what a sidecar says otherwise.
+    instead_of : sequence of Log
+        The logs as they were read, where more was found of their columns since: what a sidecar says of these may be
+        replaced.
 
     Returns
     -------
@@ -44,9 +48,12 @@ def keep_columns(logs: Sequence[Log], folder: Path | None = None, *, overwrite: 
     """
     files = {Path(log.reading.file): dict(log.reading.layout) for log in logs
              if log.reading is not None and any(one.known == SAID for one in log.reading.columns)}
+    before = {sidecar_path(Path(log.reading.file)): dict(log.reading.layout) for log in instead_of
+              if log.reading is not None}
     made = {}
-    for target, columns in _targets(files, folder).items():
-        content = _updated(target, columns, overwrite=overwrite)
+    everyone = len(files) == len({log.reading.file for log in logs if log.reading is not None})
+    for target, columns in _targets(files, folder if everyone else None).items():
+        content = _updated(target, columns, before.get(target), overwrite=overwrite)
         if content is not None:
             made[target] = content
     for target, content in made.items():
@@ -71,19 +78,25 @@ def _content(path: Path) -> dict[str, Any]:
     return content if isinstance(content, dict) else {}
 
 
-def _updated(path: Path, columns: Mapping[str, Column], *, overwrite: bool) -> dict[str, Any] | None:
+def _updated(path: Path, columns: Mapping[str, Column], before: Mapping[str, Column] | None, *,
+             overwrite: bool) -> dict[str, Any] | None:
     """Return the new content of a sidecar, None where it says all that already."""
     content = _content(path)
     said, entries = content.get("columns"), column_entries(columns)
     if isinstance(said, dict):
-        other = next((name for name in said if name not in entries or not _same(name, said[name], entries[name])), None)
-        if other is not None and not overwrite:
+        other = _other(said, entries)
+        if other is not None and not overwrite and (before is None or _other(said, column_entries(before))):
             here = _words(entries[other]) if other in entries else "nothing"
             raise InputError(f"{path}: columns, {other}", got=f"{_words(said[other])} there, {here} here",
                              allowed="the same; --force (overwrite=True) replaces what the sidecar says")
         if other is None and len(said) == len(entries):
             return None
     return {**content, "columns": entries}
+
+
+def _other(said: Mapping[str, Any], entries: Mapping[str, Any]) -> str | None:
+    """Return the first column of which a sidecar says otherwise."""
+    return next((name for name in said if name not in entries or not _same(name, said[name], entries[name])), None)
 
 
 def _same(name: str, a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
