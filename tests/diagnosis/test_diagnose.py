@@ -45,6 +45,14 @@ def test_a_cure_cures():
     assert "sags" not in names(st.diagnose(cured, load=load))
 
 
+def test_a_number_that_cannot_be_taken_away_alone_is_no_cause():
+    """A program that computes for thirteen of its ticks: with ticks as short as usual there is no such servo."""
+    servo = st.load_servo("jx-pdi-6221mg").replace({"firmware.control_period": 4.5e-3, "firmware.compute_delay": 60e-3})
+    found = names(st.diagnose(servo))
+    assert found
+    assert all("frame rate" in causes for causes in found.values())
+
+
 def test_two_that_cure_only_together_are_a_pair():
     patient = patient_of(st.PulseServo(st.load_servo("hitec-hs-422")), st.loads.Constant(0.3) + st.loads.Inertia(1.0))
 

@@ -99,9 +99,12 @@ class Trials:
         self.patient, self._strength = patient, strength
         self.base = strength(patient)
 
-    def value(self, patient: Patient) -> float:
-        """Return how strong the symptom is; inf where such a servo cannot be run."""
+    def value(self, *taken: tuple[Number, float]) -> float:
+        """Return how strong the symptom is with numbers at other values; inf where there is no such servo."""
         try:
+            patient = self.patient
+            for number, end in taken:
+                patient = number.put(patient, end)
             found = self._strength(patient).value
         except (ServotwinError, ValueError, ArithmeticError):
             return math.inf
@@ -117,7 +120,7 @@ class Trials:
         if now is None or not (stops := number.stops(self.patient)):
             return None
         for end in stops:
-            value = self.value(self._put(number, end))
+            value = self.value((number, end))
             tried.append((value, end))
             if value <= self.base.limit:
                 break
@@ -126,16 +129,13 @@ class Trials:
         return Cause(number.cause, number.name, now, end, self.share(value), value <= self.base.limit, math.nan,
                      math.exp(min(number.oddness(self.patient), 50.0)), (usual.low, usual.high), usual.source, number)
 
-    def _put(self, number: Number, value: float) -> Patient:
-        return number.put(self.patient, value)
-
     def with_need(self, cause: Cause) -> Cause:
         """Return a cause that cures with the least change of it that does."""
         low, high = 0.0, 1.0
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
-            patient = self._put(cause.number, cause.number.between(cause.now, cause.end, middle))
-            low, high = (low, middle) if self.value(patient) <= self.base.limit else (middle, high)
+            there = self.value((cause.number, cause.number.between(cause.now, cause.end, middle)))
+            low, high = (low, middle) if there <= self.base.limit else (middle, high)
         needed = cause.end if high == 1.0 else cause.number.between(cause.now, cause.end, high)
         return cause._replace(needed=needed)
 
@@ -145,7 +145,7 @@ class Trials:
         for one, other in combinations(causes, 2):
             if one.cause == other.cause:
                 continue
-            value = self.value(other.number.put(self._put(one.number, one.end), other.end))
+            value = self.value((one.number, one.end), (other.number, other.end))
             gain = self.share(value) if value > self.base.limit else 1.0 + math.log(one.odd * other.odd)
             if gain > best and gain > max(one.share, other.share) + _SPEAKS:
                 best, found = gain, (one, other)
