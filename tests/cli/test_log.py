@@ -76,6 +76,8 @@ def test_what_a_log_holds(cli):
     (steps(sign=-1.0, command=lambda c: c + 90, zero=90.0), 'angle=angle_deg:-deg+180"'),
     (steps(sign=0.5), 'angle=angle_deg:2deg"'), (steps(command=lambda c: c + 90), 'command=command_deg:deg-90"'),
     ([f"{10 * k},{(k // 100) % 2 * 40},{(7 * k + 300) % 360:.1f}" for k in range(600)], "jumps by a whole turn"),
+    ([f"{10 * k},{(k // 100) % 2 * 40},{300 if k == 250 else (k // 100) % 2 * 40}.00" for k in range(600)],
+     "1 reading of the angle, the first at 2.5 s"),
     ([f"{10 * k},{(k // 100) % 2 * 40},5.00" for k in range(600)], "the shaft does not"),
     ([f"{10 * k},20,{max(0, min(20, k - 50))}.00" for k in range(600)], "the command never changes"),
 ])

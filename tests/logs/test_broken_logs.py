@@ -121,6 +121,29 @@ def test_a_stamp_that_fits_nowhere_is_a_torn_row(tmp_path):
     assert 0.2 not in log.time
 
 
+@pytest.mark.parametrize("cells", ["15,1.00", "160,1.00", "16000,1.00", "1600200,1.00", "1500,30000"])
+def test_a_number_that_no_log_of_a_servo_holds_is_a_torn_row(tmp_path, cells):
+    file = written(tmp_path, [HEADER, *ROWS[:10], f"200,{cells}", *ROWS[11:]])
+    with pytest.raises(InputError, match=r"line 12.*as in the other rows; --mend torn leaves out 1 row"):
+        read_logs(file)
+    log, = read_logs(file, mend=["torn"])
+    assert len(log) == 39
+
+
+def test_numbers_in_a_wrong_unit_are_no_torn_rows(tmp_path):
+    with pytest.raises(InputError, match="microseconds"):
+        read_logs(written(tmp_path, ["time_s,pulse_width,output_angle_deg", *ROWS]))
+    sent = [row.replace("1500", "5000") if 10 <= k < 20 else row for k, row in enumerate(ROWS)]
+    assert read_logs(written(tmp_path, [HEADER, *sent]))[0].command.max() == 5000e-6
+
+
+def test_a_pulse_without_a_width_is_none(tmp_path):
+    rows = [row.replace("1500", "0") if 10 <= k < 20 else row for k, row in enumerate(ROWS)]
+    log, = read_logs(written(tmp_path, [HEADER, *rows]))
+    assert np.flatnonzero(~log.sent).tolist() == list(range(10, 20))
+    assert log.reading.remarks == ("10 of 40 samples have no command: no pulses were sent there",)
+
+
 def test_two_faults_are_typed_together(tmp_path):
     rows = [*ROWS[:20], "400,15", *ROWS[21:], HEADER, *ROWS]
     file = written(tmp_path, [HEADER, *rows])

@@ -139,6 +139,8 @@ def _log(path: Path, part: Timed, layout: Layout, said: Sidecar, suffix: str) ->
     else:
         missing = None if COMMANDS[command] == "voltage" else math.nan  # no pulses
         values = of[command].to_si(table.numbers(of[command].column, missing=missing), command)
+        if command == "pulse_width":
+            values = np.where(values == 0.0, math.nan, values)  # a pulse without a width is none
     switch = _switch(table, of[SWITCH]) if SWITCH in of else None
     used = {column.column for column in layout.shown}
     reading = Reading(file=str(path), columns=layout.shown, remarks=(*table.remarks, *_silences(values)),

@@ -20,9 +20,9 @@ _Kind = TypeVar("_Kind", bound=np.generic)
 _LARGEST_EDGES = 10_000_000
 # signal or kind of command -> (SI unit, largest magnitude that a servo's log can hold, what was probably meant)
 _LIMITS = {
-    **dict.fromkeys(("output_angle", "load_angle", "angle"), ("rad", 100.0, "degrees or counts?")),
+    **dict.fromkeys(("output_angle", "load_angle", "command_angle", "angle"), ("rad", 100.0, "degrees or counts?")),
     "pulse_width": ("s", 0.1, "microseconds?"),
-    **dict.fromkeys(("voltage", "feedback_voltage", "bus_voltage", "armature_voltage"),
+    **dict.fromkeys(("voltage", "command_voltage", "feedback_voltage", "bus_voltage", "armature_voltage"),
                     ("V", 1e3, "millivolts or counts?")),
     **dict.fromkeys(("armature_current", "supply_current"), ("A", 1e3, "milliamperes?")),
 }
@@ -201,6 +201,11 @@ def _column(what: str, values: object, n: int) -> NDArray[np.float64]:
     if y.size != n:
         raise InputError(what, got=f"{y.size} values", allowed=f"{n}, as many as times")
     return y
+
+
+def largest_of(name: str) -> float:
+    """Return the largest magnitude (SI) that a servo's log can hold of a signal or kind of command."""
+    return _LIMITS.get(name, ("", np.inf, ""))[1]
 
 
 def _plausible(what: str, values: NDArray[np.float64], name: str) -> None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.logs.columns import COMMANDS, TIME, Column
 from servotwin.logs.defined import is_defined
+from servotwin.logs.impossible import impossible, refuse
 from servotwin.logs.mend_names import DROP, MENDS, SPREAD, THOUSANDS, TORN
 from servotwin.logs.stamps import CLOCKS, clock_of
 from servotwin.tables import TextTable, said_lines
@@ -165,7 +166,7 @@ def sound(table: TextTable) -> TextTable:
 
 
 def without_torn(table: TextTable, layout: Layout, mends: Collection[str]) -> TextTable:
-    """Return the table without rows that are cut, joined, or hold no number where one has to be.
+    """Return the table without rows that are cut, joined, or hold no number, or an impossible one, where one has to be.
 
     Raises
     ------
@@ -174,6 +175,8 @@ def without_torn(table: TextTable, layout: Layout, mends: Collection[str]) -> Te
     """
     used = [table.header.index(column.column) for column in layout.columns.values() if not is_defined(column.column)]
     torn = _odd(table, used, layout)
+    if not torn.all():
+        torn[~torn] = impossible(table.without(torn), layout)
     if not torn.any():
         return table
     count = int(torn.sum())
@@ -181,7 +184,7 @@ def without_torn(table: TextTable, layout: Layout, mends: Collection[str]) -> Te
         return table.without(torn, f"{said_lines(_lines(table, torn))} {'is' if count == 1 else 'are'} torn, and left "
                              "out")
     try:
-        _refuse(table, layout, int(np.argmax(torn)))
+        _refuse(table, layout, torn)
     except InputError as error:
         if count > _MOST_TORN * len(torn):
             raise
@@ -236,13 +239,15 @@ def _fits(table: TextTable, cell: str, *, missing: bool) -> bool:
         cell.lower() in _SWITCHES)
 
 
-def _refuse(table: TextTable, layout: Layout, k: int) -> None:
-    """Raise what is wrong with one row."""
+def _refuse(table: TextTable, layout: Layout, torn: NDArray[np.bool_]) -> None:
+    """Raise what is wrong with the first torn row."""
+    k = int(np.argmax(torn))
     one = replace(table, rows=[table.rows[k]])
     one.check_lengths()
     for name, column in layout.columns.items():
         if not is_defined(column.column):
             _refuse_cell(one, name, column)
+    refuse(one, layout)
 
 
 def _refuse_cell(one: TextTable, name: str, column: Column) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from servotwin.loads import Load
 from servotwin.logs.columns import COMMANDS
@@ -28,6 +29,7 @@ _NEAR = 0.07
 _USUAL = (0.7, 1.4)  # angle over commanded angle
 _PULSE_GAINS = (math.radians(0.03) * 1e6, math.radians(0.4) * 1e6)  # rad/s of pulse
 _FASTEST = math.radians(3000.0)  # rad/s
+_ALONE = math.radians(5.0)  # more than noise
 _TURN = 2.0 * math.pi
 _CENTRE = math.radians(90.0)
 _OFF_ZERO = 10.0  # deg
@@ -40,6 +42,14 @@ def wrong_of(log: Log, clock: Clock, values: Values, motion: Motion) -> Iterator
     """Give what cannot be right, each in one sentence."""
     angle = log.measured[log.angle_name]
     seen = angle[np.isfinite(angle)]
+    failed = _failed(log, angle)
+    count = int(failed.sum())
+    if count:
+        at, half = float(log.time[np.argmax(failed)]), 0.5 * clock.period
+        yield (f"{count} {'reading' if count == 1 else 'readings'} of the angle, the first at {at:.4g} s, far from those "
+               f"before and after it, as no servo moves: the sensor failed there; --leave-out {max(at - half, 0.0):.4g}.."
+               f"{at + half:.4g} leaves one out")
+        seen = angle[np.isfinite(angle) & ~failed]
     jumps = int((np.abs(np.abs(np.diff(seen)) - _TURN) < 0.25 * _TURN).sum()) if log.angle_name == "output_angle" else 0
     if jumps:
         yield (f"the angle jumps by a whole turn, {jumps} times: a sensor that begins again; servotwin fit ... --mend "
@@ -59,6 +69,17 @@ def wrong_of(log: Log, clock: Clock, values: Values, motion: Motion) -> Iterator
     if motion.lag < 0.0 and motion.steps == 0 and abs(motion.correlation) > _CLEAR:
         yield (f"the angle comes {-1e3 * motion.lag:.0f} ms before the command: the columns have two clocks, or the "
                "command was logged late")
+
+
+def _failed(log: Log, angle: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell which samples of an angle lie alone: further from both neighbours, on one side, than any servo goes."""
+    step, apart = np.diff(angle), np.diff(log.time)
+    turns = np.abs(np.abs(step) - _TURN) < _OFF_CENTRE  # noise where a sensor begins again
+    fast = (np.abs(step) > _FASTEST * apart + _ALONE) & ~turns
+    found = np.zeros(len(angle), np.bool_)
+    if log.angle_name == "output_angle":
+        found[1:-1] = fast[:-1] & fast[1:] & (step[:-1] * step[1:] < 0.0)
+    return found
 
 
 def _slow(log: Log) -> bool:
