@@ -46,9 +46,9 @@ def wrong_of(log: Log, clock: Clock, values: Values, motion: Motion) -> Iterator
     count = int(failed.sum())
     if count:
         at, half = float(log.time[np.argmax(failed)]), 0.5 * clock.period
-        yield (f"{count} {'reading' if count == 1 else 'readings'} of the angle, the first at {at:.4g} s, far from those "
-               f"before and after it, as no servo moves: the sensor failed there; --leave-out {max(at - half, 0.0):.4g}.."
-               f"{at + half:.4g} leaves one out")
+        yield (f"{count} {'reading' if count == 1 else 'readings'} of the angle, the first at {at:.4g} s, far from "
+               "those before and after, as no servo moves: the sensor failed there; "
+               f"--leave-out {max(at - half, 0.0):.4g}..{at + half:.4g} leaves one out")
         seen = angle[np.isfinite(angle) & ~failed]
     jumps = int((np.abs(np.abs(np.diff(seen)) - _TURN) < 0.25 * _TURN).sum()) if log.angle_name == "output_angle" else 0
     if jumps:
