@@ -242,6 +242,9 @@ def test_names_of_columns(column, role, factor):
     ({"mass_g": MASSES, "current_mA": CURRENTS[::-1]}, 0.01, "a line that falls"),
     ({"mass_g": MASSES, "speed_deg_s": CURRENTS}, 0.01, "a line that rises"),
     ({"mass_g": MASSES, "note_x": CURRENTS}, 0.01, "beside the load"),
+    ({"mass_g": MASSES, "current": CURRENTS}, 0.01, "current has no unit that says so"),
+    ({"mass_g": MASSES, "current_mA": [200.0] * 5}, 0.01, "a line that is flat"),
+    ({"mass_g": CURRENTS, "current_mA": MASSES}, 0.01, "is each column what its name says"),
     ({"mass_g": [100.0] * 5, "current_mA": CURRENTS}, 0.01, "loads that differ"),
     ({"mass_g": [*MASSES[:4], math.nan], "current_mA": CURRENTS}, 0.01, "row 5"),
     ({"torque_Nm": [0.1, 0.2, 0.3, 0.4, 0.5], "current_mA": CURRENTS}, 0.01, "is a torque"),
@@ -252,3 +255,31 @@ def test_what_cannot_be_is_refused(columns, arm, said):
         calibrate_loads(columns, arm=arm)
     assert said in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_friction_that_scatter_makes_negative_is_as_unsure_as_any():
+    found = calibrate_loads({"mass_g": [0, 100, 200, 300, 400], "current_mA": [12, 40, 130, 160, 260]},
+                            st.load_servo("towerpro-mg996r"), arm=0.02)
+    assert found.figure("no-load current").lower < 0.0 < found.figure("no-load current").upper
+    friction = found.parameters["friction.coulomb_torque_forward"]
+    assert friction.value == 0.0
+    assert friction.std > 5e-5
+
+
+@pytest.mark.parametrize(("rows", "said"), [
+    ("500;800\n1.000;1.100\n1.500;1.400\n2.000;1.700", "line 3, mass_g: got '1.000'"),
+    ("500;800,5\n600;1.100,5\n700;1.400,5", "line 3, current_mA: got '1.100,5'"),
+    ("567\t812\n812\t967\n967\t1,045", "line 4, current_mA: got '1,045'")])
+def test_thousands_are_no_decimals(tmp_path, rows, said):
+    (tmp_path / "table.csv").write_text(f"mass_g{';' if ';' in rows else chr(9)}current_mA\n{rows}\n")
+    with pytest.raises(InputError, match="separates thousands") as error:
+        calibrate_loads(tmp_path / "table.csv", arm=0.02)
+    assert said in str(error.value)
+
+
+@pytest.mark.parametrize("rows", [
+    "0.500;0.800\n1.000;1.100\n1.500;1.400\n2.000;1.700", "0,5;1,125\n1;1,25\n1,5;1,375\n2;1,625",
+    "1;1.125\n2;1.375\n3;1.625\n4;1.875"])
+def test_decimals_are_no_thousands(tmp_path, rows):
+    (tmp_path / "table.csv").write_text(f"mass_kg;current_A\n{rows}\n")
+    assert calibrate_loads(tmp_path / "table.csv", arm=0.02).figure("heaviest load").value < 1.0

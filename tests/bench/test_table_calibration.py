@@ -177,7 +177,7 @@ GOOD = "q_deg,V_o_V,note\n0,0.590,a\n45,0.912,b\n90,1.253,c\n135,1.572,d\n"
     ("", "an empty file"),
     ("q_deg,V_o_V\n", "a header without rows"),
     ("q_deg,note\n0,1\n1,2\n2,3\n3,4\n", "got 'q_deg, note', allowed: at least two of output_angle_deg"),
-    (GOOD.replace(",", ";").replace("1.253", "1,253"), "line 2, V_o_V: got '0.590', allowed: a number with a decimal "),
+    (GOOD.replace(",", ";").replace("1.253", "1,253"), "line 4, V_o_V: got '1,253', allowed: a number with a decimal "),
     (GOOD.replace(".", ","), "line 2: got '4 cells', allowed: 3, as the header"),
     ("q_deg,f_Hz\n0,61\n45,61\n90,61\n135,61\n", "at least two of"),
     ("q_deg,V_o_V\n0,0.590\n45,0.912\n90,1.253\n", "rows: got 3, allowed: at least 4"),

@@ -144,6 +144,15 @@ def test_a_pulse_without_a_width_is_none(tmp_path):
     assert log.reading.remarks == ("10 of 40 samples have no command: no pulses were sent there",)
 
 
+def test_thousands_are_told_where_nothing_has_decimals(tmp_path):
+    rows = [f"{k};1500;{k};{30 * k:,}".replace(",", ".") for k in range(50)]
+    file = written(tmp_path, ["time_s;pulse_us;angle_deg;current_mA", *rows])
+    with pytest.raises(InputError, match=r"current_mA: got '1.020'.*such as 30, .*--mend thousands"):
+        read_logs(file)
+    log, = read_logs(file, mend=["thousands"])
+    assert log.measured["supply_current"][34] == pytest.approx(1.02)
+
+
 def test_two_faults_are_typed_together(tmp_path):
     rows = [*ROWS[:20], "400,15", *ROWS[21:], HEADER, *ROWS]
     file = written(tmp_path, [HEADER, *rows])

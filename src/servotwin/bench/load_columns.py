@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,6 +20,7 @@ from servotwin.errors import InputError
 from servotwin.logs.column_names import COMMAND, COMMAND_ANGLE, PULSE, TIME, meaning_of
 from servotwin.logs.sidecar import FOLDER_FILE, sidecar_path
 from servotwin.tables import read_table
+from servotwin.tables.thousands import check_thousands
 from servotwin.units import is_finite
 from servotwin.units.quantities import quantity
 
@@ -175,7 +176,7 @@ def load_table(table: str | Path | Mapping[str, ArrayLike], *, arm: float | None
         found[meant.role] = meant, column, _checked(where, meant, column, values)
     made = _torque(where, table, found, arm)
     return LoadTable(source=source or ("a table without a name" if isinstance(table, Mapping) else where),
-                     ignored=tuple(ignored), **made, **_measured(where, found))
+                     ignored=tuple(ignored), **made, **_measured(where, found, ignored))
 
 
 def _known(column: str) -> bool:
@@ -195,6 +196,7 @@ def _columns(table: str | Path | Mapping[str, ArrayLike]
         return [(name, "", values) for name, values in given.items()]
     read = read_table(table, _known)
     read.check_lengths(shorter=True)
+    check_thousands(read)
     columns: list[tuple[str, str, NDArray[np.float64] | InputError]] = []
     for k, name in enumerate(read.header):
         try:
@@ -299,7 +301,8 @@ def _said_in(beside: Path, path: Path) -> float | None:
     return None
 
 
-def _measured(where: str, found: dict[str, tuple[Name, str, NDArray[np.float64]]]) -> dict[str, Any]:
+def _measured(where: str, found: dict[str, tuple[Name, str, NDArray[np.float64]]],
+              ignored: Sequence[str]) -> dict[str, Any]:
     """Return current, speed, sag and voltage, as fields of a table."""
     made: dict[str, Any] = {role: _reading(found[role]) for role in (names.CURRENT, names.VOLTAGE) if role in found}
     remarks = []
@@ -322,7 +325,9 @@ def _measured(where: str, found: dict[str, tuple[Name, str, NDArray[np.float64]]
         remarks.append(f"{angle.name} is counted from the lightest load on: how far the shaft stood off its goal there "
                        "is not known")
     if names.LOAD in found and not {"current", "speed", "sag"} & set(made):
-        raise InputError(f"{where}: columns", got=", ".join(one[1] for one in found.values()),
+        has = "has" if len(ignored) == 1 else "have"
+        unknown = f"; {', '.join(ignored)} {has} no unit that says so" if ignored else ""
+        raise InputError(f"{where}: columns", got=", ".join(one[1] for one in found.values()) + unknown,
                          allowed="beside the load a current (current_mA), a speed (speed_deg_s), a time "
                          "(time_60deg_s) or a sag (sag_deg)")
     if names.LOAD not in found and not ("voltage" in made and "speed" in made):

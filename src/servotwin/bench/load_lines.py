@@ -78,7 +78,8 @@ def load_lines(table: LoadTable) -> LoadLines:
     Raises
     ------
     InputError
-        If too few rows are left, or a line falls that must rise, or rises that must fall.
+        If too few rows are left, a line falls that must rise or rises that must fall, or a current without load is less
+        than nothing.
     """
     lines: dict[str, LoadLine] = {}
     flat, stalled, rows = None, None, np.arange(table.rows)
@@ -89,6 +90,7 @@ def load_lines(table: LoadTable) -> LoadLines:
         flat = _flat_top(table, rows)
         rows = rows if flat is None else np.array([row for row in rows if row not in flat.rows])
         lines[CURRENT] = _line(table, CURRENT, table.torque, table.current, rows, rises=True)
+        _check_start(table, lines[CURRENT])
     if table.torque is not None and table.speed is not None:
         lines[SPEED] = _line(table, SPEED, table.torque, table.speed, rows, rises=False)
     if table.torque is not None and table.sag is not None:
@@ -107,9 +109,20 @@ def _line(table: LoadTable, name: str, x: Reading, y: Reading, rows: NDArray[np.
         raise InputError(f"{table.source}: {x.name}", got="the same in all rows", allowed="values that differ")
     line = _through(x, y, rows)
     if line.slope == 0.0 or (line.slope > 0.0) != rises:
-        raise InputError(f"{table.source}: {y.name} over {x.name}", got=f"a line that {'falls' if rises else 'rises'}",
+        got = "is flat" if line.slope == 0.0 else "falls" if rises else "rises"
+        raise InputError(f"{table.source}: {y.name} over {x.name}", got=f"a line that {got}",
                          allowed=f"one that {'rises' if rises else 'falls'}: are the columns and their signs right?")
     return LoadLine(name=name, x=x, y=y, line=line, rows=rows)
+
+
+def _check_start(table: LoadTable, found: LoadLine) -> None:
+    """Raise if a servo would draw less than nothing without load, which no scatter explains."""
+    line = found.line
+    upper = line.intercept + line.wide(line.intercept_error)
+    if upper < 0.0:
+        raise InputError(f"{table.source}: {found.y.name} without load, by the line over {found.x.name}",
+                         got=f"{line.intercept:.4g} A, at most {upper:.4g} A", allowed="more than 0: is each column "
+                         "what its name says, and does the load count what hung there always?")
 
 
 def _through(x: Reading, y: Reading, rows: NDArray[np.intp]) -> LineFit:

@@ -118,7 +118,7 @@ def _share_of_current(m: Sequence[float], of: Circuit) -> dict[str, float]:
     w_0 = max((of.V - of.V_d - of.R * i_0) / of.K, 0.0)
     fall = of.R * s / of.K  # c, as U - R i = K w has it
     mu = (s * of.K - 1.0 + of.b * fall) / (1.0 + s * of.K)
-    return {_TAU: max((1.0 - mu) * of.K * i_0 - of.b * w_0, 0.0), _MU: mu}
+    return {_TAU: (1.0 - mu) * of.K * i_0 - of.b * w_0, _MU: mu}
 
 
 def _of_current(m: Sequence[float], of: Circuit) -> dict[str, float]:
@@ -127,7 +127,7 @@ def _of_current(m: Sequence[float], of: Circuit) -> dict[str, float]:
     fall = of.R * gamma / (alpha * of.K**2 + of.R * of.b)  # c of the servo as it is: matters where b does
     K = (gamma - of.b * fall) / (alpha * s)
     speed = (of.V - of.V_d - of.R * i_0) / of.K
-    return {_K: K, _TAU: max(alpha * K * i_0 - of.b * max(speed, 0.0), 0.0)}
+    return {_K: K, _TAU: alpha * K * i_0 - of.b * max(speed, 0.0)}
 
 
 def _of_speed(m: Sequence[float], of: Circuit) -> dict[str, float]:
@@ -142,7 +142,7 @@ def _of_both(m: Sequence[float], of: Circuit) -> dict[str, float]:
     i_0, s, w_0, c = m[0], m[1], m[2], -m[3]
     K = (of.V - of.V_d) / (w_0 + c * i_0 / s)
     mu = (s * K - 1.0 + of.b * c) / (1.0 + s * K)
-    return {_K: K, _R: K * c / s, _TAU: max((1.0 - mu) * K * i_0 - of.b * w_0, 0.0), _MU: mu}
+    return {_K: K, _R: K * c / s, _TAU: (1.0 - mu) * K * i_0 - of.b * w_0, _MU: mu}
 
 
 def _of_voltage(m: Sequence[float], of: Circuit) -> dict[str, float]:
@@ -213,10 +213,11 @@ def estimates_of(found: Solved, servo: Servo, circuit: Circuit) -> tuple[dict[st
     if _R in values:
         _take_resistance(values[_R], errors[_R], found.how, circuit, made, notes)
     if _TAU in values:
-        if values[_TAU] < 0.0:
+        if found.how == VOLTAGE_HOW and values[_TAU] < 0.0:
             notes.append("the friction stays: the shaft turns from a voltage on that is below the drop of the servo, "
                          f"{circuit.V_d:.3g} V")
         else:
+            values[_TAU] = max(values[_TAU], 0.0)
             both = servo.get(_FRICTION[0]) == servo.get(_FRICTION[1])
             for name in _FRICTION if both else _FRICTION[:1]:
                 take(name, _TAU, "K_out I_0 (1 - mu_m) over gear_reduction")

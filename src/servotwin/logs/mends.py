@@ -17,7 +17,8 @@ from servotwin.logs.impossible import impossible, refuse
 from servotwin.logs.mend_names import DROP, MENDS, SPREAD, THOUSANDS, TORN
 from servotwin.logs.stamps import CLOCKS, clock_of
 from servotwin.tables import TextTable, said_lines
-from servotwin.tables.dialect import MISSING, Row, has_decimal_commas
+from servotwin.tables.dialect import MISSING
+from servotwin.tables.thousands import grouped_in, without_groups
 
 if TYPE_CHECKING:
     from servotwin.logs.layout import Layout
@@ -117,36 +118,13 @@ def without_thousands(table: TextTable, mends: Collection[str]) -> TextTable:
     InputError
         If there are some, and it was not asked for.
     """
-    if table.separator == ",":
+    found = grouped_in(table, asked=THOUSANDS in mends)
+    if found is None:
         return table
-    mark = _grouping(table, asked=THOUSANDS in mends)
-    if not mark:
-        return table
-    grouped = _grouped(mark)
     if THOUSANDS not in mends:
-        line, name, cell = next((row.line, name, cell) for row in table.rows for name, cell in zip(
-            table.header, row.cells, strict=False) if grouped.fullmatch(cell))
-        other = "point" if mark == "," else "comma"
-        raise InputError(f"{table.path}: line {line}, {name}", got=cell, allowed=f"a number with a decimal {other}, as "
-                         f"other cells have it; {say(THOUSANDS, mends)}")
-    rows = [Row(row.line, [cell.replace(mark, "") if grouped.fullmatch(cell) else cell for cell in row.cells])
-            for row in table.rows]
-    said = f"{'points' if mark == '.' else 'commas'} within whole numbers are taken for thousands separators"
-    return replace(table, rows=rows, decimal="," if has_decimal_commas(rows, table.separator) else ".",
-                   remarks=(*table.remarks, said))
-
-
-def _grouped(mark: str) -> re.Pattern[str]:
-    other = "," if mark == "." else r"\."
-    return re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:{re.escape(mark)}\d{{3}})+(?:{other}\d*)?")
-
-
-def _grouping(table: TextTable, *, asked: bool) -> str:
-    """Return the mark that separates thousands: the other one has to be that of decimals, unless it was said."""
-    cells = [cell for row in table.rows for cell in row.cells if "." in cell or "," in cell]
-    found = {mark: [cell for cell in cells if mark in cell] for mark in ".,"}
-    groups = [mark for mark in ".," if found[mark] and all(_grouped(mark).fullmatch(cell) for cell in found[mark])]
-    return groups[0] if len(groups) == 1 and (asked or all(found.values())) else ""
+        raise InputError(f"{table.path}: line {found.line}, {found.column}", got=found.cell,
+                         allowed=f"a number {found.other}, as other cells have it; {say(THOUSANDS, mends)}")
+    return without_groups(table, found.mark)
 
 
 def sound(table: TextTable) -> TextTable:
