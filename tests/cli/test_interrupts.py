@@ -93,6 +93,46 @@ def test_a_termination_does_the_same(case, child_environment, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == files
 
 
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="a system without hang-ups")
+@pytest.mark.parametrize("ignored", [False, True])
+def test_a_closed_terminal_does_the_same_once(child_environment, tmp_path, ignored):
+    """Shells send a hang-up of their own beside that of the system; what was for the terminal goes nowhere."""
+    import fcntl
+    import os
+    import pty
+    import termios
+
+    program = START.replace("signal.SIGINT)", "signal.SIGHUP)") + """
+import os, time
+interrupts.watch([])
+with interrupts.finishing() as check:
+    print("ready", flush=True)
+    while os.isatty(1):
+        time.sleep(0.01)
+    ctrl_c()
+    try:
+        check()
+        print("went on", flush=True)
+    except KeyboardInterrupt:
+        print("kept", flush=True)
+    Path("best").write_text("so far")
+interrupts.leave(interrupts.code() if interrupts.noted() else 0)
+"""
+
+    def at_its_terminal():
+        signal.signal(signal.SIGHUP, signal.SIG_IGN if ignored else signal.SIG_DFL)
+        fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+
+    ours, theirs = pty.openpty()
+    child = subprocess.Popen([sys.executable, "-c", program], stdin=theirs, stdout=theirs, stderr=theirs, cwd=tmp_path,
+                             env=child_environment, start_new_session=True, preexec_fn=at_its_terminal)
+    os.close(theirs)
+    assert os.read(ours, 5) == b"ready"
+    os.close(ours)
+    assert child.wait(60) == (0 if ignored else 128 + signal.SIGHUP)
+    assert (tmp_path / "best").read_text() == "so far"
+
+
 def test_where_interrupts_are_ignored_they_stay_so(child_environment):
     program = START.replace("signal.default_int_handler", "signal.SIG_IGN") + """
 interrupts.watch([])

@@ -29,8 +29,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0: done; 2: bad input or an output that cannot be written; 130 or 143: interrupted, by Ctrl-C or SIGTERM; 1: a
-        validation above its --max-error, or a mistake of servotwin.
+        0: done; 2: bad input or an output that cannot be written; 130, 143 or 129: interrupted, by Ctrl-C, SIGTERM or
+        a closed terminal; 1: a validation above its --max-error, or a mistake of servotwin.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: the process ends with 130 or 143 and one line, and takes along what is half written.
+"""Ctrl-C, SIGTERM and a closed terminal: the process ends with 130, 143 or 129, one line, and nothing half written.
 
 No exception is raised into running code: while modules are imported or kernels compiled it would come out as another
 one, or be lost.
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from typing import NoReturn
 
 CODE = 130  # of a process that was interrupted
+_HANGUP = getattr(signal, "SIGHUP", None)  # Windows has none
 _CLEAR_LINE_SHOW_CURSOR = b"\r\x1b[2K\x1b[?25h"  # a bar may be there, which hides the cursor
 
 
@@ -32,6 +33,7 @@ class _State:
         self.finishing = False  # the first one is noted: there is something to keep
         self.noted = False
         self.code = CODE
+        self.terminals: list[int] = []  # streams that end there
         self.last_words: list[Callable[[], str | None]] = []
 
 
@@ -39,7 +41,7 @@ _state = _State()
 
 
 def watch(words: Sequence[str]) -> None:
-    """Let Ctrl-C or SIGTERM end this process; where they are ignored, as in a shell's background job, it stays so.
+    """Let Ctrl-C, SIGTERM or a closed terminal end this process; where they are ignored, as by nohup, it stays so.
 
     Parameters
     ----------
@@ -50,8 +52,12 @@ def watch(words: Sequence[str]) -> None:
     if threading.current_thread() is threading.main_thread():
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             signal.signal(signal.SIGINT, _interrupted)
-        if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
-            signal.signal(signal.SIGTERM, _interrupted)
+        for number in (signal.SIGTERM, *([] if _HANGUP is None else [_HANGUP])):
+            if signal.getsignal(number) is signal.SIG_DFL:
+                signal.signal(number, _interrupted)
+            elif number == _HANGUP:
+                signal.signal(number, lambda number, frame: _away_from_terminals())  # and goes on
+        _state.terminals = [stream for stream in (0, 1, 2) if os.isatty(stream)]
 
 
 def leave(code: int) -> NoReturn:
@@ -132,6 +138,9 @@ def _check() -> None:
 def _interrupted(number: int, frame: FrameType | None) -> None:
     if not _state.noted:
         _state.code = 128 + number
+    if number == _HANGUP:
+        signal.signal(number, signal.SIG_IGN)  # shells send another one
+        _away_from_terminals()
     if _state.held:
         _state.waiting = True
     elif _state.finishing and not _state.noted:
@@ -139,6 +148,13 @@ def _interrupted(number: int, frame: FrameType | None) -> None:
         _write(2, "servotwin: interrupted; keeping the best so far (Ctrl-C again: end at once)\n")
     else:
         _end()
+
+
+def _away_from_terminals() -> None:
+    """Send nowhere what was for a terminal that is closed: an error of writing would end what there is to keep."""
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for stream in _state.terminals:
+        os.dup2(nowhere, stream)
 
 
 def _end() -> NoReturn:

@@ -1,4 +1,4 @@
-"""How a command that fits goes on after Ctrl-C, SIGTERM or the time that it was given: with the best so far."""
+"""How a command that fits goes on after a signal, or the time that it was given: with the best so far."""
 
 from __future__ import annotations
 

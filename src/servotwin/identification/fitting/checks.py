@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -266,5 +267,9 @@ def shown(progress: Any) -> Iterator[Callable[[float, str], None]]:
         left = f"about {duration_left(gone, share)} left" if share > 0.0 and gone > _PATIENCE else ""
         bar.update(task, completed=share, description=text, left=left)
 
-    with bar:
+    bar.start()
+    try:
         yield tell
+    finally:
+        with contextlib.suppress(OSError):  # a terminal that was closed takes nothing along that was found
+            bar.stop()
