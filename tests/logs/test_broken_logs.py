@@ -217,12 +217,39 @@ def test_a_command_that_lacks_is_found_as_a_step_where_there_is_one(tmp_path):
         read_logs(waves, unknown_step=True)
 
 
-@pytest.mark.parametrize("stamp", ["2024-05-03T12:00:{:06.3f}", "12:00:{:06.3f}"])
+@pytest.mark.parametrize("stamp", ["2024-05-03T12:00:{:06.3f}", "12:00:{:06.3f}", "3.5.2024 12:00:{:06.3f}",
+                                   "5/3/2024 12:00:{:06.3f} PM"])
 @pytest.mark.parametrize("name", ["time", "time_s", "timestamp"])
 def test_dates_beside_our_own_names(tmp_path, stamp, name):
     rows = [f"{stamp.format(0.02 * k)},1500,1.5" for k in range(10)]
     log, = read_logs(written(tmp_path, [f"{name},pulse_width_us,output_angle_deg", *rows]))
     assert log.time.tolist() == pytest.approx((0.02 * np.arange(10)).tolist(), abs=1e-12)
+
+
+@pytest.mark.parametrize("stamps", [
+    ["11:59:59.90 PM", "12:00:00.00 AM", "12:00:00.10 AM"], ["31.12.2025 23:59:59,9", "1.1.2026 00:00:00,0",
+                                                              "1.1.2026 00:00:00,1"],
+    ["11:59:59.9 AM", "12:00:00.0 PM", "12:00:00.1 PM"]])
+def test_times_past_midnight_and_noon(tmp_path, stamps):
+    log, = read_logs(written(tmp_path, ["time;pulse_us;angle_deg", *(f"{stamp};1500;1" for stamp in stamps)]))
+    assert log.time.tolist() == pytest.approx([0.0, 0.1, 0.2], abs=1e-12)
+
+
+@pytest.mark.parametrize("mark", ["'", "\u00a0", "\u202f"])
+def test_blanks_and_apostrophes_within_numbers(tmp_path, mark):
+    rows = [f"{time};1{mark}500;1,5" for time in ("980", f"1{mark}000", f"1{mark}020")]
+    log, = read_logs(written(tmp_path, ["time_ms;pulse_us;angle_deg", *rows]))
+    assert log.time.tolist() == pytest.approx([0.98, 1.0, 1.02])
+    assert log.command[0] == 1500e-6
+
+
+def test_decimal_commas_among_commas_are_quoted(tmp_path):
+    rows = [f'"{20 * k}","1500","{k},5"' for k in range(9)]
+    log, = read_logs(written(tmp_path, ['"time_ms","pulse_us","angle_deg"', *rows]))
+    assert np.degrees(log.measured["output_angle"][2]) == pytest.approx(2.5)
+    with pytest.raises(InputError, match="thousands"):
+        read_logs(written(tmp_path, ['"time_ms","pulse_us","angle_deg"', *(
+            f'"{20 * k if k < 50 else format(20 * k, ",")}","1500","5"' for k in range(60))]))
 
 
 def test_labels_in_another_order_or_torn(tmp_path):

@@ -170,8 +170,8 @@ def test_a_row_that_does_not_end_is_left_out_and_that_is_said(tmp_path):
 
 
 @pytest.mark.parametrize(("content", "columns", "words"), [
-    ("a,b,c\n" + body(), None, ("a, b, c", '--columns "time=a:s command=b:us angle=c:deg"')),
-    (body(), None, ("no header, 3 columns", '--columns "time=1:s command=2:us angle=3:deg"')),
+    ("a,b,c\n" + body(), None, ("a, b, c", '--columns "time=a:ms command=b:us angle=c:deg"')),
+    (body(), None, ("no header, 3 columns", '--columns "time=1:ms command=2:us angle=3:deg"')),
     ("millis,pwm,adc\n" + body("512"), None, ("column adc holds counts", "512", '--columns "angle=adc:0.3deg-90"')),
     ("millis,pwm,pot\n" + body("512"), None, ("column pot holds counts",)),
     ("millis,pwm,angle\n" + body("0.5"), None, ("unit of column angle is not known", "0.5", "deg or rad")),
@@ -193,7 +193,11 @@ def test_a_row_that_does_not_end_is_left_out_and_that_is_said(tmp_path):
     ("millis,pwm,angle\n0,1500,9\n20,1500\n40,1500,9\n", None, ("line 3", "2 cells", "3, as the header")),
     ("millis,pwm,angle\n0,1500,9\n20,15_00,9\n40,1500,9\n", None, ("line 3, pwm", "'15_00'")),
     ("timestamp,pwm,angle\n2024-05-03T12:00:00Z,1500,9\n2024-05-03T12:00:01,1500,9\n", None, ("line 3", "time zone")),
-    ("timestamp,pwm,angle\n03/05/2024 12:00:00,1500,9\n03/05/2024 12:00:01,1500,9\n", None, ("line 2, timestamp",)),
+    ("timestamp,pwm,angle\nMay 3 12:00:00,1500,9\nMay 3 12:00:01,1500,9\n", None, ("line 2, timestamp",)),
+    ("ms,servo,angle\n" + "".join(f"{20 * k},{90 + k},{90 + k}\n" for k in range(9)), None, ("command=servo:deg",)),
+    ("ms,servo,angle\n" + "".join(f"{20 * k},{90 + k},{90 + k}\n" for k in range(9)), "command=servo:us",
+     ("98 us at most", "degrees or ticks")),
+    ("min:0\tmax:180\tpwm:1500\tangle:9\n" * 5, None, ("no time", "--rate 50Hz")),
     ("timestamp,pwm,angle\n2024-05-03T12:00:00,1500,9\nsoon,1500,9\n", None, ("line 3, timestamp", "'soon'", "dates")),
     (b"PK\x03\x04" + b"\0" * 50, None, ("Excel workbook",)), (b"\x89PNG\r\n", None, ("a picture",)),
     (bytes(range(1, 32)) * 9, None, ("binary data",)),

@@ -16,6 +16,7 @@ from servotwin.logs.clock import Timed, timed
 from servotwin.logs.column_words import Wanted, wanted_columns
 from servotwin.logs.columns import COMMANDS, SWITCH, TIME, Column, switch_value
 from servotwin.logs.defined import defined_commands, is_defined
+from servotwin.logs.impossible import check_said
 from servotwin.logs.json_file import json_bytes
 from servotwin.logs.layout import NEEDS, Layout, is_known_name, layout_of
 from servotwin.logs.log import Log
@@ -126,7 +127,9 @@ def read_log_table(path: Path, mends: Sequence[str], wanted: Mapping[str, Wanted
     said = sidecar_of(path, None if sidecar is None else Path(sidecar))
     table = without_thousands(without_text(table), mends)
     layout = layout_of(sound(table), said.columns, wanted, needs=needs, unknown_step=unknown_step)
-    return LogTable(without_torn(table, layout, mends), layout, said)
+    table = without_torn(table, layout, mends)
+    check_said(table, layout)
+    return LogTable(table, layout, said)
 
 
 def _log(path: Path, part: Timed, layout: Layout, said: Sidecar, suffix: str) -> Log:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError
 from servotwin.logs.columns import UNITS, Column, dimension_of_signal
 from servotwin.logs.defined import is_defined
+from servotwin.logs.layout import SAID
 from servotwin.logs.log_checks import largest_of
 from servotwin.units import from_si
 
@@ -33,6 +34,18 @@ def impossible(table: TextTable, layout: Layout) -> NDArray[np.bool_]:
         if beyond.mean() <= _MOST:
             found |= beyond
     return found
+
+
+def check_said(table: TextTable, layout: Layout) -> None:
+    """Raise if a column that was said to hold pulses holds none that a servo takes: names the column and its values."""
+    column = layout.columns.get("pulse_width")
+    if column is None or not any(one.column == column.column and one.known == SAID for one in layout.shown):
+        return
+    values = column.to_si(table.numbers(column.column, missing=np.nan), "pulse_width")
+    longest = float(np.nanmax(values, initial=-np.inf))
+    if 0.0 < longest < _PULSES[0]:
+        raise InputError(f"{table.path}: pulses of {column.column}", got=f"{1e6 * longest:.4g} us at most",
+                         allowed=f"{1e6 * _PULSES[0]:g} us or more: milliseconds, degrees or ticks?")
 
 
 def refuse(one: TextTable, layout: Layout) -> None:

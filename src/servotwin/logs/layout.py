@@ -17,6 +17,7 @@ from servotwin.logs.reading import ReadColumn
 from servotwin.logs.stamps import clock_of
 from servotwin.logs.unknown_step import step_of
 from servotwin.tables import TextTable
+from servotwin.tables.dialect import MISSING
 from servotwin.tables.serial import ARRIVAL
 from servotwin.units.words import COUNTS, unit_shown, units_written
 
@@ -224,6 +225,8 @@ def _candidates(table: TextTable, found: Iterable[tuple[str, names.Meaning]], ro
         increasing = meaning.role in (names.TIME, names.SOME_TIME) and is_increasing(table, name)
         if meaning.role == names.SOME_TIME and not increasing:
             continue
+        if meaning.role == names.TIME and len(table.rows) > 1 and _stays(table.cells(name)):
+            continue  # "min:0,max:180" for the scale of a plotter
         if meaning.role not in roles:
             continue
         made.append(_Candidate(name, meaning, _guessed(table, name, meaning)))
@@ -235,6 +238,10 @@ def _candidates(table: TextTable, found: Iterable[tuple[str, names.Meaning]], ro
         made = [one for one in made if is_increasing(table, one.column)] or made
         made = [one for one in made if one.meaning.role == names.TIME] or made
     return made
+
+
+def _stays(cells: Sequence[str]) -> bool:
+    return cells[0].lower() not in MISSING and len(set(cells)) == 1
 
 
 def _guessed(table: TextTable, name: str, meaning: names.Meaning) -> Guess | None:
@@ -314,8 +321,7 @@ def _unknown(table: TextTable, lacking: list[str], made: Mapping[str, tuple[Colu
     """Return the error of a table without a time, a command or an angle that could be told."""
     taken = {column.column for column, _ in made.values()}
     free = [name for name in table.header if name not in taken]
-    units = {TIME: "s", COMMAND: "us", "angle": "deg"}
-    words = " ".join(f"{what}={name}:{units[what]}" for what, name in zip(
+    words = " ".join(f"{what}={name}:{_likely(table, what, name)}" for what, name in zip(
         lacking, [*free, *["COLUMN"] * len(lacking)], strict=False))
     usual = {TIME: "time_s", COMMAND: "pulse_width_us, command_angle_deg or command_voltage_V",
              "angle": "output_angle_deg or feedback_voltage_V"}
@@ -330,6 +336,16 @@ def _unknown(table: TextTable, lacking: list[str], made: Mapping[str, tuple[Colu
                     f"--commanded {step.command}, as the angle shows an unknown step {step.words}")
     return InputError(f"{table.path}: {what}", got=got, allowed=", or ".join(
         [*more, f"names such as {', '.join(usual[one] for one in lacking)}", f'{SAID} "{words}"']))
+
+
+def _likely(table: TextTable, what: str, name: str) -> str:
+    """Return the unit that a column would be in, were it a time, a command or an angle."""
+    role = {TIME: names.TIME, COMMAND: names.COMMAND, "angle": names.ANGLE}[what]
+    try:
+        found = guess(table, name, role) if name in table.header else None
+    except InputError:  # no numbers
+        found = None
+    return {TIME: "s", COMMAND: "us", "angle": "deg"}[what] if found is None else found.unit
 
 
 def _check(table: TextTable, made: Mapping[str, tuple[Column, str]], needs: Sequence[str]) -> None:

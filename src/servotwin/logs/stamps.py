@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,8 @@ from servotwin.errors import InputError
 from servotwin.tables import TextTable
 
 _ISO = re.compile(r"(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d(?::\d\d(?:[.,]\d{1,9})?)?)(Z|[+-]\d\d:?\d\d)?", re.IGNORECASE)
-_CLOCK = re.compile(r"(\d{1,2}):(\d\d):(\d\d)(?:[.,](\d{1,9}))?")
+_CLOCK = re.compile(r"(?:(\d{1,2}[./-]\d{1,2}[./-]\d{2,4}),?[ T])?"  # of which day, whatever comes first
+                    r"(\d{1,2}):(\d\d):(\d\d)(?:[.,](\d{1,9}))?(?: ?([AP])\.?M\.?)?", re.IGNORECASE)
 _SECOND = 1_000_000_000  # ns
 _DAY = 86400 * _SECOND
 CLOCKS = {"iso": "dates such as 2024-05-03T12:00:01.250", "clock": "times such as 12:00:01.250"}
@@ -36,8 +38,8 @@ def clock_of(cell: str) -> str:
 
     Examples
     --------
-    >>> clock_of("12:00:01.25"), clock_of("2024-05-03T12:00"), clock_of("1.25")
-    ('clock', 'iso', '')
+    >>> clock_of("12:00:01.25"), clock_of("3.5.2024 12:00:01"), clock_of("2024-05-03T12:00"), clock_of("1.25")
+    ('clock', 'clock', 'iso', '')
     """
     if ":" not in cell:
         return ""
@@ -85,10 +87,17 @@ def _zone(text: str) -> int:
 
 def _clock(table: TextTable, column: str, cells: Sequence[str]) -> NDArray[np.float64]:
     found = [_matched(_CLOCK, table, k, column, cell, "clock") for k, cell in enumerate(cells)]
-    times = np.array([(3600 * int(m[1]) + 60 * int(m[2]) + int(m[3])) * _SECOND + int((m[4] or "0").ljust(9, "0"))
-                      for m in found], dtype=np.int64)
-    days = np.cumsum(np.append(0, np.diff(times) < -_DAY // 2))  # past midnight
+    times = np.array([(3600 * _hour(m[2], m[6]) + 60 * int(m[3]) + int(m[4])) * _SECOND
+                      + int((m[5] or "0").ljust(9, "0")) for m in found], dtype=np.int64)
+    dated = all(m[1] for m in found)
+    later = np.array([a[1] != b[1] for a, b in pairwise(found)], bool) if dated else np.diff(times) < -_DAY // 2
+    days = np.cumsum(np.append(0, later))  # past midnight
     return np.asarray((times + _DAY * days - times[0]) / _SECOND)
+
+
+def _hour(hour: str, half: str | None) -> int:
+    """Return the hour of the day; of its halves the first begins with 12 AM, the second with 12 PM."""
+    return int(hour) if half is None else int(hour) % 12 + 12 * (half.upper() == "P")
 
 
 def _matched(form: re.Pattern[str], table: TextTable, k: int, column: str, cell: str, unit: str) -> re.Match[str]:

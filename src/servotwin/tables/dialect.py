@@ -14,7 +14,7 @@ SEPARATORS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", " ": 
 _SAMPLE = 60  # lines from each of begin, middle and end
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
 _WHOLE_OR_POINT = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
-_STAMP = re.compile(r"\d{4}-\d\d-\d\d|\d{1,2}:\d\d:\d\d")
+_STAMP = re.compile(r"\d{4}-\d\d-\d\d|(\d{1,2}[./-]\d{1,2}[./-]\d{2,4},?[ T])?\d{1,2}:\d\d:\d\d")
 _DECIMAL_COMMA = re.compile(r"(?<![\d.,])[+-]?\d*,\d+(?![\d.,])")
 
 
@@ -113,6 +113,6 @@ def is_data(cells: Sequence[str]) -> bool:
 
 
 def has_decimal_commas(rows: Iterable[Row], separator: str) -> bool:
-    """Return whether any cell is a number with a comma in place of its point."""
-    return separator != "," and any(
-        "," in cell and _DECIMAL_COMMA.match(cell) is not None for row in rows for cell in row.cells)
+    """Return whether any cell is a number with a comma in place of its point; among commas it was quoted."""
+    form = _DECIMAL_COMMA.fullmatch if separator == "," else _DECIMAL_COMMA.match
+    return any("," in cell and form(cell) is not None for row in rows for cell in row.cells)

@@ -24,6 +24,7 @@ from servotwin.tables.dialect import (
 )
 from servotwin.tables.serial import ARRIVAL, labelled_rows, without_times
 from servotwin.tables.text import Text, read_text
+from servotwin.tables.thousands import BLANKS, without_blanks
 from servotwin.units.words import is_unit
 
 _MARKS = frozenset(comment[0] for comment in COMMENTS)
@@ -251,6 +252,8 @@ def read_table(path: str | Path, known: Callable[[str], bool] = lambda name: Fal
         found = list(rows(lines, separator)) if labelled is None else labelled
     except csv.Error as error:
         raise InputError(f"{path}: not readable as CSV ({error})") from None
+    if any(mark in line for line in lines for mark in BLANKS):
+        found = without_blanks(found)
     table = _table(path, text, found, separator, known, remarks)
     return _with_arrivals(table, arrivals) if arrivals else table
 

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from servotwin.tables.reading import TextTable
 
 _FAR = 10.0  # times: whole numbers that are larger than all others, were the mark one of decimals
+BLANKS = "\u00a0\u202f\u2009'\u2019"  # that do not end a line, and marks of Switzerland
+_BLANK = re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:[{BLANKS}]\d{{3}})+(?:[.,]\d*)?")
 _WHOLE = re.compile(r"[+-]?\d{1,3}")
 
 
@@ -34,8 +36,6 @@ def grouped_in(table: TextTable, *, asked: bool = False) -> Grouped | None:
     The other mark is that of decimals, or whole numbers without a mark stand in one column with numbers of three
     places: 500, 980, 1.020. Who `asked` knows it.
     """
-    if table.separator == ",":
-        return None
     cells = [cell for row in table.rows for cell in row.cells if "." in cell or "," in cell]
     found = {mark: [cell for cell in cells if mark in cell] for mark in ".,"}
     marks = [mark for mark in ".," if found[mark] and all(_form(mark).fullmatch(cell) for cell in found[mark])]
@@ -48,6 +48,12 @@ def grouped_in(table: TextTable, *, asked: bool = False) -> Grouped | None:
     other = f"such as {mixed}" if mixed else f"with a decimal {'point' if mark == ',' else 'comma'}"
     return next(Grouped(mark, row.line, name, cell, other) for row in table.rows
                 for name, cell in zip(table.header, row.cells, strict=False) if _form(mark).fullmatch(cell))
+
+
+def without_blanks(rows: list[Row]) -> list[Row]:
+    """Return rows without blanks and apostrophes within numbers (1'020), which separate nothing but thousands."""
+    return [row if not any(mark in cell for cell in row.cells for mark in BLANKS) else Row(row.line, [
+        re.sub(f"[{BLANKS}]", "", cell) if _BLANK.fullmatch(cell) else cell for cell in row.cells]) for row in rows]
 
 
 def check_thousands(table: TextTable) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.identification.fitting.suspicions.look import rough_noise
 from servotwin.loads import Load
 from servotwin.logs.columns import COMMANDS
 from servotwin.logs.defined import is_defined
@@ -30,6 +31,7 @@ _USUAL = (0.7, 1.4)  # angle over commanded angle
 _PULSE_GAINS = (math.radians(0.03) * 1e6, math.radians(0.4) * 1e6)  # rad/s of pulse
 _FASTEST = math.radians(3000.0)  # rad/s
 _ALONE = math.radians(5.0)  # more than noise
+_STUCK, _MUCH_NOISE = 10, 2.0  # rows without noise, of a sensor that has so many steps of it elsewhere
 _TURN = 2.0 * math.pi
 _CENTRE = math.radians(90.0)
 _OFF_ZERO = 10.0  # deg
@@ -54,8 +56,9 @@ def wrong_of(log: Log, clock: Clock, values: Values, motion: Motion) -> Iterator
     if jumps:
         yield (f"the angle jumps by a whole turn, {jumps} times: a sensor that begins again; servotwin fit ... --mend "
                "wrap joins the pieces")
-    elif motion.speed > _FASTEST and log.angle_name == "output_angle":
-        yield (f"the shaft turns at {math.degrees(motion.speed):.0f} deg/s, faster than any servo: look at the "
+    elif np.fmax(motion.speed, np.ptp(seen) / log.duration) > _FASTEST and log.angle_name == "output_angle":
+        speed = float(np.fmax(motion.speed, np.ptp(seen) / log.duration))
+        yield (f"the shaft turns at {math.degrees(speed):.0f} deg/s, faster than any servo: look at the "
                f"units of angle and time ({clock.period:.3g} s a row)")
     if not len(log.changes) and motion.onset > _LATE and not _defined(log):
         yield (f"the shaft begins to move {motion.onset:.2g} s after the first row, and the command never changes: "
@@ -66,9 +69,28 @@ def wrong_of(log: Log, clock: Clock, values: Values, motion: Motion) -> Iterator
         ends = [f"{count} rows stand at {'the lowest' if low else 'the highest'} value"
                 for count, low in ((values.flat_low, True), (values.flat_high, False)) if count]
         yield f"{' and '.join(ends)} without noise: the sensor is at the end of its range, or the shaft on a stop"
+    yield from _stands(log, angle, values)
     if motion.lag < 0.0 and motion.steps == 0 and abs(motion.correlation) > _CLEAR:
         yield (f"the angle comes {-1e3 * motion.lag:.0f} ms before the command: the columns have two clocks, or the "
                "command was logged late")
+
+
+def _stands(log: Log, angle: NDArray[np.float64], values: Values) -> Iterator[str]:
+    """Give where a reading stays the same to the last digit, of a sensor with noise, long after the command moved."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], np.diff(angle) == 0.0, [False]]).astype(int)))
+    runs = [(first, last) for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+            if last - first >= _STUCK]
+    others = np.ones(len(angle), np.bool_)
+    for first, last in runs:
+        others[first:last + 1] = False
+    if not rough_noise(angle[others & np.isfinite(angle)]) > _MUCH_NOISE * values.step > 0.0:
+        return
+    for first, last in runs:
+        moved = np.abs(log.held[first:last + 1] - log.held[first]) > _LARGE.get(log.command_kind, math.inf) / 10.0
+        if moved.any() and log.time[last] - log.time[first + np.argmax(moved)] > _ARRIVED:
+            start, stop = float(log.time[first]), float(log.time[last])
+            yield (f"the angle stays the same to the last digit from {start:.4g} to {stop:.4g} s, while the command "
+                   f"moves on: the sensor stood still there; --leave-out {start:.4g}..{stop:.4g} leaves that out")
 
 
 def _failed(log: Log, angle: NDArray[np.float64]) -> NDArray[np.bool_]:
