@@ -78,7 +78,8 @@ def test_what_a_log_holds(cli):
     ([f"{10 * k},{(k // 100) % 2 * 40},{(7 * k + 300) % 360:.1f}" for k in range(600)], "jumps by a whole turn"),
     ([f"{10 * k},{(k // 100) % 2 * 40},{300 if k == 250 else (k // 100) % 2 * 40}.00" for k in range(600)],
      "1 reading of the angle, the first at 2.5 s"),
-    ([f"{10 * k},{(k // 100) % 2 * 40},{0.05 if 250 <= k < 450 else 0.01 * (k * k * 7919 % 997 % 37):.2f}" for k in range(600)],
+    ([f"{10 * k},{(k // 100) % 2 * 40},{0.05 if 250 <= k < 450 else 0.01 * (k * k * 7919 % 997 % 37):.2f}"
+      for k in range(600)],
      "to the last digit from 2.5 to 4.49 s"),
     ([f"{0.01 * k},{(k // 100) % 2 * 40},{(k // 100) % 2 * 40}.00" for k in range(600)], "faster than any servo"),
     ([f"{10 * k},{(k // 100) % 2 * 40},5.00" for k in range(600)], "the shaft does not"),
