@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as some
 from typer.main import get_command
 
+import servotwin as st
 from servotwin.cli import layout, main, terminal
 from servotwin.cli.app import app
 
@@ -23,6 +24,13 @@ LEFT_OUT = ("servotwin paper", "servotwin web", "servotwin wire", "servotwin ben
             "servotwin catalog which --motion", "servotwin simulate my-servo",
             "servotwin linear hitec-hs-755hb --load inertia=1e-3 --frame", "servotwin log ",
             "servotwin doctor my-servo", "servotwin doctor hitec")
+# ... and what these tell of a log and a table that are made here
+OF_FILES = (
+    "servotwin log run.csv", "servotwin validate hitec-hs-422 run.csv", "servotwin doctor hitec-hs-422 run.csv",
+    "servotwin doctor hitec-hs-422 --load inertia=1e-3 --set electronics.stretcher_gain=2500", "servotwin doctor",
+    "servotwin fit --table table.csv --servo towerpro-mg90s --arm 1cm",
+    "servotwin fit --table lifts.csv --servo towerpro-mg90s --arm 1cm",
+    "servotwin fit run.csv --servo hitec-hs-422 --free output_inertia,output_coulomb_torque --no-compare --no-trials")
 FIRST = "servotwin catalog which --lift 0.5kg --arm 10cm --voltage 5 --time 0.3"
 
 
@@ -52,10 +60,22 @@ def test_no_command_is_left_out_by_mistake():
     assert len(documented()) > 15
 
 
-@pytest.mark.parametrize("line", documented())
+def made(folder):
+    """Write a log and two tables."""
+    model = st.PulseServo(st.load_servo("hitec-hs-422"))
+    run = st.simulate(model, st.signals.step(-0.5, 0.2, at=0.5, unit="rad"), duration=1.5, output_step=0.01)
+    run.save(folder / "run.csv")
+    (folder / "table.csv").write_text("mass_g,current_mA\n100,230\n200,300\n320,370\n400,405\n450,450\n")
+    (folder / "lifts.csv").write_text("mass_g,current_mA,time_60deg_s\n0,130,0.11\n100,230,0.13\n200,300,0.16\n"
+                                      "320,370,0.21\n400,450,0.27\n")
+
+
+@pytest.mark.parametrize("line", [*documented(), *OF_FILES])
 def test_every_number_of_a_wide_terminal_stands_in_a_narrow_one(line, tmp_path, monkeypatch, capsys):
     """All widths are drawn of one run."""
     monkeypatch.chdir(tmp_path)
+    if line in OF_FILES:
+        made(tmp_path)
     monkeypatch.setenv("COLUMNS", str(WIDE))
     drawn = {width: "" for width in WIDTHS}
     as_drawn = terminal.drawn

@@ -17,16 +17,16 @@ from servotwin.identification.fitting.task import Task
 from servotwin.identification.fitting.uncertainty import Rows, rows_of, uncertainty
 from servotwin.identification.fitting.words import simplest
 
-LINEARISED = "intervals (those here are of the problem made straight at the best so far, twice as wide)"
+LINEARISED = "intervals (those here are of the problem made straight at the best so far, three times as wide)"
 """What is not known, where there are such."""
-_UNKNOWN = 2.0  # times as wide: how the problem bends is not known
+_UNKNOWN = 3.0  # times as wide, assumed: among kinks those of a finished fit are up to three times what is straight
 
 
 def hurried(task: Task, found: Outcome, level: float) -> tuple[Outcome, Doubts]:
     """Return where a fit was stopped, in the noise that it leaves there, and what is known of its numbers by then.
 
     The problem counts as straight there. How far its end is, and how it bends, is not known: intervals reach to either
-    side of where a whole step would lead, and are twice as wide.
+    side of where a whole step would lead, and are three times as wide.
     """
     forecast, nothing = task.forecast, Doubts()
     try:
