@@ -141,3 +141,18 @@ def test_the_stall_torque_at_80_columns(capsys, monkeypatch, tmp_path):
     assert float(row[4]) > 1.0
     assert re.fullmatch(r"\d\.\d{3}", row[4])
     assert max(map(len, said.splitlines())) <= 80
+
+
+def commands(command, path=()):
+    """Return the words of a command and of those below it."""
+    return [path] + [words for name, each in getattr(command, "commands", {}).items()
+                     for words in commands(each, (*path, name))]
+
+
+@pytest.mark.parametrize("words", commands(get_command(app)), ids=" ".join)
+def test_no_word_of_a_help_is_cut_at_80_columns(words, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main([*words, "--help"]) == 0
+    told = capsys.readouterr().out
+    assert "Usage" in told
+    assert "…" not in told

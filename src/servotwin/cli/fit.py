@@ -68,10 +68,10 @@ def fit(
         metavar="NAME", help="Parameters to search for, repeatable or with commas: names of servo and load, and "
         "output_torque_constant, output_inertia, output_coulomb_torque.", rich_help_panel=_SEARCH)] = None,
     bounds: Annotated[list[str] | None, typer.Option(
-        metavar="NAME=LOWEST..HIGHEST", help="Range to search, such as motor.armature_resistance=2ohm..5ohm; "
+        metavar="NAME=LOW..HIGH", help="Range to search, such as output_inertia=1e-3..1e-2; "
         "repeatable.", rich_help_panel=_SEARCH)] = None,
     prior: Annotated[list[str] | None, typer.Option(
-        metavar="NAME=VALUE±STD", help="Prior knowledge, such as motor.armature_resistance=3ohm±10%; "
+        metavar="NAME=VALUE±STD", help="Prior knowledge, such as output_inertia=4e-3±30%; "
         "repeatable. The spreads in the servo file apply to the others.", rich_help_panel=_SEARCH)] = None,
     no_priors: Annotated[bool, typer.Option(
         "--no-priors", help="Ignore the spreads in the servo file.", rich_help_panel=_SEARCH)] = False,
