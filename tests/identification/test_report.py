@@ -147,6 +147,8 @@ def test_what_is_not_determined_is_said(fit):
 def test_an_interrupted_fit_says_so(fit):
     text = report.page(replace(fit, interrupted=True, doubt=None, ends={}, warnings=("a < b",)))
     assert "The fit was interrupted" in text
+    assert "there are no intervals" in text
+    assert "there are no intervals" not in report.page(replace(fit, interrupted=True))
     assert "<p>a &lt; b</p>" in text
     assert "none: not asked for" in text
     read(text)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from servotwin.datasheet import DataSheet, VoltageSheet
 
 _STYLE = """
-figure img.drawing{width:100%}figure.wide img.drawing{width:100%;max-width:54rem}
+figure img.drawing{width:100%;max-width:30rem}figure.wide img.drawing{width:100%;max-width:54rem}
 .sheet td:nth-child(n+2),.sheet th:nth-child(n+2){text-align:right;font-variant-numeric:tabular-nums}
 .sheet td:nth-child(5){font-weight:600}.pairs td:first-child{white-space:nowrap;color:var(--soft)}
 .yes{border-left-color:#009e73;background:#f0faf6}

@@ -109,8 +109,9 @@ def _summary(fit: Fit) -> str:
     notes = "".join(f'<div class="note"><p>{escape(text)}</p></div>\n' for text in fit.warnings
                     if fit.verdict is None or text != fit.verdict.sentence)
     if fit.interrupted:
+        nothing = "" if known else ", and there are no intervals"
         notes = ('<div class="note"><p><strong>The fit was interrupted.</strong> This is the best that it had found; '
-                 "there may be better values, and there are no intervals.</p></div>\n") + notes
+                 f"there may be better values{nothing}.</p></div>\n") + notes
     return f'<ul class="numbers">{listed}</ul>\n{notes}'
 
 

@@ -85,10 +85,13 @@ def _step(seen: Array) -> float:
 
 
 def _flat(seen: Array, end: float) -> int:
-    """Return how many rows stand at an end of the range, in runs without noise where others have some."""
+    """Return how many rows stand at an end of the range, in runs without noise where others have some.
+
+    At its first row a shaft may be at rest there.
+    """
     if np.mean(np.diff(seen) != 0.0) < _MOVES:
         return 0
     at = np.concatenate([[0], (seen == end).astype(int), [0]])
     edges = np.flatnonzero(np.diff(at))
-    runs = edges[1::2] - edges[::2]
+    runs = (edges[1::2] - edges[::2])[edges[::2] > 0]
     return int(runs[runs >= _FLAT].sum())
