@@ -279,7 +279,7 @@ def test_thousands_are_no_decimals(tmp_path, rows, said):
 
 @pytest.mark.parametrize("rows", [
     "0.500;0.800\n1.000;1.100\n1.500;1.400\n2.000;1.700", "0,5;1,125\n1;1,25\n1,5;1,375\n2;1,625",
-    "1;1.125\n2;1.375\n3;1.625\n4;1.875"])
+    "1;1.125\n2;1.375\n3;1.625\n4;1.875", "1;1\n2.500;2.250\n3;3\n4;4"])
 def test_decimals_are_no_thousands(tmp_path, rows):
     (tmp_path / "table.csv").write_text(f"mass_kg;current_A\n{rows}\n")
     assert calibrate_loads(tmp_path / "table.csv", arm=0.02).figure("heaviest load").value < 1.0

@@ -85,6 +85,12 @@ def test_prices_are_a_shop_and_the_cheapest_comes_first(which, tmp_path):
     assert "price, EUR" in which("--limit", "price=10", "--prices", "shop.csv").out
 
 
+def test_limits_and_prices_that_cannot_be(which, tmp_path):
+    assert "NAME=VALUE" in which("--limit", "price<=3", "--lift", "100g", "--arm", "10cm").error
+    (tmp_path / "shop.csv").write_text("servo;price_EUR\nhitec-hs-422;999\ntowerpro-sg90;1.200\n")
+    assert "1200, if the point" in which("--lift", "100g", "--arm", "10cm", "--prices", "shop.csv").error
+
+
 def test_usb_is_a_supply_wherever_one_is_said(cli, which):
     usb = st.Supply.of("usb")
     assert (usb.open_circuit_voltage, usb.current_limit) == (5.0, 0.5)

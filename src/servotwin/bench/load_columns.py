@@ -20,7 +20,6 @@ from servotwin.errors import InputError
 from servotwin.logs.column_names import COMMAND, COMMAND_ANGLE, PULSE, TIME, meaning_of
 from servotwin.logs.sidecar import FOLDER_FILE, sidecar_path
 from servotwin.tables import read_table
-from servotwin.tables.thousands import check_thousands
 from servotwin.units import is_finite
 from servotwin.units.quantities import quantity
 
@@ -196,7 +195,6 @@ def _columns(table: str | Path | Mapping[str, ArrayLike]
         return [(name, "", values) for name, values in given.items()]
     read = read_table(table, _known)
     read.check_lengths(shorter=True)
-    check_thousands(read)
     columns: list[tuple[str, str, NDArray[np.float64] | InputError]] = []
     for k, name in enumerate(read.header):
         try:

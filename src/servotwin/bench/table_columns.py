@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 from servotwin.bench.dial_names import dial_columns
 from servotwin.errors import InputError
 from servotwin.tables import read_table
-from servotwin.tables.thousands import check_thousands
 
 
 class _Quantity(NamedTuple):
@@ -230,7 +229,6 @@ def _of_file(path: Path) -> tuple[dict[str, NDArray[np.float64] | InputError], d
     """Return the columns of a file, and the units that a line below the header says of them."""
     table = read_table(path, lambda name: _NUMBER.sub("", name) in _NAMES)
     table.check_lengths(shorter=True)
-    check_thousands(table)
     twice = [name for name in table.header if name and table.header.count(name) > 1]
     if twice:
         raise InputError(f"{path}: column", got=f"{twice[0]} {table.header.count(twice[0])} times",

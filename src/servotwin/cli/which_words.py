@@ -60,7 +60,7 @@ def limits_of(words: Sequence[str], time: str | None = None) -> Limits:
         found["time"] = quantity("--time", time, "time", bare=True, positive=True)
     for word in (part for each in words for part in each.split(",")):
         name, equals, text = (word.partition("=")[k].strip() for k in range(3))
-        if not (name and equals and text):
+        if not (name and equals and text) or name[-1] in "<>":
             raise InputError("--limit", got=word, allowed=_FORM)
         if name in found:
             raise InputError(f"--limit {name}", got="two values", allowed="one")

@@ -119,7 +119,7 @@ def read_log_table(path: Path, mends: Sequence[str], wanted: Mapping[str, Wanted
     asked = {one.column for one in wanted.values()}
     try:
         table = read_table(path, lambda name: name in asked or is_known_name(name), unended=False, serial=True,
-                           damaged=TORN in mends)
+                           damaged=TORN in mends, grouped=True)
     except InputError as error:
         if error.got != NUL:
             raise

@@ -24,7 +24,7 @@ from servotwin.tables.dialect import (
 )
 from servotwin.tables.serial import ARRIVAL, labelled_rows, without_times
 from servotwin.tables.text import Text, read_text
-from servotwin.tables.thousands import BLANKS, without_blanks
+from servotwin.tables.thousands import BLANKS, check_thousands, without_blanks
 from servotwin.units.words import is_unit
 
 _MARKS = frozenset(comment[0] for comment in COMMENTS)
@@ -192,7 +192,8 @@ def _frozen(values: list[float]) -> NDArray[np.float64]:
 
 
 def read_table(path: str | Path, known: Callable[[str], bool] = lambda name: False, *,
-               unended: bool = True, serial: bool = False, damaged: bool = False) -> TextTable:
+               unended: bool = True, serial: bool = False, damaged: bool = False,
+               grouped: bool = False) -> TextTable:
     r"""Return the table in a text file.
 
     Commas, semicolons, tabs, bars or blanks separate its cells; decimals have a point or, unless commas separate, a
@@ -211,11 +212,13 @@ def read_table(path: str | Path, known: Callable[[str], bool] = lambda name: Fal
         Whether lines may be those of the Arduino IDE: `12:03:11.123 -> 20,1500`, `pwm:1500,adc:512`.
     damaged : bool
         Whether there may be zeros within the text.
+    grouped : bool
+        Whether points or commas may separate thousands, and whoever reads the table looks for them.
 
     Raises
     ------
     InputError
-        If the file cannot be read, is no text, has no rows, or a quoted cell that does not end.
+        If the file cannot be read, is no text, has no rows, a quoted cell that does not end, or separated thousands.
 
     Examples
     --------
@@ -255,6 +258,8 @@ def read_table(path: str | Path, known: Callable[[str], bool] = lambda name: Fal
     if any(mark in line for line in lines for mark in BLANKS):
         found = without_blanks(found)
     table = _table(path, text, found, separator, known, remarks)
+    if not grouped:
+        check_thousands(table)
     return _with_arrivals(table, arrivals) if arrivals else table
 
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from servotwin.tables.reading import TextTable
 
+_HUNDREDS = 100  # in the same column: 2.500 beside 1 and 3 was written by hand
 _FAR = 10.0  # times: whole numbers that are larger than all others, were the mark one of decimals
 BLANKS = "\u00a0\u202f\u2009'\u2019"  # that do not end a line, and marks of Switzerland
 _BLANK = re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:[{BLANKS}]\d{{3}})+(?:[.,]\d*)?")
@@ -90,5 +91,7 @@ def _mixed(table: TextTable, mark: str) -> Iterator[str]:
         if not marked or not whole:
             continue
         largest = max(abs(float(cell.replace(mark, ".", 1).replace(mark, ""))) for cell in marked)
-        if any(cell.endswith("0") for cell in marked) or min(abs(int(cell)) for cell in whole) > _FAR * largest:
+        numbers = [abs(int(cell)) for cell in whole]
+        printed = max(numbers) >= _HUNDREDS and any(cell.endswith("0") for cell in marked)
+        if printed or min(numbers) > _FAR * largest:
             yield whole[0]
