@@ -132,4 +132,8 @@ def test_what_is_found_of_columns_is_kept_with_what_was_said(cli, tmp_path):
     assert "written" not in again.out
     assert untold.code == 0
     assert "is taken for" not in untold.out
+    (tmp_path / "other.txt").write_bytes((tmp_path / "mine.txt").read_bytes())
+    (tmp_path / "mine.json").unlink()
+    both = " ".join(cli(*words[:3], "other.txt", *words[3:]).out.split())
+    assert "log 'mine' and 1 more: commands of 90 to 150 deg count from an end" in both
     assert cli(*words[:-1], "time=1:ms command=2:deg-90 angle=3:-deg").code == 2

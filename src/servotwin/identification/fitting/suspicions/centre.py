@@ -59,16 +59,18 @@ def centred(logs: Sequence[Log], model: Model) -> Centred:
     ' commands of 90 to 150 deg count from an end of the travel, as servo.write does'
     """
     low, high = model.value_or("stops.lower_angle", -math.inf), model.value_or("stops.upper_angle", math.inf)
-    made, said, turned = [], [], []
+    made, turned, said = [], [], dict[str, list[str]]()
     for log in logs:
         if log.command_kind != "angle" or _inside(log.held, low, high):
             made.append(log)
             continue
         found = _about_the_middle(log, model, low, high)
         made.append(found.log)
-        said.append(found.sentence)
+        said.setdefault(found.sentence, []).append(repr(log.name))
         turned.append(found.log)
-    return Centred(tuple(made), tuple(said), tuple(turned))
+    sentences = tuple(f"log {names[0]}{f' and {len(names) - 1} more' if len(names) > 1 else ''}: {sentence}"
+                      for sentence, names in said.items())
+    return Centred(tuple(made), sentences, tuple(turned))
 
 
 class _Found(NamedTuple):
@@ -94,8 +96,10 @@ def _about_the_middle(log: Log, model: Model, low: float, high: float) -> _Found
     if log.angle_name == "output_angle":
         measured["output_angle"] = sign * measured["output_angle"] + offset
     at = "" if middle == 0.0 else f" ({math.degrees(middle):.4g} deg of the servo)"
-    sentence = (f"log {log.name!r}: commands of {own[0]:.4g} to {own[1]:.4g} deg count from an end of the travel, as "
-                f"servo.write does: {centre:g} deg is taken for its middle{at}{words}")
+    what = f"commands of {own[0]:.4g} to {own[1]:.4g} deg count" if own[1] > own[0] else (
+        f"a command of {own[0]:.4g} deg counts")
+    sentence = (f"{what} from an end of the travel, as servo.write does: {centre:g} deg is taken for its "
+                f"middle{at}{words}")
     moved = replace(log, command=log.command + shift, measured=measured, reading=_reading(log, shift, sign, offset))
     return _Found(moved, sentence)
 
