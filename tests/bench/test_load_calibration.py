@@ -226,7 +226,8 @@ def test_intervals_hold_in_90_to_98_percent_of_200_draws(kind):
     ("torque_kgf_cm", "load", 0.0980665), ("load [oz]", "load", 0.0283495 * 9.80665), ("current_mA", "current", 1e-3),
     ("Strom / A", "current", 1.0), ("speed_deg_s", "speed", math.pi / 180.0), ("time_60deg_s", "time", 1.0),
     ("s/60°", "time", 1.0), ("sag_deg", "sag", math.pi / 180.0), ("supply_voltage_V", "voltage", 1.0),
-    ("drum radius [mm]", "arm", 1e-3)])
+    ("drum radius [mm]", "arm", 1e-3), ("weight (grams)", "load", 9.80665e-3), ("mass_lbs", "load", 4.448222),
+    ("ounces", "load", 0.0283495 * 9.80665)])
 def test_names_of_columns(column, role, factor):
     found = name_of(column)
     assert found.role == role

@@ -22,7 +22,9 @@ _WORDS: dict[str, frozenset[str]] = {name: frozenset(words.split()) for name, wo
     VOLTAGE: "supply battery bus psu source netzteil vcc volts volt voltage spannung",
 }.items()}
 _LETTERS = {"g": ("g", "mass"), "n": ("N", "force"), "m": ("m", "length"), "a": ("A", "current"),
-            "oz": ("oz", "mass"), "lb": ("lb", "mass"), "in": ("in", "length"), "kgf": ("kgf", "force")}
+            **dict.fromkeys(("oz", "ounce", "ounces"), ("oz", "mass")),
+            **dict.fromkeys(("lb", "lbs", "pound", "pounds"), ("lb", "mass")),
+            "in": ("in", "length"), "kgf": ("kgf", "force")}
 _FORCE = {"N": 1.0, "kgf": GRAVITY}
 _OF_LOAD = ("mass", "force", "torque")
 _NOT_SUPPLY = frozenset("command cmd target feedback pot poti wiper signal".split())

@@ -24,7 +24,7 @@ _WORDS: dict[str, dict[str, str]] = {
                "ozf in": "ozfin ozin ozinch ozfinch"},
     "temperature": {"K": "k kelvin"},
     "frequency": {"Hz": "hz hertz"},
-    "mass": {"kg": "kg kilogram", "g": "g gram"},
+    "mass": {"kg": "kg kilogram kilograms kilogramm kilos", "g": "g gram grams gramm"},
     "length": {"m": "m meter", "cm": "cm", "mm": "mm"},
     "number": {"%": "% pct percent prozent"},
     COUNTS: {COUNTS: "counts count cnt adc raw lsb tick ticks digit digits steps"},
