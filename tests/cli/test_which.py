@@ -199,3 +199,11 @@ def test_curves_of_several_servos_end_with_one_table(cli):
         assert float(cells[2]) == pytest.approx(part["cold"]["stall_torque"], rel=6e-3)
         assert f"{math.degrees(part['smallest_move']):.2f}" in line
     assert "side by side" not in cli(*words[:2], "--voltage", "5", "--quick").out
+
+
+@pytest.mark.parametrize(("words", "warned"), [
+    (["--supply", "9V"], True), (["--set", "supply.open_circuit_voltage=9V"], True), (["--supply", "7.4V"], False),
+    ([], False)])
+def test_a_supply_far_above_the_sheet_is_warned_of(cli, words, warned):
+    told = cli("simulate", "hitec-hs-422", "--step", "0:60", "--duration", "0.5", *words).err
+    assert ("its sheet ends at 6 V" in told) == warned

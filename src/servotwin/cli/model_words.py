@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -86,10 +87,24 @@ def servo_of(servo: str, change: Sequence[str], register: Sequence[str] = (), su
     from servotwin.cli.settings import settings
     from servotwin.parameters import load_servo
 
-    found = with_registers(load_servo(servo), register)
+    known = found = with_registers(load_servo(servo), register)
     if supply is not None:
         from servotwin.datasheet.conditions import on_supply
         from servotwin.parameters import Supply
 
         found = on_supply(found, Supply.of(supply, what="--supply"), source="set by --supply")
-    return found.replace(settings(change), source="set by --set") if change else found
+    made = found.replace(settings(change), source="set by --set") if change else found
+    volts = made.supply.open_circuit_voltage
+    if volts is not None and volts != known.supply.open_circuit_voltage:
+        _check_sheet(known, volts)
+    return made
+
+
+def _check_sheet(servo: Servo, volts: float) -> None:
+    """Warn of a supply far above the maker's sheet; of twice as much simulations themselves do."""
+    from servotwin.datasheet.conditions import highest_voltage, is_above_sheet
+
+    most = highest_voltage(servo)
+    if is_above_sheet(servo, volts) and volts <= 2.0 * most:
+        warnings.warn(f"{servo.name}: its sheet ends at {most:g} V, and the supply has {volts:g} V", UserWarning,
+                      stacklevel=3)

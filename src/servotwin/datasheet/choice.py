@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from servotwin.datasheet.buzzing import buzz
-from servotwin.datasheet.conditions import at_voltage, changed, highest_voltage, supply_values
+from servotwin.datasheet.conditions import at_voltage, changed, highest_voltage, is_above_sheet, supply_values
 from servotwin.datasheet.full_drive import FullDrive
 from servotwin.datasheet.guesses import Span, spans, variants
 from servotwin.datasheet.holding import smallest_move
@@ -24,9 +24,6 @@ if TYPE_CHECKING:
     from servotwin.models import Model
     from servotwin.parameters import Servo, Supply
     from servotwin.simulation import Rest
-
-
-_ABOVE = 1.25  # times the highest voltage of its sheet, at which nobody is told to buy a servo; assumed
 
 
 class Reason(NamedTuple):
@@ -176,7 +173,7 @@ def candidate(servo: Servo, supply: Supply | float, *, lift: tuple[float, float]
     volts = float(supply if isinstance(supply, int | float) else supply.open_circuit_voltage or 0.0)
     mass, most = printed_fact(servo.sheet, "mass"), highest_voltage(servo)
     known = {"servo": servo, "mass": math.nan if mass is None else mass, "price": price, "travel": travel_of(servo)}
-    if volts > _ABOVE * most > 0.0:
+    if is_above_sheet(servo, volts):
         return _judged(known, [Reason("voltage", f"its sheet ends at {most:g} V")], limits)
     try:
         with warnings.catch_warnings():

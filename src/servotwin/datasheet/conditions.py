@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 _Model = TypeVar("_Model", bound="Model")
 _MOST = 2.0  # times the highest voltage that the sheet prints
+_ABOVE = 1.25  # times that, at which nobody is told to buy a servo; assumed
 _THERMAL = ("winding_capacity", "housing_capacity", "winding_to_housing", "housing_to_ambient", "ambient",
             "magnet_coefficient")
 
@@ -36,6 +37,18 @@ def highest_voltage(servo: Servo) -> float:
     printed = [point.supply_voltage for point in printed_points(servo) if point.supply_voltage]
     own = servo.supply.open_circuit_voltage
     return max([*printed, *([own] if own and not printed else [])], default=0.0)
+
+
+def is_above_sheet(servo: Servo, voltage: float) -> bool:
+    """Tell whether a supply voltage [V] is so far above the highest of a sheet that the servo may not bear it.
+
+    Examples
+    --------
+    >>> from servotwin.parameters import load_servo
+    >>> [is_above_sheet(load_servo("gobilda-2000-135"), volts) for volts in (8.4, 12.0)]
+    [False, True]
+    """
+    return voltage > _ABOVE * highest_voltage(servo) > 0.0
 
 
 def check_voltage(servo: Servo, voltage: float) -> float:
