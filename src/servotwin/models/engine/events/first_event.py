@@ -117,8 +117,10 @@ def _crossing(motion: Motion, kind: int, a: float, at_a: tuple[float, float], b:
             return math.inf
     if at_a[0] <= 0.0:
         # It starts at zero, to rounding, and so may its rate: look whether it rises before it falls.
-        for k in range(1, 50):
-            s = a + (b - a) * 0.5**k
+        part = 1.0
+        for _ in range(1, 50):
+            part *= 0.5
+            s = a + (b - a) * part
             value = _at(motion, kind, s, False)[0]
             if value > 0.0:
                 return _root(motion, kind, s, b, value, at_b[0], False)
