@@ -1,10 +1,10 @@
 """Exported servos on a Cortex-M4, emulated: flash, RAM, and the instructions of a call.
 
-`board.py` prints, for servos of several kinds, what the code of one takes of flash (with the routines for doubles, for which
-this processor has no instructions), its table and its state, the deepest stack, and the instructions of a call that
-goes on by 1 ms and by a frame of 20 ms, on average and at most, and of one that looks at all signals. QEMU counts
-instructions; a Cortex-M4 takes 1 to 1.5 cycles for one (assumed; Arm gives no number for programs). Beside them stands
-what the same servo takes of an ATmega328P's 32 KiB where floats have 32 bits, as avr-gcc has them: too much, always.
+`board.py` prints, for servos of several kinds, what the code of one takes of flash (with the routines for doubles, for
+which this processor has no instructions), its state, the deepest stack, and the instructions of a call that goes on by
+1 ms and by a frame of 20 ms, on average and at most, and of one that looks at all signals. QEMU counts instructions; a
+Cortex-M4 takes 1 to 1.5 cycles for one (assumed; Arm gives no number for programs). Beside them stands what the same
+servo takes of an ATmega328P's 32 KiB where floats have 32 bits, as avr-gcc 5 has them: too much, always.
 """
 
 import re
