@@ -16,17 +16,18 @@ static servo_state servo;
 
 /* Turns to and fro, a call each STEP; says what calls take, and what looks at the servo take. */
 __attribute__((noinline)) static int go(unsigned long told[4]) {
-    const double low = servo_command(&servo_table, LOW), high = servo_command(&servo_table, HIGH);
+    const REAL low = servo_command(&servo_table, (REAL)LOW), high = servo_command(&servo_table, (REAL)HIGH);
     servo_signals seen;
     if (servo_init(&servo, &servo_table, low, 0) != 0)
         return 1;
     for (int k = 1; k <= CALLS; k++) {
-        const double command = k * STEP * 2.0 - 2.0 * (int)(k * STEP) < 1.0 ? low : high, until = STEP * k;
+        const REAL command = k * STEP * 2.0 - 2.0 * (int)(k * STEP) < 1.0 ? low : high;
+        const double until = STEP * k;
         const uint32_t begun = COUNT;
-        if (servo_advance(&servo, &servo_table, until, command, 0.0, NULL) != 0)
+        if (servo_advance(&servo, &servo_table, until, command, (REAL)0.0, NULL) != 0)
             return 2;
         const uint32_t advanced = COUNT;
-        if (servo_observe(&servo, &servo_table, command, 0.0, &seen) != 0)
+        if (servo_observe(&servo, &servo_table, command, (REAL)0.0, &seen) != 0)
             return 3;
         const uint32_t took = (begun - advanced) & MOST;
         told[0] += took, told[2] += (advanced - COUNT) & MOST;

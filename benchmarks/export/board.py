@@ -1,16 +1,18 @@
 """Exported servos on a Cortex-M4, emulated: flash, RAM, and the instructions of a call.
 
-`board.py` prints, for servos of several kinds, what the code of one takes of flash (with the routines for doubles, for
-which this processor has no instructions), its state, the deepest stack, and the instructions of a call that goes on by
-1 ms and by a frame of 20 ms, on average and at most, and of one that looks at all signals. QEMU counts instructions; a
-Cortex-M4 takes 1 to 1.5 cycles for one (assumed; Arm gives no number for programs). Beside them stands what the same
-servo takes of an ATmega328P's 32 KiB where floats have 32 bits, as avr-gcc 5 has them: too much, always.
+`board.py` prints, for servos of several kinds, in doubles and in floats, what the code of one takes of flash (with
+the routines for doubles, for which this processor has no instructions), its state, the deepest stack, and the
+instructions of a call that goes on by 1 ms and by a frame of 20 ms, on average and at most, and of one that looks at
+all signals. QEMU counts instructions; a Cortex-M4 takes 1 to 1.5 cycles for one (assumed; Arm gives no number for
+programs). Beside them stands what the same servo takes of an ATmega328P's 32 KiB, where doubles have 32 bits too
+(avr-gcc 5): too much, always.
 """
 
 import re
 import shutil
 import subprocess
 import tempfile
+from itertools import product
 from pathlib import Path
 
 from run import BUS, HEAT, HIGH, LOW, SERVO
@@ -24,6 +26,7 @@ BOARD = ("arm-none-eabi-gcc", "--specs=rdimon.specs", "--specs=nano.specs", "-no
          "-T", str(START / "cortex_m4.ld"), str(START / "cortex_m4.c"), str(HERE / "board.c"))
 EMULATED = ("qemu-system-arm", "-M", "mps2-an386", "-icount", "shift=0", "-nographic", "-monitor", "none", "-serial",
             "none", "-semihosting-config", "enable=on,target=native", "-kernel")
+REALS = {"float64": ("-DREAL=double",), "float32": ("-DREAL=float", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")}
 PER_COUNT = 40  # instructions: of 1 ns each, where the board's counter has 25 MHz
 FRAME, STEP = 0.02, 1e-3  # s
 SERVOS = {
@@ -62,21 +65,24 @@ def of_avr(folder: Path) -> str:
 
 def main() -> None:
     calls = int(re.search(r"CALLS = (\d+)", (HERE / "board.c").read_text(encoding="utf-8"))[1])
-    print(f"{'servo':10}{'flash':>9}{'state':>7}{'stack':>7}   {'1 ms, most':>20}   {'20 ms, most':>20}{'look':>8}"
-          f"{'AVR':>10}")
+    print(f"{'servo':10}{'numbers':>9}{'flash':>10}{'state':>7}{'stack':>7}   {'1 ms, most':>20}   {'20 ms, most':>20}"
+          f"{'look':>8}{'AVR':>10}")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         without = built(folder, "-DNOTHING")
-        for kind, (model, servo, changes) in SERVOS.items():
-            st.export.c(model(st.load_servo(servo).replace(changes)), name="servo").write(folder, overwrite=True)
+        for (kind, (model, servo, changes)), (dtype, words) in product(SERVOS.items(), REALS.items()):
+            if model is st.DigitalServo and dtype == "float32":
+                continue
+            made = st.export.c(model(st.load_servo(servo).replace(changes)), name="servo", dtype=dtype)
+            made.write(folder, overwrite=True)
             counts = {}
             for step in (STEP, FRAME):
-                sizes = built(folder, f"-DSTEP={step}", f"-DLOW={LOW}", f"-DHIGH={HIGH}")
+                sizes = built(folder, *words, f"-DSTEP={step}", f"-DLOW={LOW}", f"-DHIGH={HIGH}")
                 counts[step] = told(folder)
             long = [f"{PER_COUNT * counts[step][0] / calls:,.0f}, {PER_COUNT * counts[step][1]:,}" for step in counts]
-            print(f"{kind:10}{(sizes['flash'] - without['flash']) / 1024:5.1f} KiB{sizes['RAM'] - without['RAM']:7}"
-                  f"{max(each[3] for each in counts.values()):7}   {long[0]:>20}   {long[1]:>20}"
-                  f"{PER_COUNT * counts[STEP][2] / calls:8,.0f}{of_avr(folder):>10}")
+            print(f"{kind:10}{dtype:>9}{(sizes['flash'] - without['flash']) / 1024:6.1f} KiB"
+                  f"{sizes['RAM'] - without['RAM']:7}{max(each[3] for each in counts.values()):7}"
+                  f"   {long[0]:>20}   {long[1]:>20}{PER_COUNT * counts[STEP][2] / calls:8,.0f}{of_avr(folder):>10}")
 
 
 if __name__ == "__main__":

@@ -9,6 +9,9 @@ int main(void);
 void reset(void);
 
 void reset(void) {
+#ifdef __ARM_FP
+    *(volatile unsigned long *)0xE000ED88 |= 0xFul << 20; /* its instructions for floats are off at first */
+#endif
     memcpy(data_start, data_from, (size_t)(data_end - data_start));
     memset(bss_start, 0, (size_t)(bss_end - bss_start));
     initialise_monitor_handles();
