@@ -71,8 +71,6 @@ def main() -> None:
         folder = Path(name)
         without = built(folder, "-DNOTHING")
         for (kind, (model, servo, changes)), (dtype, words) in product(SERVOS.items(), REALS.items()):
-            if model is st.DigitalServo and dtype == "float32":
-                continue
             made = st.export.c(model(st.load_servo(servo).replace(changes)), name="servo", dtype=dtype)
             made.write(folder, overwrite=True)
             counts = {}

@@ -3,18 +3,20 @@
 import shutil
 import subprocess
 
+import numpy as np
 import pytest
 
 import servotwin as st
 from export.c_servo import STRICT
-from export.structures import STRUCTURES, model_of
+from export.structures import PROGRAM, STRUCTURES, model_of
 from export.test_platforms import HERE
 from servotwin import export
 from servotwin.errors import InputError
 
-PROGRAM = HERE / "harness" / "angles.c"
+ANGLES = HERE / "harness" / "angles.c"
 WHOLE = [name for name, structure in STRUCTURES.items()
          if structure.kind is not st.DigitalServo and name not in ("elastic", "flexible")]
+COUNT = 0.0015339807878856412  # rad, of 4096 a turn
 FIRST = 88172645463325252  # of the random numbers
 COMPILER = next((each for each in ("gcc", "clang") if shutil.which(each)), None)
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="needs gcc or clang")
@@ -27,7 +29,7 @@ def angles(name, draw, folder, dtype):
     widens = () if real == "double" else ("-Wdouble-promotion",)
     subprocess.run([COMPILER, *STRICT, *widens, "-O1", "-c", str(folder / dtype / "servo.c"),
                     "-o", str(folder / dtype / "servo.o")], check=True)
-    subprocess.run([COMPILER, f"-DREAL={real}", f"-DSEED={FIRST + draw}u", "-I", str(folder / dtype), str(PROGRAM),
+    subprocess.run([COMPILER, f"-DREAL={real}", f"-DSEED={FIRST + draw}u", "-I", str(folder / dtype), str(ANGLES),
                     str(folder / dtype / "servo.o"), "-lm", "-o", str(folder / dtype / "angles")], check=True)
     told = subprocess.run([str(folder / dtype / "angles")], capture_output=True, text=True, check=True).stdout
     return [float(each) for each in told.split()]
@@ -42,6 +44,17 @@ def test_angles_are_those_of_doubles(name, tmp_path):
         assert len(floats) == len(doubles) == 400
         assert floats == pytest.approx(doubles, abs=1e-5, rel=0.0)
         assert max(doubles) - min(doubles) > 0.3
+
+
+@needs_compiler
+@pytest.mark.slow
+def test_a_servo_on_a_bus_stays_within_counts(tmp_path):
+    """A count more or less at one tick changes duties; the loop brings the shaft back."""
+    for draw in range(3):
+        floats, doubles = (np.array(angles("on a bus", draw, tmp_path / str(draw), dtype))
+                           for dtype in ("float32", "float64"))
+        assert np.sqrt(np.mean((floats - doubles)**2)) < COUNT
+        assert np.max(np.abs(floats - doubles)) < 10.0 * COUNT
 
 
 @needs_compiler
@@ -80,11 +93,11 @@ int main(void) {
 
 @pytest.mark.parametrize(("model", "load", "more", "said"), [
     (st.PulseServo, None, {"dtype": "float16"}, "dtype: got 'float16'"),
-    (st.DigitalServo, None, {"dtype": "float32"}, "a servo with a program"),
+    (st.DigitalServo, None, {"dtype": "float32"}, "a program that pulses tell its goals"),
     (st.PulseServo, st.loads.Flexible(inertia=1e-3, stiffness=5.0), {"dtype": "float32"}, "a spring between two"),
     (st.PulseServo, None, {"dtype": "float32", "parameters": True}, "with parameters"),
     (st.PulseServo, None, {"dtype": "float32", "accuracy": 1e-9}, "at least 1e-06 rad")])
 def test_what_floats_are_not_for(model, load, more, said):
-    servo = st.load_servo("feetech-sts3215-12v" if model is st.DigitalServo else "hitec-hs-755hb")
+    made = model(st.load_servo("hitec-hs-755hb").replace(PROGRAM if model is st.DigitalServo else {}))
     with pytest.raises(InputError, match=said):
-        export.c(model(servo), load, **more)
+        export.c(made, load, **more)

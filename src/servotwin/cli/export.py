@@ -52,7 +52,7 @@ def c(
     accuracy: shared.UsualAccuracyOption = None,
     dtype: Annotated[str, typer.Option(
         metavar="DTYPE", help="float64, or float32: all numbers but times have 32 bits, and angles are good to some "
-        "1e-5 rad. Not for a servo with a program or with a spring between two bodies.",
+        "1e-5 rad, of a servo on a bus to some counts.",
         rich_help_panel=shared.OUTPUT)] = "float64",
     force: Annotated[bool, typer.Option(
         "--force", help="Replace existing files.", rich_help_panel=shared.OUTPUT)] = False,

@@ -52,8 +52,8 @@ def c(model: Model, load: Load | Part | None = None, *, name: str | None = None,
         Whether there is a function too that makes the numbers of the parameters of a servo file.
     dtype : str
         "float64", or "float32" for processors that have instructions for floats alone: angles are good to some
-        1e-5 rad, and times in the calls stay doubles. Not for servos with a program or with a spring between two
-        bodies, nor with `parameters`.
+        1e-5 rad (of a servo on a bus to some counts, as each count decides), and times in the calls stay doubles. Not
+        for programs that pulses tell their goals, for a spring between two bodies, nor with `parameters`.
 
     Returns
     -------
@@ -93,8 +93,8 @@ def _checked_floats(dtype: str, model: Any, load: Load, *, accuracy: float | Non
         raise InputError("dtype", got=dtype, allowed='"float64" or "float32"')
     if dtype == "float64":
         return False
-    if isinstance(model, DigitalServo):
-        raise InputError("dtype", got=f"{dtype} for a servo with a program", allowed="float64")
+    if isinstance(model, DigitalServo) and not model.takes_goals:
+        raise InputError("dtype", got=f"{dtype} for a program that pulses tell its goals", allowed="float64")
     if elastic.present(model.pack(load).elastic):
         raise InputError("dtype", got=f"{dtype} for a spring between two bodies", allowed="float64")
     if parameters:

@@ -12,7 +12,7 @@ SOURCE = Template('''/* $title
 
 $kernels
 const ${name}_servo ${name}_table = {
-$table};
+$table$beat};
 
 /* The memory of a servo as the kernels take it. */
 static $memories memories_of(const ${name}_state *state) {
@@ -28,7 +28,7 @@ static $inputs inputs_of(const ${name}_state *state, const ${name}_servo *servo,
         state->seed, servo->numbers.accuracy, $program};
     for (int k = 0; k < 7; k++)
         piece[k] = 0;
-    piece[1] = servo->numbers.wiring.gain * command + servo->numbers.wiring.offset;
+$since    piece[1] = servo->numbers.wiring.gain * command + servo->numbers.wiring.offset;
     return all;
 }
 
@@ -105,9 +105,11 @@ IN_PARTS = Template('''int ${name}_advance(
         status = (int)$advance(&servo->numbers, &told, &all, part, command, rows, used);
         for (int64_t n = kept; n < count && n < rows.n[0]; n++)
             rows.p[n].time += late;
-        state->begun += (double)state->memory.frames * (double)state->memory.beat;
+        const int64_t frames = state->memory.frames;
+        const double passed = (double)frames * servo->beat;
+        state->begun += passed;
         state->memory.frames = 0;
-    } while (status == 0 && left > longest);
+$passing    } while (status == 0 && left > longest);
     if (events != NULL)
         events->count = count;
     if (status != 0)

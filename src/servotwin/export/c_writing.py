@@ -21,7 +21,7 @@ from servotwin.models import (
     DigitalServo,
 )
 from servotwin.models.engine.alone import Alone, Happened, Seen
-from servotwin.models.engine.memory import Inputs, Memories, Memory, Point
+from servotwin.models.engine.memory import BEAT, Inputs, Memories, Memory, Point
 from servotwin.models.outputs import SIGNALS
 from servotwin.models.state.modes import Mode, Vector
 from servotwin.models.state.records import numbers_in, record_of
@@ -49,6 +49,9 @@ _COMMANDS = ("command_voltage", "command_angle", "pulse_width")  # are what the 
 _SAME, _NEARLY = "the digits are the same, but for rounding", "angles are those to about 1e-5 rad"
 _CURVE = ("    const double *curve; /* of the potentiometer: angle [rad] and error [V] */\n"
           "    int64_t curve_rows;\n")
+_PASSING = ("        state->firm.tick -= frames;\n"
+            "        state->firm.heard -= (float)passed, state->firm.hears -= (float)passed;\n")
+_BEAT = "    double beat; /* by which the clock counts [s], in all its digits */\n"
 _TABLE = Array(FLOAT64, 2)
 _PROGRAM, _FIRM, _MEMORY, _EVENT = (Record(record_of(kind)) for kind in (Firmware, Firm, Memory, Happened))
 _RECORDS: dict[Kind, str] = {Record(record_of(kind)): kind.__name__ for kind in (
@@ -103,8 +106,16 @@ class Writing:
 
     def _source(self, text: Standalone, words: dict[str, str]) -> str:
         words |= {name: text.typed(part) for name, part in self._of_source(text).items()}
+        words["since"] = "    piece[0] = (float)-state->begun;\n" if self._floats else ""
+        words["passing"] = _PASSING if self._digital else ""
+        words["beat"] = f",\n    {self._beat!r}" if self._floats else ""
         advancing = (IN_PARTS if self._floats else ADVANCING).substitute(words)
         return SOURCE.substitute(words, kernels=self._kernels(text), advancing=advancing)
+
+    @property
+    def _beat(self) -> float:
+        """By which the memory of the servo counts time [s]."""
+        return self._program.T_c if self._digital else self._chip.frame_period or BEAT
 
     def _of_header(self, text: Standalone, flags: int) -> dict[str, str]:
         name, structs = self._name, text.public
@@ -120,7 +131,7 @@ class Writing:
             "signals": text.typed(signals_of(self._signals())),
             "since": " since the call began" if self._floats else "",
             "more": self._members((f"    {name}_program program;\n", self._digital),
-                                  (text.typed(_CURVE), len(self._curve) > 0)),
+                                  (text.typed(_CURVE), len(self._curve) > 0), (_BEAT, self._floats)),
             "remembered": self._members(
                 (f"    {name}_firm firm; /* of its program */\n", self._digital),
                 ("    double begun; /* from when the times of the memory count [s] */\n", self._floats))}
