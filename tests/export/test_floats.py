@@ -91,6 +91,35 @@ int main(void) {
     assert 0.0 <= event <= 0.03
 
 
+@needs_compiler
+def test_what_is_no_number_changes_nothing(tmp_path):
+    export.c(model_of("on a bus", 0), name="servo", dtype="float32").write(tmp_path)
+    (tmp_path / "odd.c").write_text(r"""
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "servo.h"
+int main(void) {
+    servo_state servo, before;
+    memset(&servo, 0, sizeof servo);
+    const servo_servo *table = &servo_table;
+    servo_init(&servo, table, 0.5f, 0), servo_advance(&servo, table, 0.1, 1.0f, 0.0f, NULL);
+    memcpy(&before, &servo, sizeof servo);
+    const int told[] = {servo_advance(&servo, table, (double)NAN, 1.0f, 0.0f, NULL),
+        servo_advance(&servo, table, (double)INFINITY, 1.0f, 0.0f, NULL),
+        servo_advance(&servo, table, 0.2, NAN, 0.0f, NULL), servo_advance(&servo, table, 0.2, 1e30f, 0.0f, NULL),
+        servo_advance(&servo, table, 0.2, 1.0f, INFINITY, NULL), servo_advance(&servo, table, 0.05, 1.0f, 0.0f, NULL)};
+    for (int k = 0; k < 6; k++)
+        printf("%d ", told[k]);
+    return memcmp(&before, &servo, sizeof servo) != 0;
+}
+""")
+    subprocess.run([COMPILER, "-O1", "-I", str(tmp_path), str(tmp_path / "odd.c"), str(tmp_path / "servo.c"), "-lm",
+                    "-o", str(tmp_path / "odd")], check=True)
+    done = subprocess.run([str(tmp_path / "odd")], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["-1", "-1", "-2", "-2", "-1", "-3"]
+
+
 @pytest.mark.parametrize(("model", "load", "more", "said"), [
     (st.PulseServo, None, {"dtype": "float16"}, "dtype: got 'float16'"),
     (st.DigitalServo, None, {"dtype": "float32"}, "a program that pulses tell its goals"),
