@@ -133,6 +133,9 @@ def test_a_number_that_no_log_of_a_servo_holds_is_a_torn_row(tmp_path, cells):
 def test_numbers_in_a_wrong_unit_are_no_torn_rows(tmp_path):
     with pytest.raises(InputError, match="microseconds"):
         read_logs(written(tmp_path, ["time_s,pulse_width,output_angle_deg", *ROWS]))
+    with pytest.raises(InputError, match="milliamperes"):
+        read_logs(written(tmp_path, [HEADER + ",current_A", *(f"{row},{300 if k == 7 else 20}"
+                                                              for k, row in enumerate(ROWS))]))
     sent = [row.replace("1500", "5000") if 10 <= k < 20 else row for k, row in enumerate(ROWS)]
     assert read_logs(written(tmp_path, [HEADER, *sent]))[0].command.max() == 5000e-6
 

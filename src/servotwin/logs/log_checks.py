@@ -24,7 +24,7 @@ _LIMITS = {
     "pulse_width": ("s", 0.1, "microseconds?"),
     **dict.fromkeys(("voltage", "command_voltage", "feedback_voltage", "bus_voltage", "armature_voltage"),
                     ("V", 1e3, "millivolts or counts?")),
-    **dict.fromkeys(("armature_current", "supply_current"), ("A", 1e3, "milliamperes?")),
+    **dict.fromkeys(("armature_current", "supply_current"), ("A", 100.0, "milliamperes?")),
 }
 _COMMANDS = ("pulse_width", "command_angle", "command_voltage")
 _RANGES = {POSITIVE: (np.nextafter(0.0, 1.0), np.inf), NOT_NEGATIVE: (0.0, np.inf), AT_LEAST_ONE: (1.0, np.inf),
