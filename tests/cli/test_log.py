@@ -81,6 +81,8 @@ def test_what_a_log_holds(cli):
     ([f"{10 * k},{(k // 100) % 2 * 40},{0.05 if 250 <= k < 450 else 0.01 * (k * k * 7919 % 997 % 37):.2f}"
       for k in range(600)],
      "to the last digit from 2.5 to 4.49 s"),
+    ([f"{10 * k},{min(max(k % 100 - 3, 0) * 3, 60) * (1 - k // 100 % 2 * 2) + 0.01 * (k % 7):.2f},"
+      f"{60 * (1 - k // 100 % 2 * 2)}" for k in range(600)], "each other's columns"),
     ([f"{0.01 * k},{(k // 100) % 2 * 40},{(k // 100) % 2 * 40}.00" for k in range(600)], "faster than any servo"),
     ([f"{10 * k},{(k // 100) % 2 * 40},5.00" for k in range(600)], "the shaft does not"),
     ([f"{10 * k},20,{max(0, min(20, k - 50))}.00" for k in range(600)], "the command never changes"),

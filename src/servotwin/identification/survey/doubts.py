@@ -31,6 +31,7 @@ _USUAL = (0.7, 1.4)  # angle over commanded angle
 _PULSE_GAINS = (math.radians(0.03) * 1e6, math.radians(0.4) * 1e6)  # rad/s of pulse
 _FASTEST = math.radians(3000.0)  # rad/s
 _ALONE = math.radians(5.0)  # more than noise
+_SELDOM, _OFTEN = 0.1, 0.5  # of the rows
 _STUCK, _MUCH_NOISE = 10, 2.0  # rows without noise, of a sensor that has so many steps of it elsewhere
 _TURN = 2.0 * math.pi
 _CENTRE = math.radians(90.0)
@@ -70,6 +71,10 @@ def wrong_of(log: Log, clock: Clock, values: Values, motion: Motion) -> Iterator
                 for count, low in ((values.flat_low, True), (values.flat_high, False)) if count]
         yield f"{' and '.join(ends)} without noise: the sensor is at the end of its range, or the shaft on a stop"
     yield from _stands(log, angle, values)
+    moves = [float(np.mean(np.diff(each) != 0.0)) for each in (angle, log.held)]
+    if moves[0] < _SELDOM < _OFTEN < moves[1] and motion.lag < 0.5 * clock.period:
+        yield ("the angle jumps and stands, the command moves in each row and comes no earlier: are they each other's "
+               "columns?")
     if motion.lag < 0.0 and motion.steps == 0 and abs(motion.correlation) > _CLEAR:
         yield (f"the angle comes {-1e3 * motion.lag:.0f} ms before the command: the columns have two clocks, or the "
                "command was logged late")
