@@ -9,6 +9,7 @@ import servotwin as st
 from identification.synthetic_logs import TRUTH, noisy, run
 from servotwin.identification import identify
 from servotwin.identification.fitting.diagnosis.gain import gain, teaching
+from servotwin.identification.fitting.judging import _outliers
 from servotwin.identification.fitting.noise import SensorSeries, isolated, noise_of
 from servotwin.identification.fitting.uncertainty import Rows
 from servotwin.identification.fitting.verdict import judge
@@ -222,3 +223,11 @@ def test_an_interrupt_ends_the_trials_and_keeps_the_fit(driven):
     assert not fit.interrupted
     assert fit.verdict.causes == ()
     assert fit.doubt is not None
+
+
+def test_samples_that_are_the_least_of_what_is_left_are_no_cause():
+    verdict = judge(bench(0, wrong=2e-3), "output_angle")
+    said = replace(verdict, outliers=0.05, ratio=1e4)
+    traces = bench(0, wrong=2e-3)
+    assert _outliers(said, traces, "output_angle") == ()
+    assert len(_outliers(replace(said, ratio=1e-4), traces, "output_angle")) == 1

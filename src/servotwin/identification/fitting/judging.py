@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from servotwin.errors import PlausibilityWarning
 from servotwin.identification.fitting.arrow import Prior
 from servotwin.identification.fitting.diagnosis import diagnose
 from servotwin.identification.fitting.diagnosis.counted import counted_stamps
@@ -52,8 +54,10 @@ def with_verdict(task: Task, point: Point, fit: Fit, course: Course, *, trials: 
         if trials:
             causes = _outliers(verdict, fitted, sensor)
         if trials and (verdict.undecided or not verdict.holds):
-            found = diagnose(task, point, fit.traces, verdict, sensor, _EFFORT * effort, _half_widths(fit),
-                             lambda share, text: course(0.96 + 0.04 * share, text))
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", PlausibilityWarning)  # what a trial tries is nobody's word
+                found = diagnose(task, point, fit.traces, verdict, sensor, _EFFORT * effort, _half_widths(fit),
+                                 lambda share, text: course(0.96 + 0.04 * share, text))
             causes, verdict = (*causes, *found.causes), replace(verdict, moved=found.moved)
             if not causes and not verdict.holds and (counted := counted_stamps(fitted, sensor, verdict.noise[sensor])):
                 causes = (counted,)
@@ -94,6 +98,8 @@ def _outliers(verdict: Verdict, traces: Sequence[Trace], sensor: str) -> tuple[C
     every = np.concatenate([trace.residual for trace in traces])
     before = float(np.sqrt(np.mean(every**2)))
     after = verdict.ratio * verdict.noise[sensor]
+    if after >= before:
+        return ()  # they are the least of what is left
     return (Cause("outliers", f"outliers: {100.0 * verdict.outliers:.2g} % of the samples lie far off alone; without "
                   f"them the error is {shown(after, sensor)} instead of {shown(before, sensor)} (look for a loose "
                   "contact of the sensor; loss \"huber\" bears them)", before, after, "leave these samples out"),)
