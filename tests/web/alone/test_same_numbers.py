@@ -2,32 +2,19 @@
 
 import json
 import re
-import shutil
 import warnings
 
 import numpy as np
 import pytest
 
-from bench_made import benches, unpacked, wild
+from bench_made import benches, wild
 from bench_scenes import by_python, drawn
-from servotwin.web.alone import kernel
 from servotwin.web.live import LiveBench, read_scene
 from servotwin.web.live.rest_watch import NOT_AT_REST
 
 ANGLE = 1e-9  # rad
 BETWEEN = 1e-8  # s: where a drive ends as the next begins, rounding decides whether the bridge is off in between
 OTHER = 1e-6  # of the peak of a signal: rates that two libraries of functions, under an integrator, leave
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """Return a folder with the modules and the kernel of the page."""
-    if shutil.which("node") is None:
-        pytest.skip("no node")
-    try:
-        return unpacked(tmp_path_factory.mktemp("page"))
-    except kernel.NoCompilerError as error:
-        pytest.skip(str(error))
 
 
 def whole(value):

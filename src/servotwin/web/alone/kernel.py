@@ -48,7 +48,7 @@ _LONGEST = 600.0  # s that a compiler may take
 def recipe() -> Recipe:
     """Return what the kernel is made of; it is none of those that wheels have libraries of."""
     return Recipe("bench", tuple(f"servotwin.models.engine.live.bench:{name}" for name in (
-        "make", "begin", "change", "take", "count", "draw", "look",
+        "make", "begin", "begin_at", "change", "take", "count", "draw", "look",
         "tune", "snapped", "next_edge", "advance", "advance_together")))
 
 

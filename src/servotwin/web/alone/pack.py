@@ -27,6 +27,7 @@ from servotwin.simulation.engine import failure
 from servotwin.simulation.files import shown_columns
 from servotwin.simulation.status import Status
 from servotwin.web.alone.bounds import bounds_of
+from servotwin.web.alone.csv_rules import csv_rules
 from servotwin.web.alone.limits import limits
 from servotwin.web.alone.words import WORDS
 from servotwin.web.lessons import mystery
@@ -70,7 +71,7 @@ def world(first: Scene) -> dict[str, Any]:
         "written": _written(), "mystery": {
             "base": mystery.BASE, "hidden": mystery.unknowns(), "both_ways": mystery.BOTH_WAYS,
             "friction": mystery.FRICTION, "good": mystery.GOOD, "fair": mystery.FAIR, "seeds": mystery.SEEDS},
-        "files": _files(),
+        "files": _files(), "csv": csv_rules(),
         "no_load": _no_load(), "made": ["", "no_inertia"],
         "set": {"origin": "assumed", "source": SET_BY_USER, "spread": ""},
         "ranges": {name: _ends(one) for name, one in RULES.items()},

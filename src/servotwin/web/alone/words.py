@@ -7,9 +7,18 @@ from servotwin.simulation.bus_supply import MODEL_NAMES
 
 ONLY_WITH_SERVER = "only with the server: servotwin web"
 WORDS = {
-    "alone": "This bench computes here, without a server. Only with one (servotwin web): logs, fits, servo "
-             "files, registers but those of lessons, and the control circuit.",
+    "alone": "This bench computes here, without a server. Only with one (servotwin web): fits, logs but plain CSV, "
+             "servo files, registers but those of lessons, and the control circuit.",
     "only_with_server": ONLY_WITH_SERVER,
+    "no_plain_log": "{name}: got {got}, allowed: plain CSV with columns such as time_s, pulse_width_us, "
+                    "output_angle_deg; the server's page (servotwin web) reads far more",
+    "a_number": "a number", "a_width": "a positive width", "rows": "a header and at least one row",
+    "cut_line": "line {line} does not end in a newline and was left out",
+    "log": "log: got none, allowed: a log that is dropped on the page first",
+    "log_hint": "Drop a plain CSV table anywhere on the page: columns such as time_s, pulse_width_us (or "
+                "command_angle_deg), output_angle_deg. The server's page (servotwin web) reads other tables, too.",
+    "twin": "The twin begins at rest where the log begins; delay, phase of the pulses and zero of the angle are fitted "
+            "by the server's page (servotwin web).",
     "types": {"number": "float", "whole": "int", "string": "str", "boolean": "bool", "array": "list", "object": "dict"},
     "digits": 6, "smallest": -4,
     "known": {"parameter": "GROUP.NAME, with a group of " + ", ".join(GROUPS)},

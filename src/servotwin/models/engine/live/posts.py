@@ -126,7 +126,17 @@ def begin(posts: Any, k: int, told: Told, memories: Memories) -> None:
     at, _ = train_of(told, len(posts), k)
     _put_pulse(told, at, NEVER, first)
     post.heard = 1
-    angle = min(max(post.lines.per_angle * first + post.lines.angle, post.lowest), post.highest)
+    _stand(posts, k, memories, min(max(post.lines.per_angle * first + post.lines.angle, post.lowest), post.highest))
+
+
+def begin_at(posts: Any, k: int, told: Told, memories: Memories, angle: float) -> None:
+    """Let a servo stand at an angle [rad], without drive, whatever its first command asks for."""
+    begin(posts, k, told, memories)
+    _stand(posts, k, memories, angle)
+
+
+def _stand(posts: Any, k: int, memories: Memories, angle: float) -> None:
+    post = posts[k]
     warm = post.numbers.heat.T_amb
     put_started(memories, k, Vector(angle, 0.0, 0.0, warm, warm, angle, 0.0),
                 INSIDE if play.present(numbers_of(post.numbers).play) else RIGID)

@@ -171,6 +171,9 @@ export class Going {
   /** @param {number} k */
   begin(k) { this.kernel.call("begin", this.posts, k, this.told, this.memories); }
 
+  /** @param {number} k @param {number} angle where it stands, whatever its command says [rad] */
+  beginAt(k, angle) { this.kernel.call("begin_at", this.posts, k, this.told, this.memories, angle); }
+
   /** @param {number} k @returns {Float64Array} the row of a servo as it stands */
   now(k) {
     this.kernel.call("look", this.posts, k, this.told, this.programs, this.memories, this.rows, this.used);

@@ -5,6 +5,7 @@ import { file } from "./files.js";
 import { Live } from "./live.js";
 import { Refused, filled as filledIn, refuse, unknown, wrong } from "./check.js";
 import { Pace } from "./pace.js";
+import { OwnLog } from "./own.js";
 import { fragment, read, servo, unfragment, view, written } from "./scene.js";
 
 const now = () => performance.now() / 1000; // s
@@ -27,6 +28,7 @@ export class Room {
     this.broken = null;
     this.end = 0;
     this.step = world.limits.first_stretch;
+    this.own = new OwnLog(parts, page);
     /** @type {any[]} */
     this.lcd = [];
     this.put(read(world, world.first));
@@ -227,6 +229,7 @@ export class Room {
     } else if ("export" in message) return { file: await file(this.parts, live.now(), message.export, message.servo ?? 0) };
     else if ("mystery" in message) this.put(read(world, this.hidden(message.mystery)));
     else if ("guess" in message) return { compared: this.compared(live.scene.servos[0].mystery, message.guess) };
+    else if ("log" in message) return message.log.play ? this.answer({ do: "command", value: this.own.played() }) : this.own.answer(live, message.log);
     else refuse("only_with_server");
     return { time: /** @type {Live} */ (this.live).time };
   }

@@ -48,7 +48,6 @@ export function mount(root, bench) {
     const given = event.dataTransfer?.files[0];
     event.preventDefault();
     if (given?.name.endsWith(".toml")) open(await given.text(), given.name);
-    else if (given && bench.hello.alone) bench.notice(bench.hello.alone);
     else if (given) bench.emit("dropped", given);
   });
 
