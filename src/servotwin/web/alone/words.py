@@ -23,6 +23,8 @@ WORDS = {
     "digits": 6, "smallest": -4,
     "known": {"parameter": "GROUP.NAME, with a group of " + ", ".join(GROUPS)},
     "stands": "the bench stands: ",
+    "too_long": "motion: got 'one that takes too long to compute at t = {time} s', allowed: numbers of a servo that is "
+                "not so fast, and a new beginning",
     "repeating": "action: got 'while the bench is being repeated', allowed: a moment later",
     "no_single_frame": "single frame: got 'a bench that is being repeated', allowed: one that stands",
     "new_beginning": "bench: got {got}, allowed: a new beginning",

@@ -1,7 +1,6 @@
 // The way to the bench: here it stands in the page itself.
 
 import { Refused, speak } from "./check.js";
-import { Kernel } from "./kernel.js";
 import { Room } from "./room.js";
 
 /** @type {Room} */
@@ -20,7 +19,7 @@ export function connect(page) {
   const live = () => { room.turn(); setTimeout(live, world.limits.pause); };
   const begun = Promise.resolve().then(() => {
     page.told({ hello: { role: "own", alone: world.words.alone, log_hint: world.words.log_hint, lessons: world.lessons } });
-    room = new Room({ kernel: new Kernel(module, world.layout), module, world }, page);
+    room = new Room({ module, world }, page);
     live();
   });
   return { open: true, say: async (message) => {
@@ -40,8 +39,12 @@ export async function asked(what, name = "") {
   return found.error ? Promise.reject(new Error(found.error)) : found;
 }
 
-/** @param {File} file @returns {Promise<{log?: any, wrong?: string}>} what is known of a log, or what is wrong with it */
-export async function handedIn(file) {
+/**
+ * @param {File} file a log
+ * @param {string} _visitor whose it is
+ * @returns {Promise<{log?: any, wrong?: string, error?: string}>} what is known of it, or what is wrong with it
+ */
+export async function handedIn(file, _visitor) {
   const bytes = await file.arrayBuffer();
   try {
     return { log: room.own.take(file.name, bytes) };

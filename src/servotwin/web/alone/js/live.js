@@ -127,7 +127,7 @@ export class Live {
     this.catchUp();
     const end = this.todo.length ? Math.min(until, this.todo[0].time) : until;
     const push = this.going.advance(end, rate, switches);
-    if (push.wrong) throw new Refused(push.wrong.replace("{time}", String(this.time)));
+    if (push.wrong) throw new Refused(push.wrong.replace("{time}", tidy(this.time)));
     this.catchUp();
     return push;
   }

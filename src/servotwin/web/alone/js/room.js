@@ -2,6 +2,7 @@
 
 import { hidden } from "./facts.js";
 import { file } from "./files.js";
+import { Kernel } from "./kernel.js";
 import { Live } from "./live.js";
 import { Refused, filled as filledIn, refuse, unknown, wrong } from "./check.js";
 import { Pace } from "./pace.js";
@@ -12,12 +13,11 @@ const now = () => performance.now() / 1000; // s
 
 export class Room {
   /**
-   * @param {any} parts kernel and world
+   * @param {{module: WebAssembly.Module, world: any}} parts
    * @param {{told: (message: any) => void, pushed: (header: any, parts: any[]) => void}} page
    */
   constructor(parts, page) {
-    const { kernel, world } = parts;
-    this.kernel = kernel;
+    const { world } = parts;
     this.parts = parts;
     /** @type {Live|undefined} */
     this.live = undefined;
@@ -36,13 +36,8 @@ export class Room {
 
   /** @param {any} scene begin with this bench; what was done at it is done again, as fast as it goes */
   put(scene) {
-    const before = this.live;
-    try {
-      this.live = new Live(this.kernel, this.world, { ...scene, end: 0 });
-    } catch (error) {
-      if (before) this.live = this.again(before); // the kernel has one bench at a time
-      throw error;
-    }
+    // in a kernel of its own: the bench before stays as it is where this one is refused
+    this.live = new Live(new Kernel(this.parts.module, this.world.layout), this.world, { ...scene, end: 0 });
     this.end = scene.end;
     this.broken = null;
     this.step = this.world.limits.first_stretch;
@@ -50,14 +45,6 @@ export class Room {
     this.pace.begin(now(), this.live.time);
     this.page.told({ scene: this.state() });
     this.glance();
-  }
-
-  /** @param {Live} before @returns {Live} the same bench once more, at the time that it had come to */
-  again(before) {
-    const scene = before.now();
-    const live = new Live(this.kernel, this.world, { ...scene, end: 0 });
-    while (!live.going.reached(scene.end)) live.advance(scene.end, this.world.limits.coarsest);
-    return live;
   }
 
   state() {
@@ -161,7 +148,7 @@ export class Room {
       return Number.isFinite(found) ? found : null;
     };
     const counts = Object.fromEntries(this.world.converters.map((/** @type {any} */ one) => [one.name,
-      value(one.of) === null ? null : this.kernel.call("count", one.gain, one.offset, one.highest, value(one.of))]));
+      value(one.of) === null ? null : live.going.kernel.call("count", one.gain, one.offset, one.highest, value(one.of))]));
     return { command_voltage: value("command_voltage"), feedback_voltage: value("feedback_voltage"), ...counts,
       pulse_rate: columns.includes("pulse_width") ? live.going.rate : null, output_angle: value("output_angle"),
       pulse_width: value("pulse_width") };
@@ -246,7 +233,7 @@ export class Room {
     const { good, fair } = this.world.mystery;
     if (seed === undefined) wrong("guess", "a bench without a mystery", "a mystery servo");
     if (!guess || typeof guess !== "object" || !Object.keys(guess).length) wrong("guess", guess, "a table of numbers in SI");
-    const truth = hidden(this.world, this.kernel, /** @type {number} */ (seed));
+    const truth = hidden(this.world, /** @type {Live} */ (this.live).going.kernel, /** @type {number} */ (seed));
     for (const [name, value] of Object.entries(guess)) {
       if (!(name in truth)) unknown("number of a mystery servo", name, Object.keys(truth));
       if (!Number.isFinite(value)) wrong(`guess of ${name}`, value, "a finite number in SI");
