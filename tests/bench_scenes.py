@@ -15,6 +15,8 @@ NUMBERS = ("electronics.deadband", "electronics.stretcher_gain", "electronics.st
            "supply.internal_resistance", "supply.open_circuit_voltage", "firmware.proportional_gain",
            "firmware.derivative_gain", "potentiometer.noise", "stops.upper_angle", "friction.breakaway_ratio",
            "firmware.torque_limit", "no.such")
+REGISTERS = ("P_Coefficient", "Torque_Limit", "Minimum_Startup_Force", "Integral_Limit", "Position_P_Gain", "P_Gain",
+             "Minimum_Velocity_Limit")  # no two of them make one number
 
 
 def drawn(seed: int, servos: int = 0) -> dict:
@@ -51,7 +53,7 @@ def drawn(seed: int, servos: int = 0) -> dict:
 
 def action(rng: random.Random) -> tuple[str, object]:
     """Return a kind of action and a value, some of which are refused."""
-    kind = rng.choice(("command", "command", "command", "set", "set", "push", "frames", "torque"))
+    kind = rng.choice(("command", "command", "command", "set", "set", "push", "frames", "torque", "register"))
     if kind == "command":
         return kind, command(rng)
     if kind == "push":
@@ -59,6 +61,8 @@ def action(rng: random.Random) -> tuple[str, object]:
     if kind == "frames":
         return kind, rng.choice(({"rate": rng.uniform(20.0, 300.0)}, {"lost": rng.random()}, {"rate": 1.0, "lost": 1.0},
                                  {"lost": 2.0}, {"rate": 900.0}))
+    if kind == "register":
+        return kind, {rng.choice(REGISTERS): rng.randint(0, 300)}
     if kind == "torque":
         return kind, rng.random() < 0.5
     if rng.random() < 0.5:

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from page_talk import angle, go_on, latest, opened_panel, scene
+from page_talk import angle, beside, go_on, latest, opened_panel, scene
 
 pytestmark = pytest.mark.slow
 
@@ -23,7 +23,7 @@ def test_a_horn_gives_way_to_the_mouse_and_says_the_force(page):
     said = page.locator(".force").inner_text()
     pushed = angle(page)
     assert pushed > before + 5.0
-    torque = float(re.search(r"pushes with ([\d.]+) N m towards larger", said).group(1))
+    torque = 1e-3 * float(re.search(r"pushes with ([\d.]+) mN m towards larger", said).group(1))
     turn = 1.5708 - (pushed - before) / 57.2958  # what the hand is still ahead of the horn [rad]
     assert torque == pytest.approx(2.0 * turn, abs=0.15)
     assert page.locator("svg.servo0 .hand").get_attribute("d").startswith("M")
@@ -109,6 +109,7 @@ def test_shapes_begin_and_go_as_they_are_told(page):
 
 
 def test_any_parameter_by_search_changes_the_servo(page):
+    beside(page)
     opened_panel(page, "Any parameter")
     page.get_by_label("Search").fill("stretcher gain")
     assert page.locator(".found .card").count() == 1
@@ -145,8 +146,8 @@ def test_supply_load_and_choices_have_their_controls(page):
                     {"load.pendulum.mass": 0.3}]
 
 
-def test_a_register_is_stiffness(opened, server):
-    page = opened(server)
+def test_a_register_is_stiffness(opened, home):
+    page = opened(home)
     page.evaluate("""bench.ask({scene: 'format = 1\\n[[servo]]\\nid = "feetech-sts3215-12v"\\n'})""")
     page.wait_for_function("bench.facts[0].registers !== null")
     opened_panel(page, "Registers")
@@ -192,7 +193,8 @@ def test_other_servos_are_chosen_and_their_curves_shown(page):
     page.get_by_label("Servo 1", exact=True).select_option("feetech-sts3215-12v")
     page.locator(".curves h3", has_text="Feetech").wait_for()
     assert page.locator(".curve path.line").count() == 2
-    assert "N m at rest" in page.locator(".curve").get_attribute("aria-label")
+    assert "mN m at rest" in page.locator(".curve").get_attribute("aria-label")
+    page.get_by_role("button", name="Add a servo").click()
     page.get_by_label("Servo 2", exact=True).select_option("dynamixel-xl330-m288")
     page.get_by_label("All on one battery").check()
     page.get_by_label("Voltage without load").last.fill("7.4")

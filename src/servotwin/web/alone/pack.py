@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import warnings
 from typing import Any
@@ -12,6 +11,7 @@ import numpy as np
 from servotwin.bench import FEEDBACK_CONVERTER, INPUT_CONVERTER
 from servotwin.errors import ServotwinError
 from servotwin.loads import Load, Pendulum
+from servotwin.models import DigitalServo
 from servotwin.models.engine.live import making, screen
 from servotwin.models.engine.live.posts import UNITS
 from servotwin.models.engine.live.shapes import FIELDS
@@ -29,6 +29,7 @@ from servotwin.simulation.status import Status
 from servotwin.web.alone.bounds import bounds_of
 from servotwin.web.alone.csv_rules import csv_rules
 from servotwin.web.alone.limits import limits
+from servotwin.web.alone.register_tables import family_names, register_tables
 from servotwin.web.alone.words import WORDS
 from servotwin.web.lessons import mystery
 from servotwin.web.lessons.lessons import lessons
@@ -68,7 +69,7 @@ def world(first: Scene) -> dict[str, Any]:
         "columns": screen.COLUMNS, "events": {str(code): word for code, word in screen.SHOWN.items()},
         "rules": {"actions": said.ACTIONS, "for_all": said.FOR_ALL, "scene": said.SCENE, "view": said.VIEW,
                   "servo": said.SERVO, "loads": {name: _load_rule(name) for name in _LOADS}},
-        "written": _written(), "mystery": {
+        "mystery": {
             "base": mystery.BASE, "hidden": mystery.unknowns(), "both_ways": mystery.BOTH_WAYS,
             "friction": mystery.FRICTION, "good": mystery.GOOD, "fair": mystery.FAIR, "seeds": mystery.SEEDS},
         "files": _files(), "csv": csv_rules(),
@@ -86,6 +87,7 @@ def world(first: Scene) -> dict[str, Any]:
                                              ("feedback_count", "feedback_voltage", FEEDBACK_CONVERTER))]}
 
 
+_GAIN = "firmware.proportional_gain"
 _LOADS = {"load.inertia": "inertia", "load.viscous_friction": "viscous_friction", "load.torque": "torque",
           "load.coulomb_torque": "coulomb_torque", "load.pendulum.mass": "mass", "load.pendulum.length": "arm",
           "load.pendulum.hanging_angle": "hanging_angle"}
@@ -128,27 +130,17 @@ def _servo(name: str) -> dict[str, Any]:
             continue
         facts = facts_of(model, scene)
         found = {key: facts[key] for key in ("id", "title", "kind", "models", "horn")}
+        found["registers"], found["family"] = register_tables(model), family_names(model.servo)
         found["values"] = [[one[key] for key in _OF_EACH] for one in facts["parameters"]]
         models[kind] = {"columns": ["time", *facts["signals"]], "bounds": bounds_of(model), "middle": middle_of(model),
                         **{key: facts[key] for key in ("travel_deg", "pulse_us", "voltage", "loop")}}
+        if isinstance(model, DigitalServo) and facts["loop"]:
+            models[kind]["loop"] = {**facts["loop"], "gain": _GAIN,
+                                    "per_gain": model.loop_stiffness() / model.value(_GAIN)}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         default = models_of(Scene(servos=(SceneServo(id=name),)))[0]
     return {**found, "model": type(default).__name__, "of": models}
-
-
-def _written() -> dict[str, Any]:
-    """Return what the registers that lessons write make of their servos, by the words of a scene."""
-    found = {}
-    for one in lessons():
-        for servo in one.scene.servos:
-            if servo.registers:
-                before, model = SceneServo(id=servo.id).servo(), model_named(servo.model)(servo.servo())
-                after = {name: model.servo.get(name) for name in model.servo.names()
-                         if model.servo.get(name) != before.get(name)}
-                found[f"{servo.id} {json.dumps(dict(servo.registers), separators=(',', ':'))}"] = {
-                    "values": after, "loop": facts_of(model, one.scene)["loop"]}
-    return found
 
 
 def _files() -> dict[str, Any]:

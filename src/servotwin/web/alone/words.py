@@ -8,7 +8,7 @@ from servotwin.simulation.bus_supply import MODEL_NAMES
 ONLY_WITH_SERVER = "only with the server: servotwin web"
 WORDS = {
     "alone": "This bench computes here, without a server. Only with one (servotwin web): fits, logs but plain CSV, "
-             "servo files, registers but those of lessons, and the control circuit.",
+             "servo files, and the control circuit.",
     "only_with_server": ONLY_WITH_SERVER,
     "no_plain_log": "{name}: got {got}, allowed: plain CSV with columns such as time_s, pulse_width_us, "
                     "output_angle_deg; the server's page (servotwin web) reads far more",
@@ -44,6 +44,8 @@ WORDS = {
     "no_inertia": "gear.backlash: got {got}, allowed: play only with inertia behind it: gear.output_inertia, or a load "
                   "that has some",
     "frame_rate": "frame rate: got {got}, allowed: frames that a pulse fits into",
+    "unknown_register": "unknown register of {label} {name}: allowed: the name of a register, such as {such}",
+    "no_registers": "none: it is no bus servo", "bus_registers": "registers of a bus servo",
     "no_torque": "torque_enable of {model}: got {got}, allowed: nothing: an analog servo has no such switch",
     "no_torque_switch": "torque: got {got}, allowed: nothing: no servo here has such a switch",
     "too_many_actions": "record of the bench: got '100000 actions', allowed: no more: start it anew",

@@ -1,6 +1,6 @@
 // The servos of a bench: what is given of them, what the panels show of them, and between what commands may be.
 
-import { Refused, filled, refuse, tidy, unknown, within, wrong } from "./check.js";
+import { Refused, filled, refuse, shown, tidy, unknown, within, wrong } from "./check.js";
 
 /** @typedef {{time: number, kind: string, value: any, servo: number|null}} Action */
 
@@ -30,11 +30,9 @@ export class Servo {
     this.changed = new Map();
     this.load = { ...world.no_load, ...scene.load };
     if (this.mystery) for (const [name, value] of Object.entries(hidden(world, kernel, one.mystery))) this.hide(name, value);
-    if (Object.keys(one.registers).length) {
-      const written = world.written[`${id} ${JSON.stringify(one.registers)}`] ?? refuse("only_with_server");
-      for (const [name, value] of Object.entries(written.values)) { this.values.set(name, value); this.changed.set(name, value); }
-      this.own = { ...this.own, loop: written.loop };
-    }
+    /** @type {Map<string, number>} what was written into registers */
+    this.written = new Map();
+    if (Object.keys(one.registers).length) this.write(one.registers);
     this.change(one.parameters);
   }
 
@@ -86,6 +84,40 @@ export class Servo {
     }
     this.values = next;
     for (const [name, value] of Object.entries(values)) this.changed.set(name, value);
+  }
+
+  /** @param {Record<string, number>} values by the maker's names; nothing has changed where one is refused */
+  write(values) {
+    const { registers } = this.known;
+    if (!registers) wrong(`registers of ${this.id}`, Object.keys(values).join(", "), this.world.words.no_registers);
+    const all = new Map([...this.written, ...Object.entries(values)]);
+    /** @type {Map<string, any>} */
+    const made = new Map();
+    for (const [name, value] of Object.entries(values)) {
+      const table = registers.find((/** @type {any} */ one) => one.name === name) ?? this.unwritten(name);
+      const now = held(table, value) ?? wrong(table.what, value, table.allowed);
+      if (table.shared.some((/** @type {string} */ other) => all.has(other))) refuse("only_with_server");
+      const before = held(table, this.written.get(name) ?? table.value) ?? [];
+      table.numbers.forEach((/** @type {string} */ number, /** @type {number} */ n) => { if (now[n] !== before[n]) made.set(number, now[n]); });
+    }
+    for (const [number, value] of made) { this.values.set(number, value); this.changed.set(number, value); }
+    this.written = all;
+  }
+
+  /** Refuse to write a register that has no table. @param {string} name @returns {never} */
+  unwritten(name) {
+    const { label, names } = this.known.family;
+    if (names.includes(name)) return refuse("only_with_server");
+    throw new Refused(filled(this.world.words.unknown_register, { label, name: shown(name), such: names[0] }));
+  }
+
+  /** @returns {any} the spring that its loop is: of a servo whose registers were written its stiffness alone, of one with other numbers nothing is said */
+  get loop() {
+    const { loop } = this.own;
+    if (!loop || !this.changed.size) return loop;
+    const numbers = this.known.registers.flatMap((/** @type {any} */ one) => (this.written.has(one.name) ? one.numbers : []));
+    if (![...this.changed.keys()].every((name) => numbers.includes(name))) return null;
+    return { stiffness_nm_per_rad: loop.per_gain * this.values.get(loop.gain) };
   }
 
   /** @param {string} name @param {any} value @param {any[]} own what is alike of all servos */
@@ -140,8 +172,8 @@ export class Servo {
   facts(k) {
     const { world, known, own } = this;
     return { servo: k, id: known.id, title: known.title, kind: known.kind, model: this.model, models: known.models,
-      horn: known.horn, registers: null, columns: own.columns, travel_deg: own.travel_deg, pulse_us: own.pulse_us,
-      voltage: own.voltage, loop: own.loop,
+      horn: known.horn, registers: this.registers(), columns: own.columns, travel_deg: own.travel_deg, pulse_us: own.pulse_us,
+      voltage: own.voltage, loop: this.loop,
       signals: Object.fromEntries(own.columns.slice(1).map((/** @type {string} */ name) => [name, world.signals[name]])),
       parameters: world.parameters.map((/** @type {any[]} */ alike, /** @type {number} */ n) => {
         const name = alike[0];
@@ -150,12 +182,18 @@ export class Servo {
       }).filter((/** @type {any} */ one) => !this.hides(one.name)) };
   }
 
+  /** @returns {any[]|null} its registers with what they hold */
+  registers() {
+    return this.known.registers && this.known.registers.map((/** @type {any} */ one) => ({ ...one, value: this.written.get(one.name) ?? one.value }));
+  }
+
   /** @returns {Servo} the same, of which something may change */
   copy() {
     const copy = Object.assign(Object.create(Servo.prototype), this);
     copy.load = { ...this.load };
     copy.values = new Map(this.values);
     copy.changed = new Map(this.changed);
+    copy.written = new Map(this.written);
     return copy;
   }
 }
@@ -167,3 +205,10 @@ export function hidden(world, kernel, seed) {
 
 /** @param {string[]} names @param {any[]} values */
 function joined(names, values) { return Object.fromEntries(names.map((name, k) => [name, values[k]])); }
+
+/** @param {any} table of a register @param {any} value @returns {any[]|null} the numbers that follow; null of a value that is none of the register's */
+function held({ low, high, only, pieces }, value) {
+  if (!Number.isInteger(value) || value < low || value > high || (only.length && !only.includes(value))) return null;
+  const [from, at, slopes] = pieces.filter((/** @type {any[]} */ piece) => piece[0] <= value).at(-1);
+  return at ? at.map((/** @type {any} */ one, /** @type {number} */ n) => (typeof one === "number" ? one + slopes[n] * (value - from) : one)) : null;
+}

@@ -158,13 +158,34 @@ function set(live, action) {
   const those = live.those(all ? { ...action, servo: null } : action).map((k) => ({ k, own: names.filter((name) => isLoad(name) || live.servos[k].reads.has(name)) }))
     .filter(({ own }) => own.length);
   if (!those.length) wrong(names.join(", "), "no servo here reads it", "what a model here reads");
+  return [...remade(live, those.map(({ k }) => k), (servo, n) => {
+    const { own } = those[n];
+    for (const name of own.filter(isLoad)) servo.load[world.load[name]] = checked(world.rules.loads[name], action.value[name], name);
+    servo.change(Object.fromEntries(own.filter((name) => !isLoad(name)).map((name) => [name, action.value[name]])));
+  }), () => Object.assign(live.loads, Object.fromEntries(names.filter(isLoad).map((name) => [name, action.value[name]])))];
+}
+
+/** @param {Live} live @param {Action} action @returns {(() => void)[]} */
+function register(live, action) {
+  const those = live.those(action).filter((k) => action.servo === k || live.servos[k].known.registers);
+  if (!those.length) wrong(Object.keys(action.value).join(", "), "no bus servo", live.world.words.bus_registers);
+  return remade(live, those, (servo) => servo.write(action.value));
+}
+
+/**
+ * Make servos anew that are changed; all stay as they were where one cannot be.
+ * @param {Live} live
+ * @param {number[]} those
+ * @param {(servo: Servo, n: number) => void} change
+ * @returns {(() => void)[]} what lets them go on
+ */
+function remade(live, those, change) {
   /** @type {{k: number, servo: Servo, taken?: any}[]} */
   const made = [];
   try {
-    for (const { k, own } of those) {
+    for (const [n, k] of those.entries()) {
       const servo = live.servos[k].copy();
-      for (const name of own.filter(isLoad)) servo.load[world.load[name]] = checked(world.rules.loads[name], action.value[name], name);
-      servo.change(Object.fromEntries(own.filter((name) => !isLoad(name)).map((name) => [name, action.value[name]])));
+      change(servo, n);
       made.push({ k, servo });
       live.going.make(k, servo);
       const { command, time } = live.told[k];
@@ -174,11 +195,11 @@ function set(live, action) {
     for (const { k } of made) live.going.make(k, live.servos[k]); // as before
     throw error;
   }
-  return [...made.map(({ k, servo, taken }) => () => {
+  return made.map(({ k, servo, taken }) => () => {
     live.servos[k] = servo;
     live.follow(k, taken);
     live.going.change(k);
-  }), () => Object.assign(live.loads, Object.fromEntries(names.filter(isLoad).map((name) => [name, action.value[name]])))];
+  });
 }
 
 /** @type {Record<string, (live: Live, action: Action) => (() => void)[]>} */
@@ -201,6 +222,6 @@ const WAYS = {
     }];
   },
   set,
-  register: () => refuse("only_with_server"),
+  register,
   control: () => refuse("only_with_server"),
 };

@@ -192,7 +192,7 @@ export class Room {
     if ("do" in message) {
       if (this.replaying) refuse("repeating");
       const { time, kind, servo } = live.do(message.do, message.value, message.servo ?? null);
-      if (kind === "set") {
+      if (kind === "set" || kind === "register") {
         this.step = world.limits.first_stretch;
         const those = live.servos.map((one, k) => one.facts(k)).filter((one) => servo === null || one.servo === servo);
         this.page.told({ changed: those, loads: this.loads() });
