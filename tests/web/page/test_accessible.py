@@ -167,7 +167,7 @@ def test_what_is_said_is_what_is_shown_and_only_when_asked(page):
     heads = page.locator(".words-panel thead th").all_inner_texts()
     shown = dict(zip(heads, cells, strict=True))
     assert float(shown["time [s]"]) == pytest.approx(page.evaluate("bench.time"), abs=1e-3)
-    assert float(shown["angle, PulseServo [°]"]) == pytest.approx(angle, abs=0.06)
+    assert float(shown["angle [°]"]) == pytest.approx(angle, abs=0.06)
     assert page.locator(".words-panel tbody tr").count() == 20
 
 

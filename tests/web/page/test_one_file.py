@@ -51,13 +51,13 @@ def test_it_is_asked_for_once_and_its_link_is_short(opened, shelf):
 def test_a_link_that_is_pasted_into_the_open_page_acts(opened, home):
     page = opened(home)
     page.evaluate("location.hash = '#lesson=deadband'")
-    page.wait_for_selector(".lesson h3")
-    assert page.locator(".lesson h3").inner_text() == "A servo that is content"
+    page.wait_for_selector(".lesson h2")
+    assert page.locator(".lesson h2").inner_text() == "A servo that is content"
 
 
 def test_what_only_a_server_can_is_said_and_so_is_a_browser_that_cannot(opened, browser, bench_file):
     page = opened(bench_file)
-    said = page.locator(".alone-says").inner_text()
+    said = page.locator(".alone-says").text_content()
     assert "servotwin web" in said
     assert "fits" in said
     assert page.evaluate("bench.ask({fit: {plan: true}}).catch((error) => error.message)") == (

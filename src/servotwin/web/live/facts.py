@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from servotwin.parameters import Servo
     from servotwin.web.live.scene import Scene
 
-_SHOWN = {"time": "us", "angle": "deg", "inertia": "g cm2", "inductance": "mH", "torque per current": "mN m/A"}
+_SHOWN = {"time": "us", "angle": "deg", "inertia": "g cm2", "inductance": "mH", "torque": "mN m",
+          "torque per current": "mN m/A"}
 """Units in which people read some dimensions; SI else."""
 _WIDE = 4.0  # times the value: where a slider ends of which nothing else is known; assumed
 _GEAR_DENSITY = 1400.0  # kg/m³ of a servo with motor and gear: 40 g in 40 x 20 x 36 mm, a standard size; assumed
@@ -158,11 +159,21 @@ def size_of(servo: Servo) -> dict[str, float]:
 
 def _control(name: str, symbol: str, dimension: str, meaning: str, value: Any, low: float | None,
              high: float | None) -> dict[str, Any]:
-    unit = "" if dimension == "word" else si_unit(dimension)
-    shown = unit if dimension == "word" else _SHOWN.get(dimension, unit)
-    return {"name": name, "symbol": symbol, "unit": unit, "dimension": dimension, "meaning": meaning,
-            "value": list(value) if isinstance(value, tuple) else value, "low": low, "high": high,
-            "shown": {"unit": shown, "factor": 1.0 if not unit else factor(shown, dimension)}}
+    return {"name": name, "symbol": symbol, "unit": "" if dimension == "word" else si_unit(dimension),
+            "dimension": dimension, "meaning": meaning, "value": list(value) if isinstance(value, tuple) else value,
+            "low": low, "high": high, "shown": shown_in(dimension)}
+
+
+def shown_in(dimension: str) -> dict[str, Any]:
+    """Return the unit in which the page shows a dimension, and how much of SI one of it is.
+
+    Examples
+    --------
+    >>> shown_in("torque"), shown_in("word")
+    ({'unit': 'mN m', 'factor': 0.001}, {'unit': '', 'factor': 1.0})
+    """
+    unit = "" if dimension == "word" else _SHOWN.get(dimension, si_unit(dimension))
+    return {"unit": unit, "factor": factor(unit, dimension) if unit else 1.0}
 
 
 def _range(value: Any, rule: str, known: Any) -> tuple[float | None, float | None]:

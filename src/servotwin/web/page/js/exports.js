@@ -32,6 +32,7 @@ export function mount(root, bench) {
     if (!found) return;
     if (found.fragment.length > LONGEST_LINK) { bench.notice("too much was done for a link: save the bench as a file"); return; }
     history.replaceState(null, "", `${location.pathname}${location.search}#${found.fragment}`);
+    bench.emit("linked");
     link.value = location.href;
     link.select();
     navigator.clipboard?.writeText(location.href).catch(() => {});
