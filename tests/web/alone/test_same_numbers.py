@@ -64,6 +64,13 @@ def test_some_benches(folder):
     assert moved > 5
 
 
+def test_benches_with_a_control_circuit(folder):
+    seeds = [seed for seed in range(60) if "[control]" in drawn(seed)["scene"]]
+    _, moved = compare(folder, seeds)
+    assert len(seeds) > 3
+    assert moved > 2
+
+
 @pytest.mark.slow
 def test_two_hundred_benches(folder):
     refused, moved = compare(folder, range(1000, 1200))

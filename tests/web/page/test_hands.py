@@ -199,7 +199,7 @@ def test_other_servos_are_chosen_and_their_curves_shown(page):
     page.get_by_label("All on one battery").check()
     page.get_by_label("Voltage without load").last.fill("7.4")
     page.get_by_role("button", name="Put on the bench").click()
-    page.wait_for_function("bench.facts[1].id === 'dynamixel-xl330-m288' && bench.history[1].length > 5")
+    page.wait_for_function("bench.facts[1]?.id === 'dynamixel-xl330-m288' && bench.history[1].length > 5")
     assert [one["model"] for one in page.evaluate("bench.facts")] == ["DigitalServo", "DigitalServo"]
     assert latest(page, "bus_voltage", 0) == latest(page, "bus_voltage", 1) == pytest.approx(7.4, abs=0.4)
     assert page.locator("figcaption").count() == 2

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from servotwin.bench import FEEDBACK_CONVERTER, INPUT_CONVERTER
+from servotwin.bench import FEEDBACK_CONVERTER, INPUT_CONVERTER, ControlSupply, PulseGenerator
 from servotwin.errors import ServotwinError
 from servotwin.loads import Load, Pendulum
 from servotwin.models import DigitalServo
@@ -82,6 +82,7 @@ def world(first: Scene) -> dict[str, Any]:
         "degrees": "deg", "whole": WHOLE, "status": [_failed(one) for one in Status],
         "scene": {"servo": [*said.SERVO["fields"]], "sources": said.SOURCES, "tables": TABLES, "top": TOP,
                   "row": (3, 4)},
+        "control": _control(),
         "converters": [{"name": name, "of": of, "gain": one.gain, "offset": one.offset, "highest": one.highest}
                        for name, of, one in (("command_count", "command_voltage", INPUT_CONVERTER),
                                              ("feedback_count", "feedback_voltage", FEEDBACK_CONVERTER))]}
@@ -141,6 +142,17 @@ def _servo(name: str) -> dict[str, Any]:
         warnings.simplefilter("ignore")
         default = models_of(Scene(servos=(SceneServo(id=name),)))[0]
     return {**found, "model": type(default).__name__, "of": models}
+
+
+def _control() -> dict[str, Any]:
+    """Return the control circuit: what it is unless a scene says more, and its converter and generator."""
+    usual, generator = ControlSupply(), PulseGenerator()
+    return {"usual": {name: getattr(usual, name) for name in said.CONTROL_FIELDS},
+            "longest": generator.width(INPUT_CONVERTER.highest), "delay": said.CONTROL_FIELDS[2],
+            "fields": {"gain": INPUT_CONVERTER.gain, "offset": INPUT_CONVERTER.offset,
+                       "highest": INPUT_CONVERTER.highest, "step": generator.step, "base": generator.base,
+                       "counts_per_step": generator.counts_per_step}, "shares": said.CONTROL_FIELDS[:2],
+            "unit": UNITS[2], "bus": "bus_voltage", "full": "supply.open_circuit_voltage"}
 
 
 def _files() -> dict[str, Any]:

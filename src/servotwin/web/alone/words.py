@@ -8,7 +8,7 @@ from servotwin.simulation.bus_supply import MODEL_NAMES
 ONLY_WITH_SERVER = "only with the server: servotwin web"
 WORDS = {
     "alone": "This bench computes here, without a server. Only with one (servotwin web): fits, logs but plain CSV, "
-             "servo files, and the control circuit.",
+             "servo files.",
     "only_with_server": ONLY_WITH_SERVER,
     "no_plain_log": "{name}: got {got}, allowed: plain CSV with columns such as time_s, pulse_width_us, "
                     "output_angle_deg; the server's page (servotwin web) reads far more",
@@ -45,6 +45,10 @@ WORDS = {
                   "that has some",
     "frame_rate": "frame rate: got {got}, allowed: frames that a pulse fits into",
     "unknown_register": "unknown register of {label} {name}: allowed: the name of a register, such as {such}",
+    "no_circuit": "a bench that has one", "of_pulses": "one of pulses",
+    "late_circuit": "less than what a frame leaves after its longest pulse [s]",
+    "no_reference": "reference of a converter that hangs on the supply: allowed: a positive voltage: the supply has "
+                    "broken down",
     "no_registers": "none: it is no bus servo", "bus_registers": "registers of a bus servo",
     "no_torque": "torque_enable of {model}: got {got}, allowed: nothing: an analog servo has no such switch",
     "no_torque_switch": "torque: got {got}, allowed: nothing: no servo here has such a switch",

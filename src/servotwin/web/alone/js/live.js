@@ -1,5 +1,6 @@
 // The bench of the page as one file: what was done at it, and its servos that go on.
 
+import { Circuit } from "./circuit_of.js";
 import { Refused, checked, refuse, tidy, unknown, wrong } from "./check.js";
 import { Servo } from "./facts.js";
 import { Going } from "./going.js";
@@ -17,13 +18,13 @@ export class Live {
     this.scene = { ...scene };
     /** @type {Servo[]} */
     this.servos = scene.servos.map((/** @type {any} */ one) => new Servo(world, one, scene, kernel));
-    if (Object.keys(scene.control).length) refuse("only_with_server");
     this.shared = Object.keys(scene.supply).length > 0;
     if (this.shared) {
       this.servos.forEach((/** @type {Servo} */ one, /** @type {number} */ k) => one.hang(scene.supply, k + 1));
       if (new Set(this.servos.map((/** @type {Servo} */ one) => one.columns.includes("duty"))).size > 1) refuse("mixed");
     }
     this.going = new Going(kernel, world, this.servos, scene);
+    this.circuit = Object.keys(scene.control).length ? new Circuit(world, this, scene.control) : null;
     /** @type {{command: any, time: number}[]} what each servo is told now */
     this.told = [];
     /** @type {Record<string, number>} what was changed of loads since the start, by dotted names */
@@ -37,6 +38,7 @@ export class Live {
     this.servos.forEach((/** @type {Servo} */ _, /** @type {number} */ k) => {
       const first = this.todo.find((one) => one.kind === "command" && (one.servo === null || one.servo === k));
       this.follow(k, this.takes(k, /** @type {Action} */ (first).value, 0));
+      this.circuit?.heed(k, 0);
       this.going.begin(k);
     });
     this.fits(scene.frame_rate);
@@ -74,6 +76,8 @@ export class Live {
 
   /** @param {number} k @param {any} command @param {number} time @param {Servo} [servo] that is to follow it */
   takes(k, command, time, servo = this.servos[k]) {
+    const { unit } = this.world.control;
+    if (this.circuit && command.unit !== unit) wrong("unit of a command to a control circuit", command.unit, unit);
     const taken = this.going.taken(k, command, time);
     servo.bound(command, taken.ends);
     return { ...taken, command, time };
@@ -87,6 +91,8 @@ export class Live {
 
   /** Refuse frames that some pulse does not fit into. @param {number} rate [Hz] */
   fits(rate) {
+    if (this.circuit && this.circuit.longest * rate >= 1) refuse("frame_rate", `${tidy(rate)} Hz`);
+    if (this.circuit) return;
     if (this.told.some((one, k) => this.going.hears(k) && /** @type {any} */ (one).ends[1][1] * rate >= 1)) refuse("frame_rate", `${tidy(rate)} Hz`);
   }
 
@@ -126,7 +132,8 @@ export class Live {
   advance(until, rate, switches = true) {
     this.catchUp();
     const end = this.todo.length ? Math.min(until, this.todo[0].time) : until;
-    const push = this.going.advance(end, rate, switches);
+    const push = this.going.advance(this.circuit ? Math.min(end, this.circuit.next) : end, rate, switches);
+    this.circuit?.look(push.parts);
     if (push.wrong) throw new Refused(push.wrong.replace("{time}", tidy(this.time)));
     this.catchUp();
     return push;
@@ -223,5 +230,11 @@ const WAYS = {
   },
   set,
   register,
-  control: () => refuse("only_with_server"),
+  control: (live, { value }) => {
+    const { circuit, world } = live;
+    if (!circuit) return wrong("control circuit", Object.keys(value).join(", "), world.words.no_circuit);
+    const { delay } = world.control;
+    if (circuit.longestWith(value) * live.going.rate >= 1) wrong(`${delay} of the control circuit`, value[delay], world.words.late_circuit);
+    return [() => circuit.change(value)];
+  },
 };
