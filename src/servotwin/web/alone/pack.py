@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import warnings
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from servotwin import units
 from servotwin.bench import FEEDBACK_CONVERTER, INPUT_CONVERTER, ControlSupply, PulseGenerator
 from servotwin.errors import ServotwinError
 from servotwin.loads import Load, Pendulum
@@ -21,6 +22,7 @@ from servotwin.models.terms.given import field_of
 from servotwin.parameters import GROUPS, catalog_names
 from servotwin.parameters.group import RULES
 from servotwin.parameters.quantity import SET_BY_USER
+from servotwin.parameters.servo import KINDS as KINDS_OF_SERVOS
 from servotwin.signals.signal import KINDS
 from servotwin.simulation.bus_supply import OF_BUS
 from servotwin.simulation.engine import failure
@@ -34,7 +36,7 @@ from servotwin.web.alone.words import WORDS
 from servotwin.web.lessons import mystery
 from servotwin.web.lessons.lessons import lessons
 from servotwin.web.live import said
-from servotwin.web.live.beginning import load_of, middle_of, models_of
+from servotwin.web.live.beginning import NO_PLAY, load_of, middle_of, models_of
 from servotwin.web.live.export import APART, SCRIPT, STEP
 from servotwin.web.live.export import KINDS as KINDS_OF_FILES
 from servotwin.web.live.facts import facts_of, load_facts
@@ -43,7 +45,11 @@ from servotwin.web.live.scene import TABLES, TOP, Scene
 from servotwin.web.live.scene_servo import SERVO_MODELS, SceneServo, model_named
 from servotwin.web.server.catalog import catalog_list, curves_data
 
+if TYPE_CHECKING:
+    from servotwin.parameters import Servo
+
 _OF_ALL = ("name", "symbol", "unit", "dimension", "meaning", "shown", "rule", "choices")  # alike of all servos
+_SPREAD = ("std", "lower", "upper")
 _OF_EACH = ("value", "origin", "source", "spread", "low", "high")
 
 
@@ -72,6 +78,8 @@ def world(first: Scene) -> dict[str, Any]:
         "mystery": {
             "base": mystery.BASE, "hidden": mystery.unknowns(), "both_ways": mystery.BOTH_WAYS,
             "friction": mystery.FRICTION, "good": mystery.GOOD, "fair": mystery.FAIR, "seeds": mystery.SEEDS},
+        "file": {"groups": [*GROUPS], "spread": _SPREAD, "no_play": NO_PLAY, "usual": KINDS_OF_SERVOS[0], "units": {
+            name: {unit: units.factor(unit, name) for unit in known} for name, known in units.DIMENSIONS.items()}},
         "files": _files(), "csv": csv_rules(),
         "no_load": _no_load(), "made": ["", "no_inertia"],
         "set": {"origin": "assumed", "source": SET_BY_USER, "spread": ""},
@@ -133,6 +141,8 @@ def _servo(name: str) -> dict[str, Any]:
         found = {key: facts[key] for key in ("id", "title", "kind", "models", "horn")}
         found["registers"], found["family"] = register_tables(model), family_names(model.servo)
         found["values"] = [[one[key] for key in _OF_EACH] for one in facts["parameters"]]
+        found["stated"] = _stated(model.servo)
+        found |= {"notes": model.servo.notes, "sheet": dict(model.servo.sheet), "fit": dict(model.servo.fit)}
         models[kind] = {"columns": ["time", *facts["signals"]], "bounds": bounds_of(model), "middle": middle_of(model),
                         **{key: facts[key] for key in ("travel_deg", "pulse_us", "voltage", "loop")}}
         if isinstance(model, DigitalServo) and facts["loop"]:
@@ -142,6 +152,12 @@ def _servo(name: str) -> dict[str, Any]:
         warnings.simplefilter("ignore")
         default = models_of(Scene(servos=(SceneServo(id=name),)))[0]
     return {**found, "model": type(default).__name__, "of": models}
+
+
+def _stated(servo: Servo) -> dict[str, list[float | None]]:
+    """Return how sure a servo's record is of its numbers: std, lower and upper (SI) of those where it says so."""
+    found = {name: [getattr(servo.source(name), key) for key in _SPREAD] for name in servo.names()}
+    return {name: ends for name, ends in found.items() if any(end is not None for end in ends)}
 
 
 def _control() -> dict[str, Any]:

@@ -8,7 +8,7 @@ from servotwin.simulation.bus_supply import MODEL_NAMES
 ONLY_WITH_SERVER = "only with the server: servotwin web"
 WORDS = {
     "alone": "This bench computes here, without a server. Only with one (servotwin web): fits, logs but plain CSV, "
-             "servo files.",
+             "servo files but of catalog servos.",
     "only_with_server": ONLY_WITH_SERVER,
     "no_plain_log": "{name}: got {got}, allowed: plain CSV with columns such as time_s, pulse_width_us, "
                     "output_angle_deg; the server's page (servotwin web) reads far more",
@@ -45,6 +45,9 @@ WORDS = {
                   "that has some",
     "frame_rate": "frame rate: got {got}, allowed: frames that a pulse fits into",
     "unknown_register": "unknown register of {label} {name}: allowed: the name of a register, such as {such}",
+    "no_servo_file": "servo file: got {got}, allowed: a file of a servo of the catalog with its parameters; the "
+                     "server's page (servotwin web) reads any",
+    "no_mystery_file": "servo file of a mystery servo: allowed: none: find out what it is",
     "no_circuit": "a bench that has one", "of_pulses": "one of pulses",
     "late_circuit": "less than what a frame leaves after its longest pulse [s]",
     "no_reference": "reference of a converter that hangs on the supply: allowed: a positive voltage: the supply has "

@@ -1,6 +1,7 @@
 // The servos of a bench: what is given of them, what the panels show of them, and between what commands may be.
 
 import { Refused, filled, refuse, shown, tidy, unknown, within, wrong } from "./check.js";
+import { readServo } from "./servo_file.js";
 
 /** @typedef {{time: number, kind: string, value: any, servo: number|null}} Action */
 
@@ -14,8 +15,9 @@ export class Servo {
   constructor(world, one, scene, kernel) {
     this.world = world;
     this.mystery = "mystery" in one;
-    const id = this.mystery ? world.mystery.base : one.id ?? refuse("only_with_server");
-    const known = world.servos[id];
+    const file = "file" in one ? readServo(world, one.file) : null;
+    const id = this.mystery ? world.mystery.base : file?.id ?? one.id;
+    const known = file ? { ...world.servos[id], title: file.title } : world.servos[id];
     if (!known) unknown("servo", id, Object.keys(world.servos));
     this.known = this.mystery ? { ...known, id: "mystery", title: filled(world.words.mystery, { seed: one.mystery }) } : known;
     this.id = this.known.id;
@@ -33,7 +35,7 @@ export class Servo {
     /** @type {Map<string, number>} what was written into registers */
     this.written = new Map();
     if (Object.keys(one.registers).length) this.write(one.registers);
-    this.change(one.parameters);
+    this.change({ ...file?.values, ...one.parameters });
   }
 
   /**

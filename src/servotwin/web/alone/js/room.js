@@ -213,7 +213,7 @@ export class Room {
     else if ("text" in message) {
       const text = written(world, live.now());
       return { text, fragment: await fragment(text) };
-    } else if ("export" in message) return { file: await file(this.parts, live.now(), message.export, message.servo ?? 0) };
+    } else if ("export" in message) return { file: await file(this.parts, live, message.export, message.servo ?? 0) };
     else if ("mystery" in message) this.put(read(world, this.hidden(message.mystery)));
     else if ("guess" in message) return { compared: this.compared(live.scene.servos[0].mystery, message.guess) };
     else if ("log" in message) return message.log.play ? this.answer({ do: "command", value: this.own.played() }) : this.own.answer(live, message.log);
