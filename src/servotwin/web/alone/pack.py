@@ -39,7 +39,7 @@ from servotwin.web.live import said
 from servotwin.web.live.beginning import NO_PLAY, load_of, middle_of, models_of
 from servotwin.web.live.export import APART, SCRIPT, STEP
 from servotwin.web.live.export import KINDS as KINDS_OF_FILES
-from servotwin.web.live.facts import facts_of, load_facts
+from servotwin.web.live.facts import SLIDER, facts_of, load_facts
 from servotwin.web.live.live_bench import WHOLE
 from servotwin.web.live.scene import TABLES, TOP, Scene
 from servotwin.web.live.scene_servo import SERVO_MODELS, SceneServo, model_named
@@ -83,7 +83,7 @@ def world(first: Scene) -> dict[str, Any]:
         "files": _files(), "csv": csv_rules(),
         "no_load": _no_load(), "made": ["", "no_inertia"],
         "set": {"origin": "assumed", "source": SET_BY_USER, "spread": ""},
-        "ranges": {name: _ends(one) for name, one in RULES.items()},
+        "slider": SLIDER, "ranges": {name: _ends(one) for name, one in RULES.items()},
         "less": [[f"{title}.{name}" for name in pair] for title, group in GROUPS.items() for pair in group.less],
         "limits": limits(), "words": WORDS, "shapes": FIELDS, "units": UNITS,
         "kinds": {unit: KINDS[unit][0] for unit in UNITS}, "lines": "linear", "hold": "hold",

@@ -28,7 +28,10 @@ if TYPE_CHECKING:
 _SHOWN = {"time": "us", "angle": "deg", "inertia": "g cm2", "inductance": "mH", "torque": "mN m",
           "torque per current": "mN m/A"}
 """Units in which people read some dimensions; SI else."""
-_WIDE = 4.0  # times the value: where a slider ends of which nothing else is known; assumed
+SLIDER: dict[str, Any] = {
+    "wide": 4.0, "of_none": (0.0, 1.0), "positive": "a positive number", "least": 1e-3,
+    "floors": {"a number of at least 1": 1.0, "a number of at least 0": 0.0}, "share": "a number from 0 to 1"}
+"""Where a slider ends of which nothing else is known, assumed: times the value, of 0, and what its rule leaves."""
 _GEAR_DENSITY = 1400.0  # kg/m³ of a servo with motor and gear: 40 g in 40 x 20 x 36 mm, a standard size; assumed
 _SHAPE = (40.0, 20.0, 36.0)  # length to width to height of standard servos [mm]; assumed for all
 _STANDARD_MASS = 0.04  # kg; assumed where a sheet prints none
@@ -186,10 +189,10 @@ def _range(value: Any, rule: str, known: Any) -> tuple[float | None, float | Non
     elif known.std:
         low, high = value - 10.0 * known.std, value + 10.0 * known.std
     else:
-        low, high = sorted((value / _WIDE, value * _WIDE)) if value else (0.0, 1.0)
-    floor = {"a number of at least 1": 1.0, "a number of at least 0": 0.0, "a positive number": 1e-3 * abs(value)}
-    low = max(low, floor.get(rule, low))
-    return (max(low, 0.0), min(high, 1.0)) if rule == "a number from 0 to 1" else (low, high)
+        low, high = sorted((value / SLIDER["wide"], value * SLIDER["wide"])) if value else SLIDER["of_none"]
+    floors = {**SLIDER["floors"], SLIDER["positive"]: SLIDER["least"] * abs(value)}
+    low = max(low, floors.get(rule, low))
+    return (max(low, 0.0), min(high, 1.0)) if rule == SLIDER["share"] else (low, high)
 
 
 def _pulses_of(model: Model) -> list[float] | None:

@@ -179,7 +179,8 @@ export class Servo {
       signals: Object.fromEntries(own.columns.slice(1).map((/** @type {string} */ name) => [name, world.signals[name]])),
       parameters: world.parameters.map((/** @type {any[]} */ alike, /** @type {number} */ n) => {
         const name = alike[0];
-        const set = this.changed.has(name) ? { value: this.changed.get(name), ...world.set } : {};
+        const value = this.changed.get(name);
+        const set = this.changed.has(name) ? { value, ...world.set, ...ends(world.slider, value, alike[world.of_all.indexOf("rule")]) } : {};
         return { ...joined(world.of_all, alike), ...joined(world.of_each, known.values[n]), ...set, read: this.reads.has(name) };
       }).filter((/** @type {any} */ one) => !this.hides(one.name)) };
   }
@@ -213,4 +214,12 @@ function held({ low, high, only, pieces }, value) {
   if (!Number.isInteger(value) || value < low || value > high || (only.length && !only.includes(value))) return null;
   const [from, at, slopes] = pieces.filter((/** @type {any[]} */ piece) => piece[0] <= value).at(-1);
   return at ? at.map((/** @type {any} */ one, /** @type {number} */ n) => (typeof one === "number" ? one + slopes[n] * (value - from) : one)) : null;
+}
+
+/** @param {any} slider @param {any} value @param {string} rule @returns {{low?: number, high?: number}} where a slider ends of a number that was set */
+function ends({ wide, of_none: none, floors, positive, least, share }, value, rule) {
+  if (!Number.isFinite(value)) return {};
+  const [from, to] = value ? [value / wide, value * wide].sort((a, b) => a - b) : none;
+  const low = Math.max(from, rule === positive ? least * Math.abs(value) : floors[rule] ?? from);
+  return rule === share ? { low: Math.max(low, 0), high: Math.min(to, 1) } : { low, high: to };
 }
