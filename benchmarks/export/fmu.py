@@ -13,7 +13,7 @@ from pathlib import Path
 import fmpy
 
 import servotwin as st
-from servotwin.export.c_code import wiring_of
+from servotwin.export.c_writing import wiring_of
 from servotwin.models import default_model
 
 SERVOS = ("hitec-hs-755hb", "feetech-sts3215-12v", "dynamixel-xl330-m288", "miuzei-25kg")

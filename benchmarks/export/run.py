@@ -52,7 +52,7 @@ def told(model: st.models.Model) -> tuple[list[float], str]:
     """Return two commands as the exported servo takes them, and their unit."""
     if isinstance(model, st.DigitalServo) and model.takes_goals:
         return [LOW, HIGH], "rad"
-    wiring = st.export.c_code.wiring_of(model)
+    wiring = st.export.c_writing.wiring_of(model)
     return [wiring.per_angle * angle + wiring.at_zero for angle in (LOW, HIGH)], "s"
 
 

@@ -1,4 +1,4 @@
-"""An exported servo has the same digits everywhere, and what is no number traps it nowhere: compilers, arm64, wasm."""
+"""An exported servo has the same digits on all platforms, and what is no number traps on none."""
 
 import shutil
 import subprocess
@@ -15,6 +15,10 @@ HERE = Path(__file__).parent
 RUN = HERE.parent / "simulation" / "compile" / "harness" / "run.mjs"
 PROGRAM = HERE / "harness" / "digits.c"
 CHECKED = ("-O1", "-g", "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
+BOARD = ("-mcpu=cortex-m4", "-mthumb", "--specs=rdimon.specs", "-nostartfiles",
+         "-T", str(HERE / "harness" / "cortex_m4.ld"), str(HERE / "harness" / "cortex_m4.c"))
+EMULATED = ("qemu-system-arm", "-M", "mps2-an386", "-nographic", "-monitor", "none", "-serial", "none",
+            "-semihosting-config", "enable=on,target=native", "-kernel")
 PLATFORMS = {  # what compiles, and what runs it
     "clang": (("clang", *STRICT, "-O2"), ()),
     "gcc, with fused products and sums": (("gcc", "-std=gnu99", "-O3", "-march=native"), ()),
@@ -22,6 +26,7 @@ PLATFORMS = {  # what compiles, and what runs it
     "with all checks of memory and arithmetic": (("gcc", *STRICT, *CHECKED), ()),
     "arm64": (("aarch64-linux-gnu-gcc", "-std=gnu99", "-O2", "-static"), ("qemu-aarch64",)),
     "wasm": (("clang", "--target=wasm32-wasi", "-std=c99", "-O2"), ("node", "--no-warnings", str(RUN))),
+    "a Cortex-M4": (("arm-none-eabi-gcc", *BOARD, "-std=gnu99", "-O2"), EMULATED),
 }
 SOME = ("plain", "worn", "backlash", "flexible", "warm", "everything", "bounded", "averaged", "on a bus",
         "digital, worn")  # what all others have is in one of them

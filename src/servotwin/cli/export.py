@@ -49,7 +49,11 @@ def c(
     parameters: Annotated[bool, typer.Option(
         "--parameters", help="Add a function that makes the table of other parameters.",
         rich_help_panel=shared.OUTPUT)] = False,
-    accuracy: shared.AccuracyOption = _ACCURACY,
+    accuracy: shared.UsualAccuracyOption = None,
+    dtype: Annotated[str, typer.Option(
+        metavar="DTYPE", help="float64, or float32: all numbers but times have 32 bits, and angles are good to some "
+        "1e-5 rad, of a servo on a bus to some counts.",
+        rich_help_panel=shared.OUTPUT)] = "float64",
     force: Annotated[bool, typer.Option(
         "--force", help="Replace existing files.", rich_help_panel=shared.OUTPUT)] = False,
     as_json: shared.JsonOption = False,
@@ -62,7 +66,7 @@ def c(
     chosen = model_of(servo, model, change or [], None, register or [], supply)
     hangs = load_from(load or [], chosen)
     with patience(f"printing {chosen.servo.name}"):
-        code = exported(chosen, hangs, name=name, parameters=parameters, accuracy=accuracy)
+        code = exported(chosen, hangs, name=name, parameters=parameters, accuracy=accuracy, dtype=dtype)
         files = code.write(out, overwrite=force)
     facts = _facts(code) | {"model": type(chosen).__name__, "files": [str(path) for path in files]}
     if as_json:

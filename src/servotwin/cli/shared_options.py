@@ -59,8 +59,10 @@ LogSupplyOption = Annotated[str | None, typer.Option(
     "that a log has beside it comes before.", rich_help_panel="Logs and servo")]
 SchedulerOption = Annotated[str | None, typer.Option(
     metavar="ADDRESS", help="Run on the workers of a dask scheduler, such as tcp://host:8786.", rich_help_panel=OUTPUT)]
-AccuracyOption = Annotated[float, typer.Option(
+_ACCURACY = typer.Option(
     metavar="RADIANS", help="Error that an angle may have where a motion is integrated, from 1e-13 to 1e-4 rad.",
-    rich_help_panel=OUTPUT)]
+    rich_help_panel=OUTPUT)
+AccuracyOption = Annotated[float, _ACCURACY]
+UsualAccuracyOption = Annotated[float | None, _ACCURACY]
 JsonOption = Annotated[bool, typer.Option(
     "--json", help="Print the summary as JSON, in SI units.", rich_help_panel=OUTPUT)]

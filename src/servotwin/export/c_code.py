@@ -2,23 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import re
-import tempfile
-import textwrap
-from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from servotwin import __version__
-from servotwin.errors import InputError, OutputError, OutputExistsError
-from servotwin.export.c_header import HEADER, MADE, events_of, signals_of
-from servotwin.export.c_making import making
-from servotwin.export.c_source import SOURCE
-from servotwin.export.features import features_of, left_out, recipe_of
+from servotwin.errors import InputError
 from servotwin.loads import as_load
 from servotwin.models import (
     AveragedServo,
@@ -29,92 +16,23 @@ from servotwin.models import (
     PulseServo,
     PulseServoInductive,
 )
-from servotwin.models.engine.alone import Alone, Happened, Seen
-from servotwin.models.engine.memory import ACCURACY, Inputs, Memories, Memory, Point
-from servotwin.models.outputs import SIGNALS
-from servotwin.models.state.modes import Mode, Vector
-from servotwin.models.state.records import numbers_in, record_of
-from servotwin.models.terms import wiring
-from servotwin.models.terms.chip import NO_CHIP, Chip
-from servotwin.models.terms.control import Firm
-from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
-from servotwin.models.terms.frame import Decision, Frame
-from servotwin.models.terms.given import Given
-from servotwin.models.terms.numbers import Numbers
-from servotwin.models.terms.sensor import table_of
-from servotwin.models.terms.wiring import Wiring
-from servotwin.physics.pieces import Piece
-from servotwin.simulation.compile.kinds import FLOAT64, INT64, Array, Kind, Record, Tuple
-from servotwin.simulation.compile.signatures import named
-from servotwin.simulation.compile.standalone import Standalone
+from servotwin.models.engine.memory import ACCURACY
+from servotwin.models.terms import elastic
 from servotwin.simulation.start import accuracy_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
 
     from servotwin.loads import Load, Part
+from servotwin.export.c_text import CCode
+from servotwin.export.c_writing import Writing
 
-_COMMANDS = ("command_voltage", "command_angle", "pulse_width")  # are what the caller says
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 _KNOWN = (AveragedServo, AveragedServoInductive, BoundedServo, PulseServo, PulseServoInductive, DigitalServo)
-_TABLE = Array(FLOAT64, 2)
-_PROGRAM, _FIRM, _MEMORY, _EVENT = (Record(record_of(kind)) for kind in (Firmware, Firm, Memory, Happened))
-_RECORDS: dict[Kind, str] = {Record(record_of(kind)): kind.__name__ for kind in (
-    Firmware, Firm, Memory, Happened, Point, Vector, Mode, Frame, Decision, Piece)}
-_OWN_NAMES = {"Numbers": "plant", "Alone": "numbers", "Firmware": "program", "Happened": "event"}
+_IN_FLOATS, _FINEST_IN_FLOATS = 1e-5, 1e-6  # rad: accuracy unless another is asked for, and what rounding allows
 
 
-@dataclass(frozen=True)
-class CCode:
-    """A servo as C99.
-
-    Attributes
-    ----------
-    name : str
-        Begins the names of the files, types and functions.
-    header, source : str
-        The two texts.
-    left_out : str
-        What the numbers of the servo have no use for, and the code does not follow.
-    table : tuple of float
-        All numbers of the servo in the order in which the struct of its table has them, the table of a potentiometer
-        apart: what another servo with the same things left out may have in its place.
-    """
-
-    name: str
-    header: str
-    source: str
-    left_out: str
-    table: tuple[float, ...]
-
-    def write(self, folder: str | Path, *, overwrite: bool = False) -> tuple[Path, Path]:
-        """Write `name.h` and `name.c` into a folder, which is made where there is none; return their paths.
-
-        Raises
-        ------
-        OutputExistsError
-            If a file is there and `overwrite` is not given; then nothing has changed.
-        OutputError
-            If they cannot be written.
-        """
-        paths = Path(folder) / f"{self.name}.h", Path(folder) / f"{self.name}.c"
-        for path in paths:
-            if path.exists() and not overwrite:
-                raise OutputExistsError(path)
-        try:
-            Path(folder).mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryDirectory(prefix=".servotwin-", dir=folder) as aside:
-                for path, text in zip(paths, (self.header, self.source), strict=True):
-                    (Path(aside) / path.name).write_text(text, encoding="utf-8")
-                for path in paths:
-                    os.replace(Path(aside) / path.name, path)
-        except OSError as error:
-            raise OutputError(f"{folder} cannot be written ({error.strerror or error})") from None
-        return paths
-
-
-def c(model: Model, load: Load | Part | None = None, *, name: str | None = None, accuracy: float = ACCURACY,
-      parameters: bool = False) -> CCode:
+def c(model: Model, load: Load | Part | None = None, *, name: str | None = None, accuracy: float | None = None,
+      parameters: bool = False, dtype: str = "float64") -> CCode:
     """Return a servo as C: a header and a source of functions that start it, let it go on, and look at it.
 
     What they compute is what `Simulator` computes, of the same kernels. The numbers of servo and load stand in a table;
@@ -128,10 +46,14 @@ def c(model: Model, load: Load | Part | None = None, *, name: str | None = None,
         What hangs on the shaft; nothing unless given. A recorded torque is told at each call instead.
     name : str, optional
         Of the files, and the beginning of all names in them; that of the servo unless given.
-    accuracy : float
-        What angles may be off by where motions are integrated [rad].
+    accuracy : float, optional
+        What angles may be off by where motions are integrated [rad]: 1e-9 unless given, in floats 1e-5.
     parameters : bool
         Whether there is a function too that makes the numbers of the parameters of a servo file.
+    dtype : str
+        "float64", or "float32" for processors that have instructions for floats alone: angles are good to some
+        1e-5 rad (of a servo on a bus to some counts, as each count decides), and times in the calls stay doubles. Not
+        for programs that pulses tell their goals, for a spring between two bodies, nor with `parameters`.
 
     Returns
     -------
@@ -140,7 +62,7 @@ def c(model: Model, load: Load | Part | None = None, *, name: str | None = None,
     Raises
     ------
     InputError
-        If there is no C for the model or the load, or the name is none that C can have.
+        If there is no C for the model or the load, the name is none that C can have, or floats are not for it.
 
     Examples
     --------
@@ -157,172 +79,31 @@ def c(model: Model, load: Load | Part | None = None, *, name: str | None = None,
     hung = as_load(load)
     if hung.recorded:
         raise InputError("export c", got="a recorded torque", allowed="loads without one: torque is told at each call")
+    floats = _checked_floats(dtype, model, hung, accuracy=accuracy, parameters=parameters)
     name = re.sub(r"\W", "_", model.servo.name.lower()) if name is None else name
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         raise InputError("export c: name", got=name, allowed="small letters, digits and _, a letter first")
-    return _Writing(model, hung, name, accuracy_of(accuracy), makes=parameters).code()
+    accuracy = accuracy_of((_IN_FLOATS if floats else ACCURACY) if accuracy is None else accuracy)
+    return Writing(model, hung, name, accuracy, makes=parameters, floats=floats).code()
+
+
+def _checked_floats(dtype: str, model: Any, load: Load, *, accuracy: float | None, parameters: bool) -> bool:
+    """Tell whether a servo shall be written in floats."""
+    if dtype not in ("float64", "float32"):
+        raise InputError("dtype", got=dtype, allowed='"float64" or "float32"')
+    if dtype == "float64":
+        return False
+    if isinstance(model, DigitalServo) and not model.takes_goals:
+        raise InputError("dtype", got=f"{dtype} for a program that pulses tell its goals", allowed="float64")
+    if elastic.present(model.pack(load).elastic):
+        raise InputError("dtype", got=f"{dtype} for a spring between two bodies", allowed="float64")
+    if parameters:
+        raise InputError("dtype", got=f"{dtype} with parameters", allowed="float64, or a table alone")
+    if accuracy is not None and accuracy < _FINEST_IN_FLOATS:
+        raise InputError("accuracy", got=accuracy, allowed=f"at least {_FINEST_IN_FLOATS:g} rad in float32")
+    return True
 
 
 def table_for(model: Model, load: Load | Part | None = None, accuracy: float = ACCURACY) -> tuple[float, ...]:
     """Return `CCode.table` of a servo, without its code."""
-    return _Writing(model, as_load(load), "", accuracy_of(accuracy), makes=False).table
-
-
-class _Writing:
-    """The numbers of one servo on their way into C."""
-
-    def __init__(self, model: Any, load: Load, name: str, accuracy: float, *, makes: bool) -> None:
-        self._model, self._load, self._name, self._makes = model, load, name, makes
-        self._program: Firmware = model.firmware() or NO_FIRMWARE
-        self._chip: Chip = model.chip() or NO_CHIP
-        self._curve = table_of(model.curve())
-        self._numbers: Numbers = model.pack(load)
-        N = model.value("gear.gear_reduction")
-        self._alone = Alone(self._numbers, self._chip, wiring_of(model), N, load.torque, self._numbers.heat.T_amb,
-                            accuracy)
-        self._digital = isinstance(model, DigitalServo)
-
-    def code(self) -> CCode:
-        """Return header and source."""
-        flags = features_of_model(self._model, self._load)
-        text, recipe = Standalone(self._public()), recipe_of(flags)
-        names = text.add(recipe, _signatures())
-        made = making(text, recipe, self._model, self._load, self._alone, name=self._name) if self._makes else ""
-        shared = {
-            "name": self._name, "guard": self._name.upper(), "version": __version__, "id": self._model.servo.name,
-            "title": f"{self._name}: {self._model.servo.name} as a {type(self._model).__name__}."}
-        return CCode(self._name, HEADER.substitute(shared | self._of_header(text, flags)),
-                     SOURCE.substitute(shared | names | self._of_source(text)) + made, left_out(flags), self.table)
-
-    @property
-    def table(self) -> tuple[float, ...]:
-        """All numbers of the table in its order."""
-        return tuple(map(float, numbers_in((self._alone, *((self._program,) if self._digital else ())))))
-
-    def _public(self) -> dict[str, Kind]:
-        """Return the structs of the header by their names, each after those in it."""
-        roots: list[Kind] = [named(Alone), _MEMORY, _EVENT]
-        if self._digital:
-            roots += [_PROGRAM, _FIRM]
-        if self._makes:
-            roots.append(named(Given))
-        structs = dict.fromkeys(kind for root in roots for kind in (*_within(root), root))
-        return {f"{self._name}_{_name_of(kind)}": kind for kind in structs}
-
-    def _of_header(self, text: Standalone, flags: int) -> dict[str, str]:
-        name, structs = self._name, text.public
-        event = next(each for each in structs if each.endswith(f" {name}_event;"))
-        goals = self._alone.wiring.per_angle == 1.0
-        return {
-            "structs": "\n".join(map(_laid_out, (each for each in structs if each is not event))),
-            "event": _laid_out(event), "events": events_of(name.upper()),
-            "command": "a goal [rad]" if goals else "the width of a pulse [s]",
-            "example": f"{self._alone.wiring.at_zero + self._alone.wiring.per_angle:.6g}",
-            "absent": textwrap.fill(f"{left_out(flags)}.", 110, initial_indent=" * ", subsequent_indent=" * "),
-            "making": MADE.substitute(name=name, guard=name.upper()) if self._makes else "",
-            "signals": signals_of(self._signals()),
-            "more": self._members((f"    {name}_program program;\n", self._digital),
-                                  ("    const double *curve; /* of the potentiometer: angle [rad] and error [V] */\n"
-                                   "    int64_t curve_rows;\n", len(self._curve) > 0)),
-            "remembered": self._members((f"    {name}_firm firm; /* of its program */\n", self._digital))}
-
-    @staticmethod
-    def _members(*parts: tuple[str, bool]) -> str:
-        return "".join(line for line, there in parts if there)
-
-    def _of_source(self, text: Standalone) -> dict[str, str]:
-        name, types = self._name, text.types
-        table = [f"    {types.initial(named(Alone), self._alone)}"]
-        kernels = text.private
-        if self._digital:
-            table.append(f"    {{{', '.join(types.initial(FLOAT64, float(x)) for x in self._program)}}}")
-        if self._curve:
-            rows = ", ".join(repr(float(x)) for row in self._curve for x in row)
-            kernels += f"\nstatic const double {name}_curve[] = {{{rows}}};\n"
-            table.append(f"    {name}_curve, {len(self._curve)}")
-        return {
-            "kernels": kernels, "table": ",\n".join(table).replace(", (-", ", (-") + "\n",
-            "memories": types.of(_MEMORIES), "inputs": types.of(_INPUTS), "seen": types.of(named(Seen)),
-            "rows": types.of(Array(_EVENT, 1)), "firms": "{&own->firm, {1}}" if self._digital else "{NULL, {0}}",
-            # the memory is written at the end of a call, but what a program remembers changes on the way
-            "keeping": self._members((f"    const {name}_firm before = state->firm;\n", self._digital)),
-            "restoring": self._members(("    if (status != 0)\n        state->firm = before;\n", self._digital)),
-            "period": ("servo->program.T_f" if self._digital else
-                       "servo->numbers.chip.frame_period" if self._chip.frame_period > 0.0 else "0.0"),
-            "curve": ("{(double *)(uintptr_t)servo->curve, {servo->curve_rows, 2}}" if self._curve
-                      else "{NULL, {0, 2}}"),
-            "program": (f"{{({name}_program *)(uintptr_t)&servo->program, {{1}}}}" if self._digital
-                        else "{NULL, {0}}"),
-            "signals": "\n".join(f"    signals->{signal} = {self._read(signal)};" for signal, *_ in self._signals())}
-
-    def _signals(self) -> list[tuple[str, str, str]]:
-        """Return names, units and meanings of the signals that the servo has."""
-        return signals_of_model(self._model, self._load)
-
-    @staticmethod
-    def _read(signal: str) -> str:
-        return f"seen.{signal}" if signal in ("output_angle", "output_speed") else f"seen.shown.{signal}"
-
-
-def signals_of_model(model: Any, load: Load) -> list[tuple[str, str, str]]:
-    """Return names, units and meanings of the signals of a servo in C."""
-    return [(name, SIGNALS[name].unit, SIGNALS[name].meaning) for name in model.signals_with(load)
-            if name not in _COMMANDS]
-
-
-def features_of_model(model: Any, load: Load) -> int:
-    """Return what the code of a servo has to follow: flags of `terms.dependence`."""
-    return features_of(model.pack(load), model.chip() or NO_CHIP, model.firmware() or NO_FIRMWARE,
-                       len(table_of(model.curve())) > 0)
-
-
-def wiring_of(model: Any) -> Wiring:
-    """Return how a model is told."""
-    if isinstance(model, BoundedServo):
-        return wiring.bounded(model.given)
-    if isinstance(model, AveragedServo | AveragedServoInductive):
-        return wiring.averaged(model.given)
-    return (wiring.digital if isinstance(model, DigitalServo) else wiring.pulsed)(model.given, np.nan)
-
-
-def _tuple(kind: Any, **fields: Kind) -> Tuple:
-    return Tuple(tuple(fields[name] for name in kind._fields), kind.__name__, kind._fields)
-
-
-_MEMORIES = _tuple(Memories, rows=Array(_MEMORY, 1), firms=Array(_FIRM, 1))
-_INPUTS = _tuple(Inputs, command=_TABLE, torque=_TABLE, constant_torque=FLOAT64, period=FLOAT64,
-                 edges=Array(FLOAT64, 1), curve=_TABLE, seed=INT64, accuracy=FLOAT64, firmware=Array(_PROGRAM, 1))
-
-
-@cache
-def _signatures() -> dict[str, tuple[Kind, ...]]:
-    """Return what the entries are called with."""
-    alone = named(Alone)
-    return {"start": (alone, _TABLE, _MEMORIES, FLOAT64),
-            "advance": (alone, _INPUTS, _MEMORIES, FLOAT64, FLOAT64, Array(_EVENT, 1), Array(INT64, 1)),
-            "answer": (alone, FLOAT64, FLOAT64), "observe": (alone, _INPUTS, _MEMORIES)}
-
-
-def _within(kind: Kind) -> Iterator[Kind]:
-    """Return the structs within a struct, each after those in it."""
-    inner: list[Kind] = []
-    if isinstance(kind, Tuple):
-        inner = [each for each in kind.elements if isinstance(each, Tuple)]
-    elif isinstance(kind, Record):
-        inner = [Record(kind.dtype[place]) for place in kind.dtype.names or () if kind.dtype[place].names]
-    for each in inner:
-        yield from _within(each)
-        yield each
-
-
-def _name_of(kind: Kind) -> str:
-    """Return what a struct is called, behind the name of the servo."""
-    name = kind.name if isinstance(kind, Tuple) else _RECORDS[kind]
-    return _OWN_NAMES.get(name, name.lower())
-
-
-def _laid_out(struct: str) -> str:
-    """Return a struct with a member on each line."""
-    head, _, rest = struct.partition("{ ")
-    body, _, name = rest.rpartition(" }")
-    return "\n".join([f"{head}{{", *(f"    {each.strip()};" for each in body.split(";") if each.strip()), f"}}{name}"])
+    return Writing(model, as_load(load), "", accuracy_of(accuracy), makes=False, floats=False).table

@@ -9,7 +9,7 @@ from servotwin.models.engine.events.kinds import NAMES
 
 HEADER = Template('''/* $title
  *
- * Printed by servotwin $version from the kernels that simulate it in Python: the digits are the same, but for rounding.
+ * Printed by servotwin $version from the kernels that simulate it in Python: $digits.
  * C99, no allocation, no globals, SI units. Compile ${name}.c beside it and link with the maths library.
  *
  *     ${name}_state servo;
@@ -34,7 +34,7 @@ extern "C" {
 /* What a call returns. Unless it is ${guard}_DONE, nothing has changed. */
 enum {
     ${guard}_DONE = 0,
-    ${guard}_DIVERGED = 1,       /* numbers beyond what a double holds */
+    ${guard}_DIVERGED = 1,       /* numbers beyond what one holds */
     ${guard}_STEP_TOO_SMALL = 2, /* a motion that no step is short enough for */
     ${guard}_CHATTER = 3,        /* events without time going on */
     ${guard}_TOO_FAST = 4,       /* more oscillations than can be followed */
@@ -63,7 +63,7 @@ typedef struct {
 $remembered    int64_t seed;
 } ${name}_state;
 
-/* Something that happened: when [s], at which output angle [rad], and what. */
+/* Something that happened: when [s$since], at which output angle [rad], and what. */
 $event
 
 /* Room for events; `count` is set to how many there were, of which the first `room` are kept. */
@@ -82,22 +82,22 @@ $signals
 extern const ${name}_servo ${name}_table;
 
 /* Put the servo to rest at t = 0, where it has no error under a command; the seed is that of its noise. */
-int ${name}_init(${name}_state *state, const ${name}_servo *servo, double command, int64_t seed);
+int ${name}_init(${name}_state *state, const ${name}_servo *servo, $real command, int64_t seed);
 
 /* Go on to a time since the start [s] under a command from now on, and a torque that is constant meanwhile, beside that
  * of the load; positive pushes towards -q [N m]. `events` may be NULL. */
-int ${name}_advance(${name}_state *state, const ${name}_servo *servo, double until, double command, double torque,
+int ${name}_advance(${name}_state *state, const ${name}_servo *servo, double until, $real command, $real torque,
     ${name}_events *events);
 
 /* Look at the servo as it stands, before anything happens at its time. */
-int ${name}_observe(const ${name}_state *state, const ${name}_servo *servo, double command, double torque,
+int ${name}_observe(const ${name}_state *state, const ${name}_servo *servo, $real command, $real torque,
     ${name}_signals *signals);
 
 /* The time since the start [s]. */
 double ${name}_time(const ${name}_state *state);
 
 /* The command under which the servo has no error at an angle [rad]. */
-double ${name}_command(const ${name}_servo *servo, double angle);
+$real ${name}_command(const ${name}_servo *servo, $real angle);
 $making
 #ifdef __cplusplus
 }

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from servotwin.errors import InputError, PlausibilityWarning
-from servotwin.export.c_code import c, features_of_model, signals_of_model, wiring_of
+from servotwin.export.c_code import c
+from servotwin.export.c_writing import features_of_model, signals_of_model, wiring_of
 from servotwin.export.fmu_binary import binaries
 from servotwin.export.fmu_model import model_header
 from servotwin.export.fmu_variables import (

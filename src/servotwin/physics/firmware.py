@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 NEARLY = 1e-9  # of a step: what is so near to a whole number is that number
+IN_FLOATS = {"NEARLY": 2e-4}
 
 
 def counted(angle: float, angle_quantum: float) -> float:

@@ -1,5 +1,4 @@
 /* The bits of all signals of a servo under random commands and torques, some of which it does not take. */
-#include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -41,9 +40,10 @@ int main(void) {
         for (size_t n = 0; n < sizeof seen / sizeof *signals; n++) {
             uint64_t bits;
             memcpy(&bits, &signals[n], sizeof bits);
-            printf("%016" PRIx64 " ", signals[n] != signals[n] ? 0u : bits);
+            bits = signals[n] != signals[n] ? 0u : bits;
+            printf("%08lx%08lx ", (unsigned long)(bits >> 32), (unsigned long)(bits & 0xffffffffu));
         }
-        printf("%" PRId64 "\n", events.count);
+        printf("%ld\n", (long)events.count);
         const double bad[] = {nan, inf, -inf, odd[k % 4]};
         for (int n = 0; n < 4; n++) {
             if (servo_advance(&servo, numbers, until + 1.0, bad[n], torque, NULL) == 0)

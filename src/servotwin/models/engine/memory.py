@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.models.state.modes import INSIDE, ON_BACKWARD, RIGID, Mode, Vector, one_body
 from servotwin.models.state.records import record_reader, record_writer
+from servotwin.models.state.rounding import UNIT
 from servotwin.models.terms import control, firmware, frame
 from servotwin.models.terms.control import Firm, Programs
 from servotwin.models.terms.firmware import Firmware
@@ -29,6 +30,7 @@ FIRST_STEP = 1e-4  # s, the first that the integrator tries
 BEAT = 0.0625  # s, by which the clock counts where no pulses come regularly
 FRAMES = 256  # after so many times count anew: not after each, for that would round all of them anew
 SAME = 1e-9  # of a frame: so near to an edge it is the edge
+IN_FLOATS = {"SAME": 1e-4, "FRAMES": 1}
 _USUAL = 0.02  # s, a frame where edges are listed
 
 
@@ -152,7 +154,7 @@ def resumed(pulsed: bool, inputs: Inputs, memory: Memory, changed: bool) -> Memo
         beat = inputs.firmware[0].T_c
     if beat != memory.beat:  # its frames are others now
         origin = origin_of(memory)
-        frames = int((origin + memory.point.time) / beat * (1.0 + 4e-16))
+        frames = int((origin + memory.point.time) / beat * (1.0 + 2.0 * UNIT))
         memory = shifted(memory, frames, beat, frames * beat - origin)
     origin, time = origin_of(memory), memory.point.time
     number = memory.chip.number

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _NO_VOLTAGE = 5e-324  # V: a bus without any is still connected
+IN_FLOATS = {"_NO_VOLTAGE": 1.2e-38}
 _EDGE = 1e-6  # of a limit: what float32 rounds
 
 

@@ -16,6 +16,7 @@ from servotwin.models.engine.memory import SAME, Inputs, Memory, Point, edge_of,
 from servotwin.models.engine.motions import choice, motion
 from servotwin.models.engine.motions.motion import Motion
 from servotwin.models.state.modes import CORE, Vector
+from servotwin.models.state.rounding import UNIT
 from servotwin.models.terms import bridge, duty, firmware, frame
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.chip import present as chip_present
@@ -126,7 +127,7 @@ def follow(m: Motion, point: Point, horizon: float) -> tuple[Point, int, int]:
     """Follow a motion to its first event, its end or the horizon [s]; return also the event (−1: none) and a status."""
     t0, integrated = m.t0, motion.is_step(m)
     step_end = t0 + m.length
-    if abs(step_end - horizon) <= 4e-16 * (abs(t0) + abs(horizon)):
+    if abs(step_end - horizon) <= 2.0 * UNIT * (abs(t0) + abs(horizon)):
         step_end = horizon
     end = min(horizon, step_end)
     if m.kind == motion.SECOND_ORDER or m.kind == motion.WITH_CURRENT:

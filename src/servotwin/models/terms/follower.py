@@ -21,6 +21,7 @@ from servotwin.physics.electronics import error_beyond_deadband, proportional_vo
 from servotwin.physics.pieces import Piece
 
 _TIE = 1e-13  # V
+IN_FLOATS = {"_TIE": 1e-6}
 
 
 class Follower(NamedTuple):

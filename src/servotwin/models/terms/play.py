@@ -18,6 +18,7 @@ from servotwin.physics.laws import array_form
 _LAST_IMPACT = 1e-12  # rad/s: an impact of motor and output this slow is the last one of many
 _BEARING_SHARE = 0.06  # of the Coulomb friction, where the servo does not say: assumed, 0.02 to 0.15
 _ROUNDING = 1e-12  # relative
+IN_FLOATS = {"_LAST_IMPACT": 1e-6, "_ROUNDING": 1e-6}
 _BEARING = "friction.bearing_coulomb_torque"
 
 READS = (_BEARING,)

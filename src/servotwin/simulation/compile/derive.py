@@ -125,6 +125,8 @@ class Derivation:
         if isinstance(value, FunctionType):
             return self._callable(value)
         flat = flat_name(module, name)
+        if self.recipe.in_floats:
+            value = getattr(import_module(module), "IN_FLOATS", {}).get(name, value)
         if isinstance(value, type):
             flat = flat_name(value.__module__, value.__name__)
             self.imports[flat] = (value.__module__, value.__name__)

@@ -33,6 +33,9 @@ class Recipe:
         Constants of the engine that nothing will be equal to, beside those that come up by nothing that they know.
     by_numbers : bool
         Whether C calls the entries with their whole numbers, instead of with words.
+    in_floats : bool
+        Whether the text made of it will be C of floats throughout: what is compared with rounding is that of
+        `IN_FLOATS` of its module, and exponentials and angles are those of C's library.
     """
 
     name: str
@@ -44,6 +47,7 @@ class Recipe:
     always: int = 0
     never: tuple[str, ...] = ()
     by_numbers: bool = False
+    in_floats: bool = False
 
     @cached_property
     def absent(self) -> frozenset[str]:

@@ -225,10 +225,11 @@ class Rewriting(ast.NodeTransformer):
         value = self._space[name]
         if isinstance(value, ModuleType):
             return node
-        if isinstance(value, FunctionType) and value.__module__ == EVERYWHERE and self._module not in DOUBLE:
-            if self._work.recipe.vector and name in _REPLACED:
+        if isinstance(value, FunctionType) and value.__module__ == EVERYWHERE:
+            in_double, recipe = self._module in DOUBLE, self._work.recipe
+            if recipe.vector and name in _REPLACED and not in_double:
                 return self._of_vectors(name, node)
-            if self._work.recipe.single and name not in _PRIMITIVE:
+            if (recipe.in_floats or (recipe.single and not in_double)) and name not in _PRIMITIVE:
                 return ast.parse(f"math.{_OF_C.get(name, name)}", mode="eval").body
         return ast.copy_location(ast.Name(self._work.value(*_home(self._module, name, value)), node.ctx), node)
 

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from servotwin.simulation.compile.derive import derive
+from servotwin.simulation.compile.in_floats import in_floats
 from servotwin.simulation.compile.inference import Module
 from servotwin.simulation.compile.kinds import Kind
 from servotwin.simulation.compile.printing import Printer
@@ -33,9 +34,12 @@ class Standalone:
     ----------
     public : mapping of str to kind
         Structs that others see, by their names, each after those in it.
+    floats : bool
+        Whether numbers have 32 bits; recipes have to say so too.
     """
 
-    def __init__(self, public: Mapping[str, Kind]) -> None:
+    def __init__(self, public: Mapping[str, Kind], *, floats: bool = False) -> None:
+        self._floats = floats
         self._printer = Printer(False, frozenset(), frozenset(), _ONCE)
         for name, kind in public.items():
             self.types.call(kind, name)
@@ -62,13 +66,20 @@ class Standalone:
     @property
     def public(self) -> list[str]:
         """The structs that others see."""
-        return [_SIZES.sub("", each) for each in self.types.structs[:self._public]]
+        return [self.typed(_SIZES.sub("", each)) for each in self.types.structs[:self._public]]
+
+    def typed(self, text: str) -> str:
+        """Return C of doubles as C of what numbers are here."""
+        return in_floats(text) if self._floats else text
 
     @property
     def private(self) -> str:
         """All else: what the functions stand on, and the functions."""
         types = self.types
         sizes = [size[1:] for each in types.structs[:self._public] for size in _SIZES.findall(each)]
-        parts = (part_of_header(name) for name in ("standalone.h", "arithmetic.h"))
-        return "\n".join([*parts, *sizes, *types.structs[self._public:], *types.tables, *types.helpers, "",
-                          *self._printer.functions])
+        structs, bits = types.structs[self._public:], "doubles.h"
+        if self._floats:
+            sizes, structs, bits = [], [_SIZES.sub("", each) for each in structs], "floats.h"
+        parts = (part_of_header(name) for name in ("standalone.h", "arithmetic.h", bits))
+        return self.typed("\n".join([*parts, *sizes, *structs, *types.tables, *types.helpers, "",
+                                     *self._printer.functions]))

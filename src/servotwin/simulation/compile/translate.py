@@ -87,7 +87,7 @@ def translated(derived: Derived, signatures: Sequence[tuple[str, tuple[Kind, ...
 @cache
 def header() -> str:
     """Return the text on which all others stand."""
-    return "\n".join(map(part_of_header, ("kernels.h", "arithmetic.h", "addresses.h")))
+    return "\n".join(map(part_of_header, ("kernels.h", "arithmetic.h", "doubles.h", "floats.h", "addresses.h")))
 
 
 @cache

@@ -39,6 +39,7 @@ from servotwin.physics.load_friction import torque_on_gear
 REST_SPEED = 1e-6  # rad/s: below this a rebound from a stop comes to rest
 NEXT_TO_NOTHING = 1e-300  # N m: where a current is about to flow
 REST_HEIGHT = 4e-15  # relative to the angle: a rebound this low is rounding
+IN_FLOATS = {"NEXT_TO_NOTHING": 1e-30, "REST_HEIGHT": 2e-6}
 
 
 def has_friction(numbers: Numbers) -> bool:

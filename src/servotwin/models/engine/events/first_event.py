@@ -25,9 +25,13 @@ from servotwin.models.engine.motions.motion import (
 )
 from servotwin.models.engine.motions.rodas import not_constant
 from servotwin.models.state.modes import RIGID, Vector
+from servotwin.models.state.rounding import UNIT
 from servotwin.models.terms import source
 from servotwin.models.terms.friction import fades
 from servotwin.physics.pieces import piece_rate, piece_value
+
+_INSTANT = 1e-18  # s: between two times
+IN_FLOATS = {"_INSTANT": 1e-9}
 
 
 def first_event(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float, int, Vector]:
@@ -117,8 +121,10 @@ def _crossing(motion: Motion, kind: int, a: float, at_a: tuple[float, float], b:
             return math.inf
     if at_a[0] <= 0.0:
         # It starts at zero, to rounding, and so may its rate: look whether it rises before it falls.
-        for k in range(1, 50):
-            s = a + (b - a) * 0.5**k
+        part = 1.0
+        for _ in range(1, 50):
+            part *= 0.5
+            s = a + (b - a) * part
             value = _at(motion, kind, s, False)[0]
             if value > 0.0:
                 return _root(motion, kind, s, b, value, at_b[0], False)
@@ -148,11 +154,11 @@ def _root(motion: Motion, kind: int, a: float, b: float, f_a: float, f_b: float,
             b, f_b = x, f
         else:
             a, f_a = x, f
-        if b - a <= 2e-16 * max(abs(a), abs(b)) or b - a < 1e-18:
+        if b - a <= UNIT * max(abs(a), abs(b)) or b - a < _INSTANT:
             break
         newton = slope == slope and slope != 0.0
         guess = x - f / slope if newton else (a * f_b - b * f_a) / (f_b - f_a)
-        if abs(guess - x) <= 1e-16 * abs(x):
+        if abs(guess - x) <= 0.5 * UNIT * abs(x):
             return guess if a <= guess <= b else x
         better = b - a <= 0.6 * width or (slope == slope and abs(f) < 0.5 * last)
         last = abs(f)

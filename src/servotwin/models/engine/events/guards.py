@@ -43,6 +43,7 @@ MEET_FORWARD, MEET_BACKWARD, PART, PART_OUTPUT, PART_MOTOR = range(9, 14)
 MOTOR_SPEED, MOTOR_RELEASE_FORWARD, MOTOR_RELEASE_BACKWARD, SHARE, CREEPS = range(14, 19)
 KINDS = 19
 BELOW = -1e-13  # a guard counts as crossed below this (V, rad, rad/s, N m): rounding is not an event
+IN_FLOATS = {"BELOW": -1e-6}
 KINKS = (SHARE, CREEPS)  # of a law: no event that anybody would see
 IN_CLOSED_FORM = 1 << SHARE | 1 << CREEPS  # what a creep has looked at itself
 _CORE = 1 << CORE_FORWARD | 1 << CORE_BACKWARD

@@ -9,6 +9,9 @@ import math
 
 from servotwin.physics.elementary import expm1, log1p
 
+_SMALL = 1e-8  # its square is below rounding
+IN_FLOATS = {"_SMALL": 1e-4}
+
 
 def response(rate: float, s: float) -> tuple[float, float, float]:
     """Return e^(−λ s), g = (1 − e^(−λ s))/λ and its integral (s − g)/λ, for λ ≥ 0 and s ≥ 0."""
@@ -41,6 +44,6 @@ def time_to(rate: float, f: float, w0: float, w1: float) -> float:
         return math.inf
     time = gap / there
     y = rate * time
-    if y > 1e-8:
+    if y > _SMALL:
         return time * (log1p(y) / y)
     return time * (1.0 - 0.5 * y)

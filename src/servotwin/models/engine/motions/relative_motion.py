@@ -10,12 +10,14 @@ from typing import NamedTuple
 
 from servotwin.models.engine.motions import first_order
 from servotwin.models.state.modes import Vector
+from servotwin.models.state.rounding import UNIT
 from servotwin.physics.elementary import log
 
 _BEYOND = 1e-13  # rad: so little is rounding
 _STEPS, _FEW = 200, 8  # after a few it is rounding that decides
 _ROUNDING = 2.5e-16  # of an angle
 _CLOSE = 1e-7  # of a time: from so near a step along a parabola ends at rounding
+IN_FLOATS = {"_BEYOND": 1e-6, "_ROUNDING": 1.3e-7, "_CLOSE": 1e-3}
 
 
 class Course(NamedTuple):
@@ -127,7 +129,7 @@ def _reaches(one: Course, other: Course, way: float, toward: float, a: float, at
         step = _step(left, toward * at.speed, toward * at.bend)
         if abs(step) <= _CLOSE * x:
             return min(max(x + step, a), b)
-        if b - a <= 2e-16 * b:
+        if b - a <= UNIT * b:
             break
         x += step
     return 0.5 * (a + b)
@@ -154,7 +156,7 @@ def _turning(one: Course, other: Course, a: float, at_a: Lead, b: float) -> floa
         step = -at.speed / at.bend if at.bend != 0.0 else math.inf
         if abs(step) <= _CLOSE * x:  # more makes no difference to the way
             return min(max(x + step, a), b)
-        if b - a <= 2e-16 * b:
+        if b - a <= UNIT * b:
             break
         x += step
     return 0.5 * (a + b)

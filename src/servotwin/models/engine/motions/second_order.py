@@ -16,6 +16,9 @@ import math
 
 from servotwin.physics.elementary import atan2, atanh, cos, exp, expm1, sin
 
+_TERM = 1e-18  # of a series: what follows is below rounding
+_SMALL = 1e-8  # its square is below rounding
+IN_FLOATS = {"_TERM": 1e-9, "_SMALL": 1e-4}
 FAR = 0.01  # roots are far apart where their distance is a tenth of their mean
 
 
@@ -57,7 +60,7 @@ def _series(x: float, y: float, s: float) -> tuple[float, float, float, float, f
         G1 += p / (n + 1.0)
         G2 += p / ((n + 1.0) * (n + 2.0))
         G3 += p / ((n + 1.0) * (n + 2.0) * (n + 3.0))
-        if abs(p) * n < 1e-18 and abs(before) < 1e-17:
+        if abs(p) * n < _TERM and abs(before) < 10.0 * _TERM:
             break
     return dg, g * s, G1 * s * s, G2 * s * s * s, G3 * s * s * s * s
 
@@ -177,7 +180,7 @@ def first_zero_of(a: float, d: float, root: float, h0: float, h1: float) -> tupl
         x = -h0 / slope
         if x <= 0.0 or root * x >= 1.0:
             return math.inf, math.inf
-        return (atanh(root * x) / root if root * x > 1e-8 else x), math.inf
+        return (atanh(root * x) / root if root * x > _SMALL else x), math.inf
     # h ~ h0 cos(root s) + (slope/root) sin(root s)
     angle = atan2(-h0, slope / root)
     if angle <= 0.0:

@@ -78,6 +78,7 @@ _SHORT = 4e-16  # of a time
 _LONGEST = 100.0  # s: of a creep
 _INTO = 0.9  # of the speed at which friction begins to fade: up to there next to nothing of it has
 _PART, _ROUNDING = 0.1, 2e-15  # of a tolerance: where two runs halve otherwise, they should not differ by more
+IN_FLOATS = {"_NEAR": 1e-3, "_SHORT": 2.4e-7, "_ROUNDING": 1e-6}
 
 
 class Crept(NamedTuple):

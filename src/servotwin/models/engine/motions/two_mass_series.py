@@ -24,6 +24,7 @@ _LONGEST = 2.0  # of a series, in times of the fastest rate
 _TERMS = 40
 _INVERSES = (0.0, *(1.0 / n for n in range(1, _TERMS + 1)))
 _ROUNDING = 1e-18  # of the state: what a term may be
+IN_FLOATS = {"_ROUNDING": 1e-9}
 
 
 def linear(numbers: Numbers, on: int, u: Piece, tau: Piece) -> bool:

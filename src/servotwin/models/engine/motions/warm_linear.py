@@ -46,6 +46,7 @@ _PART = 0.1  # of the time in which temperatures change: of a step
 _PER_KELVIN = 0.1  # of an error of the temperature, to tell it as one of an angle
 _MARGIN = 3.0
 _NONE = 1e-200
+IN_FLOATS = {"_NONE": 1e-30}
 _STRAIGHT = 1e-4  # times 1/slow: a time in which the slow part is a straight line
 _MOST, _LEAST, _LESS, _SIXTH = 60, 0.1, 0.85, 1.0 / 6.0  # tries of a step, and how much shorter the next one is
 _BETWEEN = 6e-5  # of the change of a polynomial's highest power within a step: of its error between the points
