@@ -80,7 +80,8 @@ def compare(benches, seeds):
         ours, theirs = (sorted(map(tuple, events), key=lambda one: (one[1], one[2], one[0])) for events in (
             page["events"], happened))
         if len(ours) != len(theirs):  # of a shaft that only just turns back rounding decides whether it does
-            assert len(ours) + len(theirs) - 2 * len(same := shared(ours, theirs)) <= 2, seed
+            same = shared(ours, theirs)
+            assert len(ours) + len(theirs) - 2 * len(same) <= 2, seed
             ours, theirs = ([pair[k] for pair in same] for k in (0, 1))
         assert [one[1:] for one in ours] == [one[1:] for one in theirs], seed
         np.testing.assert_allclose([one[0] for one in ours], [one[0] for one in theirs], atol=1e-6)
