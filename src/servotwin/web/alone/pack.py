@@ -37,6 +37,7 @@ from servotwin.web.lessons import mystery
 from servotwin.web.lessons.lessons import lessons
 from servotwin.web.live import said
 from servotwin.web.live.beginning import NO_PLAY, load_of, middle_of, models_of
+from servotwin.web.live.commands import command_signal
 from servotwin.web.live.export import APART, SCRIPT, STEP
 from servotwin.web.live.export import KINDS as KINDS_OF_FILES
 from servotwin.web.live.facts import SLIDER, facts_of, load_facts
@@ -46,6 +47,7 @@ from servotwin.web.live.scene_servo import SERVO_MODELS, SceneServo, model_named
 from servotwin.web.server.catalog import catalog_list, curves_data
 
 if TYPE_CHECKING:
+    from servotwin.models import Model
     from servotwin.parameters import Servo
 
 _OF_ALL = ("name", "symbol", "unit", "dimension", "meaning", "shown", "rule", "choices")  # alike of all servos
@@ -144,6 +146,7 @@ def _servo(name: str) -> dict[str, Any]:
         found["stated"] = _stated(model.servo)
         found |= {"notes": model.servo.notes, "sheet": dict(model.servo.sheet), "fit": dict(model.servo.fit)}
         models[kind] = {"columns": ["time", *facts["signals"]], "bounds": bounds_of(model), "middle": middle_of(model),
+                        "refused": _refused(model),
                         **{key: facts[key] for key in ("travel_deg", "pulse_us", "voltage", "loop")}}
         if isinstance(model, DigitalServo) and facts["loop"]:
             models[kind]["loop"] = {**facts["loop"], "gain": _GAIN,
@@ -152,6 +155,17 @@ def _servo(name: str) -> dict[str, Any]:
         warnings.simplefilter("ignore")
         default = models_of(Scene(servos=(SceneServo(id=name),)))[0]
     return {**found, "model": type(default).__name__, "of": models}
+
+
+def _refused(model: Model) -> dict[str, str]:
+    """Return what is said of commands that a model does not take, by their units."""
+    found = {}
+    for unit in {*UNITS} - {*bounds_of(model)}:
+        try:
+            model.command(command_signal({"shape": "hold", "unit": unit, "value": 1.0}, 0.0))
+        except ServotwinError as error:
+            found[unit] = " ".join(str(error).split())
+    return found
 
 
 def _stated(servo: Servo) -> dict[str, list[float | None]]:

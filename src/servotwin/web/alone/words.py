@@ -34,7 +34,6 @@ WORDS = {
     "no_such_model": "model of {id}: got {got}, allowed: one that the servo has numbers for",
     "takes_goals": "{kind} command of {name}: got '{word}', allowed: angles: it takes goals on a bus "
                    "(firmware.command_kind)",
-    "no_such_command": "command of {name}: allowed: none of this unit",
     "no_supply": "supply of a scene: allowed: a Supply with open_circuit_voltage, such as "
                  "Supply(open_circuit_voltage=6.0, internal_resistance=0.5)",
     "bus_models": MODEL_NAMES,

@@ -147,7 +147,7 @@ export class Servo {
    * @param {number[][]} ends lowest and highest of the command, and of what the servo follows; their pieces, and when these start [s]
    */
   bound(command, ends) {
-    const bounds = this.own.bounds[command.unit] ?? this.untold(this.world.kinds[command.unit]);
+    const bounds = this.own.bounds[command.unit] ?? this.untold(command.unit);
     const end = (/** @type {any} */ one, /** @type {number} */ none) => {
       const [name, usual] = Array.isArray(one) ? one : [null, one];
       return (name && this.value(name)) ?? usual ?? none;
@@ -164,10 +164,12 @@ export class Servo {
     }
   }
 
-  /** Refuse a kind of command that it does not take. @param {string} word @returns {never} */
-  untold(word) {
+  /** Refuse a kind of command that it does not take. @param {string} unit @returns {never} */
+  untold(unit) {
+    const word = this.world.kinds[unit];
     const goals = this.values.get("firmware.command_kind") === "goal" && this.reads.has("firmware.command_kind");
-    return refuse(goals ? "takes_goals" : "no_such_command", null, { name: this.id, word, kind: word.replaceAll("_", " ") });
+    if (goals) return refuse("takes_goals", null, { name: this.id, word, kind: word.replaceAll("_", " ") });
+    throw new Refused(this.own.refused[unit]);
   }
 
   /** @param {number} k @returns {any} what the panels know of it */
