@@ -139,6 +139,7 @@ def test_supply_load_and_choices_have_their_controls(page):
     go_on(page, 0.5)
     assert latest(page, "bus_voltage") == pytest.approx(4.8, abs=1e-9)
     assert (ends["low"], ends["high"]) == (-2.0, 2.0)
+    page.wait_for_function("Number(document.querySelector('svg.servo0 .mass').getAttribute('r')) > 0")
     assert float(page.locator("svg.servo0 .mass").get_attribute("r")) == pytest.approx(
         (0.3 / (4 / 3 * 3.14159265 * 11340)) ** (1 / 3), rel=1e-3)
     done = [value for _, kind, value, *_ in scene(page)["actions"] if kind == "set"]
