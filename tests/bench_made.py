@@ -5,13 +5,14 @@ import shutil
 import subprocess
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from servotwin.web.alone import kernel
 from servotwin.web.alone.pack import world
 from servotwin.web.alone.page import modules
 from servotwin.web.server.first import first_scene
 
-HARNESS = Path(__file__).parent / "web" / "alone" / "harness" / "bench.mjs"
+HARNESS = Path(__file__).parent / "web" / "alone" / "harness"
 
 
 @cache
@@ -31,16 +32,17 @@ def unpacked(folder: Path) -> Path:
 
 def benches(folder: Path, jobs: list[dict]) -> list[dict]:
     """Let benches go on in node; return what shows of each."""
-    done = subprocess.run([shutil.which("node"), "--no-warnings", str(HARNESS), str(folder)], check=False,
-                          capture_output=True, text=True, input=json.dumps({"world": known(), "jobs": jobs}))
-    assert done.returncode == 0, done.stderr[-3000:]
-    return json.loads(done.stdout)
+    return in_node("bench", folder, jobs=jobs)
 
 
 def wild(folder: Path, scenes: list[str]) -> int:
     """Put numbers that no rule lets through into benches; return how many were tried."""
-    done = subprocess.run([shutil.which("node"), "--no-warnings", str(HARNESS.with_name("wild.mjs")), str(folder)],
-                          check=False, capture_output=True, text=True, timeout=60,
-                          input=json.dumps({"world": known(), "scenes": scenes}))
+    return in_node("wild", folder, scenes=scenes)
+
+
+def in_node(harness: str, folder: Path, **given: Any) -> Any:
+    """Return what a harness makes of what is given, in node, with the page that lies in a folder."""
+    done = subprocess.run([shutil.which("node"), "--no-warnings", str(HARNESS / f"{harness}.mjs"), str(folder)],
+                          check=False, capture_output=True, text=True, input=json.dumps({"world": known(), **given}))
     assert done.returncode == 0, done.stderr[-3000:]
     return json.loads(done.stdout)

@@ -5,6 +5,7 @@ import random
 from servotwin.errors import ServotwinError
 from servotwin.parameters import catalog_names
 from servotwin.web.live import LiveBench, Scene, SceneServo
+from servotwin.web.live.actions import Action
 from servotwin.web.live.beginning import models_of
 from servotwin.web.live.scene_servo import SERVO_MODELS
 
@@ -15,6 +16,8 @@ NUMBERS = ("electronics.deadband", "electronics.stretcher_gain", "electronics.st
            "supply.internal_resistance", "supply.open_circuit_voltage", "firmware.proportional_gain",
            "firmware.derivative_gain", "potentiometer.noise", "stops.upper_angle", "friction.breakaway_ratio",
            "firmware.torque_limit", "no.such")
+REGISTERS = ("P_Coefficient", "Torque_Limit", "Minimum_Startup_Force", "Integral_Limit", "Position_P_Gain", "P_Gain",
+             "Minimum_Velocity_Limit")  # no two of them make one number
 
 
 def drawn(seed: int, servos: int = 0) -> dict:
@@ -36,8 +39,12 @@ def drawn(seed: int, servos: int = 0) -> dict:
         supply = {"open_circuit_voltage": rng.uniform(5.0, 7.0), "internal_resistance": rng.uniform(0.1, 1.0)}
         supply |= {"current_limit": rng.uniform(1.0, 4.0)} if rng.random() < 0.3 else {}
     load = {name: rng.uniform(*ends) for name, ends in LOADS.items() if rng.random() < 0.4}
+    control: dict[str, float] = {}
+    if pulsed and not supply and rng.random() < 0.3:
+        control = {"command_share": rng.random(), "reference_share": 0.5 * rng.random(), "sampling_delay": 1e-3}
+    first = Action(0.0, "command", {"shape": "hold", "unit": "V", "value": rng.uniform(1.2, 1.6)})
     scene = Scene(servos=tuple(found), seed=rng.randrange(1000), frame_rate=rng.choice((50.0, 50.0, 100.0, 31.7)),
-                  load={"inertia": 1e-4} | load, supply=supply)
+                  load={"inertia": 1e-4} | load, supply=supply, control=control, actions=(first,) if control else ())
     until, steps = 0.0, []
     for _ in range(rng.randint(3, 8)):
         until += rng.choice((0.0, 0.013, 0.02, 0.1, 0.25))
@@ -51,7 +58,8 @@ def drawn(seed: int, servos: int = 0) -> dict:
 
 def action(rng: random.Random) -> tuple[str, object]:
     """Return a kind of action and a value, some of which are refused."""
-    kind = rng.choice(("command", "command", "command", "set", "set", "push", "frames", "torque"))
+    kind = rng.choice(("command", "command", "command", "set", "set", "push", "frames", "torque", "register",
+                       "control"))
     if kind == "command":
         return kind, command(rng)
     if kind == "push":
@@ -59,6 +67,11 @@ def action(rng: random.Random) -> tuple[str, object]:
     if kind == "frames":
         return kind, rng.choice(({"rate": rng.uniform(20.0, 300.0)}, {"lost": rng.random()}, {"rate": 1.0, "lost": 1.0},
                                  {"lost": 2.0}, {"rate": 900.0}))
+    if kind == "control":
+        return kind, rng.choice(({"command_share": rng.random()}, {"sampling_delay": 2e-3}, {"sampling_delay": 0.5},
+                                 {"command_share": 2.0}))
+    if kind == "register":
+        return kind, {rng.choice(REGISTERS): rng.randint(0, 300)}
     if kind == "torque":
         return kind, rng.random() < 0.5
     if rng.random() < 0.5:

@@ -30,6 +30,12 @@ def pause(page) -> None:
     page.wait_for_timeout(300)
 
 
+def beside(page) -> None:
+    """Put the second model beside the first, as the page offers it."""
+    page.get_by_role("button", name="Put it beside").click()
+    page.wait_for_function("bench.facts.length === 2 && bench.history[1].length > 5")
+
+
 def scene(page) -> dict:
     """Return the text of the bench, read."""
     return tomllib.loads(page.evaluate("bench.ask({text: true}).then((found) => found.text)"))

@@ -26,11 +26,21 @@ SECONDS = """async (text) => {
   const [{ Kernel }, { Live }, { read }] = await Promise.all(names.map((one) => import(`bench/${one}.js`)));
   const { world, module } = globalThis.servotwin;
   const live = new Live(new Kernel(module, world.layout), world, { ...read(world, text), end: 0 });
-  const run = (until) => { while (!live.going.reached(until)) live.advance(Math.min(until, live.time + 1 / 60), 180); };
+  const ends = live.servos.map(() => [Infinity, -Infinity]);
+  const run = (until) => {
+    while (!live.going.reached(until)) {
+      live.advance(Math.min(until, live.time + 1 / 60), 180).parts.forEach(({ columns, points }, k) => {
+        const at = columns.indexOf("output_angle");
+        for (let n = at; n < points.length; n += columns.length) {
+          ends[k] = [Math.min(ends[k][0], points[n]), Math.max(ends[k][1], points[n])];
+        }
+      });
+    }
+  };
   run(1);
   const begun = performance.now();
   run(3);
-  return (performance.now() - begun) / 2000;
+  return [(performance.now() - begun) / 2000, Math.min(...ends.map(([low, high]) => (high - low) * 180 / Math.PI))];
 }"""
 
 
@@ -103,8 +113,9 @@ def main() -> None:
         page.evaluate("bench.ask({run: false})")
         for name, (*servo, slower) in SIX.items():
             session.send("Emulation.setCPUThrottlingRate", {"rate": slower})
-            lasted = page.evaluate(SECONDS, scene(*servo))
-            print(f"  {name}: {lasted:.3f} s for a second (bar {1.0 if slower > 1 else SECOND})")
+            lasted, swing = page.evaluate(SECONDS, scene(*servo))
+            print(f"  {name}: {lasted:.3f} s for a second, in which each moves by {swing:.0f} degrees "
+                  f"(bar {1.0 if slower > 1 else SECOND})")
             session.send("Emulation.setCPUThrottlingRate", {"rate": 1})
         browser.close()
 

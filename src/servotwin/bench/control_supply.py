@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from servotwin.errors import InputError
+from servotwin.physics.converter import supplied_count
 from servotwin.signals import constant
 from servotwin.simulation import Simulator
 from servotwin.simulation.engine import Record
@@ -81,8 +82,10 @@ class ControlSupply:
         if left <= 0.0:
             raise InputError("reference of a converter that hangs on the supply", got=left * converter.reference,
                              allowed="a positive voltage: the supply has broken down")
-        seen = replace(converter, reference=left * converter.reference)
-        return seen.count((1.0 - self.command_share * sag) * voltage)
+        if not math.isfinite(voltage):
+            raise InputError("voltage at a converter", got=voltage, allowed="a finite number [V]")
+        return supplied_count(converter.gain, converter.offset, converter.highest, voltage, sag, self.command_share,
+                              self.reference_share)
 
     def sampling_times(self, pulses: Signal) -> NDArray[np.float64]:
         """Return when the program looks at the command, once behind each of these pulses [s], shape (n,).

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from servotwin.errors import InputError
+from servotwin.physics.converter import generated_steps, generated_width
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,11 +63,11 @@ class PulseGenerator:
 
     def steps(self, count: int) -> int:
         """Return m, at least 0 (assumed: Table II has no count that low)."""
-        return max((count - 1) // self.counts_per_step - 1, 0)
+        return generated_steps(self.counts_per_step, count)
 
     def width(self, count: int) -> float:
         """Return the pulse width t_a for a count of the converter [s]."""
-        return self.step * self.steps(count) + self.base
+        return generated_width(self.step, self.base, self.counts_per_step, count)
 
     def counts(self, width: float) -> tuple[int, int]:
         """Return the first and the last count that give this pulse width [s].

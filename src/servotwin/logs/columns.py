@@ -143,6 +143,20 @@ def columns_of(header: Sequence[str], where: object, *, taken: Container[str] = 
     return found
 
 
+def own_columns() -> dict[str, tuple[str, Column]]:
+    """Return every name of a column that needs no guess: which signal it is, and what its numbers mean.
+
+    Examples
+    --------
+    >>> name, column = own_columns()["output_angle_deg"]
+    >>> name, column.unit, "angle" in own_columns()
+    ('output_angle', 'deg', False)
+    """
+    names = (f"{name}_{suffix}" if suffix else name for name in NAMES
+             for suffix in ("", *_SUFFIXES[dimension_of_signal(name)]))
+    return {column: found for column in names for found in columns_of([column], column).items()}
+
+
 def _unit_behind(column: str, name: str) -> str | None:
     """Return the unit behind a name, None where it is none of the signal's."""
     suffix = column[len(name) + 1:]

@@ -19,7 +19,7 @@ FEWEST = 3  # samples
 _Kind = TypeVar("_Kind", bound=np.generic)
 _LARGEST_EDGES = 10_000_000
 # signal or kind of command -> (SI unit, largest magnitude that a servo's log can hold, what was probably meant)
-_LIMITS = {
+LIMITS = {
     **dict.fromkeys(("output_angle", "load_angle", "command_angle", "angle"), ("rad", 100.0, "degrees or counts?")),
     "pulse_width": ("s", 0.1, "microseconds?"),
     **dict.fromkeys(("voltage", "command_voltage", "feedback_voltage", "bus_voltage", "armature_voltage"),
@@ -205,12 +205,12 @@ def _column(what: str, values: object, n: int) -> NDArray[np.float64]:
 
 def largest_of(name: str) -> float:
     """Return the largest magnitude (SI) that a servo's log can hold of a signal or kind of command."""
-    return _LIMITS.get(name, ("", np.inf, ""))[1]
+    return LIMITS.get(name, ("", np.inf, ""))[1]
 
 
 def _plausible(what: str, values: NDArray[np.float64], name: str) -> None:
     """Raise if a value is too large for its unit."""
-    unit, limit, meant = _LIMITS.get(name, ("", np.inf, ""))
+    unit, limit, meant = LIMITS.get(name, ("", np.inf, ""))
     largest = values[np.argmax(np.abs(np.nan_to_num(values)))]
     if abs(largest) > limit:
         raise InputError(what, got=f"{largest:g} {unit}", allowed=f"at most {limit:g} {unit} in magnitude: {meant}")

@@ -13,7 +13,7 @@ MISSING = frozenset(("", "-", "--", "nan", "na", "n/a", "#n/a", "#na", "none", "
 SEPARATORS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", " ": "blanks"}
 _SAMPLE = 60  # lines from each of begin, middle and end
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
-_WHOLE_OR_POINT = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
+WHOLE_OR_POINT = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
 _STAMP = re.compile(r"\d{4}-\d\d-\d\d|(\d{1,2}[./-]\d{1,2}[./-]\d{2,4},?[ T])?\d{1,2}:\d\d:\d\d")
 _DECIMAL_COMMA = re.compile(r"(?<![\d.,])[+-]?\d*,\d+(?![\d.,])")
 
@@ -43,7 +43,7 @@ def separator_of(lines: Sequence[str]) -> str:
 
 def _merit(sample: Sequence[str], separator: str) -> float:
     """Return the share of lines that are rows of numbers, all equally long, under a separator."""
-    number = _WHOLE_OR_POINT if separator == "," else _NUMBER
+    number = WHOLE_OR_POINT if separator == "," else _NUMBER
     lengths: Counter[int] = Counter()
     for line in sample:
         if not line.lstrip().startswith(COMMENTS[:3]):

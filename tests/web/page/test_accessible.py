@@ -159,7 +159,8 @@ def test_what_is_said_is_what_is_shown_and_only_when_asked(page):
     said = page.locator(".words-panel .said").inner_text()
     angle, told = (page.evaluate(f"bench.history[0].latest('{name}') * 180 / Math.PI")
                    for name in ("output_angle", "command_angle"))
-    assert f"Hitec HS-755HB, PulseServo, stands at {angle:.1f} degrees, {told - angle:.2f} degrees below" in said
+    assert said.startswith("Hitec HS-755HB, PulseServo, buzzes at 50 Hz by 0.")
+    assert f" degrees at {angle:.1f} degrees, {told - angle:.2f} degrees below its command" in said
     assert page.evaluate("window.spoken") >= 1
     page.locator("summary", has_text="Table of the last two seconds").click()
     page.wait_for_selector(".words-panel tbody tr")
@@ -167,7 +168,7 @@ def test_what_is_said_is_what_is_shown_and_only_when_asked(page):
     heads = page.locator(".words-panel thead th").all_inner_texts()
     shown = dict(zip(heads, cells, strict=True))
     assert float(shown["time [s]"]) == pytest.approx(page.evaluate("bench.time"), abs=1e-3)
-    assert float(shown["angle, PulseServo [°]"]) == pytest.approx(angle, abs=0.06)
+    assert float(shown["angle [°]"]) == pytest.approx(angle, abs=0.06)
     assert page.locator(".words-panel tbody tr").count() == 20
 
 

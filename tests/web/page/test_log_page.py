@@ -77,6 +77,30 @@ def test_a_log_is_dropped_fitted_and_taken_over(opened, server, tools):
     assert 1.0 < angle(page) < 180.0
 
 
+def test_a_table_of_the_bench_lies_over_its_twin_and_is_played(opened, home):
+    page = opened(home)
+    drop(page, "mine.csv", moved(page))
+    page.wait_for_selector(".log-panel:not([hidden]) canvas", timeout=LONG)
+    assert rms(page) < 1e-4
+    assert "mine: 2" in said(page)
+    assert "output angle [°]" in page.locator(".side.own table").inner_text()
+    page.evaluate("bench.do('set', {'motor.rotor_inertia': 2.5e-7})")  # the bench is another one now than the log's
+    page.get_by_role("button", name="Compare", exact=True).click()
+    page.wait_for_function("Number(document.querySelector('.log-panel').dataset.rms) > 0.1", timeout=LONG)
+    page.get_by_role("button", name="Play its command on the bench").click()
+    page.wait_for_selector(".sample.log")
+    assert scene(page)["actions"][-1][2]["shape"] == "recorded"
+    page.get_by_role("button", name="Let it go").click()
+    assert page.locator(".log-panel").is_hidden()
+    for name, text, words in (("empty.csv", "", "an empty file"), ("odd.csv", "a,b\n1,2\n3,4\n", "allowed:"),
+                              ("large.csv", "0" * 21_000_000, "21.0 MB")):
+        drop(page, name, text)
+        page.wait_for_function("(line) => document.querySelector('.side.own p.said').textContent.includes(line)",
+                               arg=words)
+        assert "\n" not in said(page)
+        assert page.locator(".log-panel").is_hidden()
+
+
 def test_a_fit_is_cancelled_and_the_next_one_begins(opened, server):
     page = opened(server)
     drop(page, "mine.csv", moved(page))

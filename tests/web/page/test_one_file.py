@@ -51,13 +51,13 @@ def test_it_is_asked_for_once_and_its_link_is_short(opened, shelf):
 def test_a_link_that_is_pasted_into_the_open_page_acts(opened, home):
     page = opened(home)
     page.evaluate("location.hash = '#lesson=deadband'")
-    page.wait_for_selector(".lesson h3")
-    assert page.locator(".lesson h3").inner_text() == "A servo that is content"
+    page.wait_for_selector(".lesson h2")
+    assert page.locator(".lesson h2").inner_text() == "A servo that is content"
 
 
 def test_what_only_a_server_can_is_said_and_so_is_a_browser_that_cannot(opened, browser, bench_file):
     page = opened(bench_file)
-    said = page.locator(".alone-says").inner_text()
+    said = page.locator(".alone-says").text_content()
     assert "servotwin web" in said
     assert "fits" in said
     assert page.evaluate("bench.ask({fit: {plan: true}}).catch((error) => error.message)") == (
@@ -68,3 +68,23 @@ def test_what_only_a_server_can_is_said_and_so_is_a_browser_that_cannot(opened, 
     old.wait_for_selector("#notice:not([hidden])")
     assert "WebAssembly" in old.locator("#notice").inner_text()
     old.close()
+
+
+def test_a_motion_that_takes_too_long_stands_and_the_page_goes_on(opened, bench_file):
+    page = opened(bench_file)
+    stiff = """format = 1
+[[servo]]
+id = "hitec-hs-755hb"
+model = "PulseServoInductive"
+parameters = {"motor.rotor_inertia" = 1e-13, "motor.armature_inductance" = 1e-9}
+[load]
+mass = 0.1
+arm = 0.1
+"""
+    page.evaluate("(text) => bench.ask({scene: text})", stiff)
+    page.evaluate("bench.do('command', {shape: 'hold', unit: 'us', value: 1800})")
+    page.wait_for_selector("#notice:not([hidden])")
+    assert page.locator("#notice").inner_text().startswith("the bench stands: motion: got 'one that takes too long")
+    assert "allowed: a new beginning" in page.evaluate("bench.ask({run: true}).catch((error) => error.message)")
+    page.evaluate("bench.ask({lesson: 'deadband'})")
+    go_on(page, 0.2)

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from page_talk import angle, go_on, opened_panel, pause
+from page_talk import angle, beside, go_on, opened_panel, pause
 
 pytestmark = pytest.mark.slow
 
@@ -25,6 +25,7 @@ def test_slider_and_keys_move_the_horn(page):
 
 
 def test_the_two_models_differ(page):
+    beside(page)
     page.evaluate("bench.do('set', {'load.torque': 0.5})")
     go_on(page, 1.5)
     assert abs(angle(page, 0) - angle(page, 1)) > 0.3

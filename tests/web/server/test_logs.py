@@ -377,7 +377,7 @@ def test_measured_logs_are_read_and_compared(server, page, data_folder):
     assert found["rms"] < overlay["rms"]
     page.ask(fit={"take": "instead"})
     state = next(text["scene"] for text in reversed(page.texts) if "scene" in text)
-    assert len(state["servos"]) == 2
+    assert len(state["servos"]) == 1
     assert "fit to logs" in state["scene"]
 
 

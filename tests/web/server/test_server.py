@@ -15,7 +15,7 @@ from web_talk import Page, running
 def test_the_page_gets_what_the_bench_shows_and_a_script_repeats_it(server):
     with Page(server) as page:
         assert page.until("hello")["hello"]["role"] == "own"
-        assert [one["model"] for one in page.until("scene")["scene"]["servos"]] == ["PulseServo", "BoundedServo"]
+        assert [one["model"] for one in page.until("scene")["scene"]["servos"]] == ["PulseServo"]
         page.ask(do="command", value={"shape": "hold", "unit": "us", "value": 1700.0})
         page.pushed(20)
         page.ask(do="push", value=0.3)
@@ -26,12 +26,11 @@ def test_the_page_gets_what_the_bench_shows_and_a_script_repeats_it(server):
         said = page.ask(text=True)
         run = replay(said["text"], output_step=1e-3)
         assert read_fragment(said["fragment"]).text() == said["text"]
-        for k in range(2):
-            points = np.concatenate([parts[k][0] for _, parts in page.pushes])
-            column = page.pushes[0][0]["servos"][k]["columns"].index("output_angle")
-            end = points[-1]
-            assert run[k]["time"][-1] == pytest.approx(end[0], abs=1e-12)
-            assert run[k]["output_angle"][-1] == pytest.approx(end[column], abs=1e-9)
+        points = np.concatenate([parts[0][0] for _, parts in page.pushes])
+        column = page.pushes[0][0]["servos"][0]["columns"].index("output_angle")
+        end = points[-1]
+        assert run[0]["time"][-1] == pytest.approx(end[0], abs=1e-12)
+        assert run[0]["output_angle"][-1] == pytest.approx(end[column], abs=1e-9)
 
 
 def test_slow_motion_pause_and_single_frames(server):

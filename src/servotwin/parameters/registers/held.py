@@ -26,6 +26,11 @@ class Held(NamedTuple):
     numbers: tuple[str, ...]
 
 
+def register_family_of(servo: Servo) -> Family:
+    """Return the registers of a servo that has some, and how its program follows from them."""
+    return _FAMILIES[family_label(servo) or ""](servo)
+
+
 def registers_of(servo: Servo) -> dict[str, Held]:
     """Return the registers from which numbers of a servo's program follow, by name; none of a servo without.
 
@@ -39,7 +44,7 @@ def registers_of(servo: Servo) -> dict[str, Held]:
     label = family_label(servo)
     if label is None:
         return {}
-    family = _FAMILIES[label](servo)
+    family = register_family_of(servo)
     raw = written(family, servo)
     numbers = {name: tuple(one.name for one in family.settings if name in one.registers) for name in family.registers}
     return {name: Held(register, raw[name], numbers[name]) for name, register in family.registers.items()

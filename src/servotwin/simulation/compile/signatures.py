@@ -118,7 +118,7 @@ def _of_the_bench() -> Mapping[str, tuple[Kind, ...]]:
     from servotwin.models.engine.bus.bus_records import Mate, Seat, Shared
     from servotwin.models.engine.bus.event_log import Tape
     from servotwin.models.engine.live.making import Weights
-    from servotwin.models.engine.live.posts import Post, Told
+    from servotwin.models.engine.live.posts import Circuit, Post, Told
     from servotwin.models.engine.live.sender import Sender
 
     posts, sender, programs = _records(record_of(Post)), _records(record_of(Sender)), _records(record_of(Firmware))
@@ -129,6 +129,8 @@ def _of_the_bench() -> Mapping[str, tuple[Kind, ...]]:
     going = (FLOAT64, FLOAT64, INT64, _CUBE, _CUBE, _CUBE, _INDICES)
     return {"bench:make": (posts, programs, INT64, INT64, _records(record_of(Given)), _records(record_of(Weights))),
             "bench:begin": (posts, INT64, told, _MEMORIES), "bench:change": (posts, INT64, _MEMORIES),
+            "bench:heed": (posts, INT64, told, _records(record_of(Circuit)), FLOAT64, FLOAT64),
+            "bench:begin_at": (posts, INT64, told, _MEMORIES, FLOAT64),
             "bench:take": (posts, INT64, INT64, INT64, _FLOATS, _FLOATS, _FLOATS, FLOAT64, _TABLE, _FLOATS),
             "bench:count": (FLOAT64, FLOAT64, INT64, FLOAT64),
             "bench:draw": (INT64, INT64, FLOAT64, FLOAT64),
@@ -138,8 +140,8 @@ def _of_the_bench() -> Mapping[str, tuple[Kind, ...]]:
             "bench:advance_together": (posts, told, programs, _MEMORIES, sender, *bus, *going)}
 
 
-_OF_BENCH = ("make", "begin", "change", "take", "count", "draw", "look", "tune", "snapped", "next_edge", "advance",
-             "advance_together")
+_OF_BENCH = ("make", "begin", "begin_at", "heed", "change", "take", "count", "draw", "look", "tune", "snapped",
+             "next_edge", "advance", "advance_together")
 _ELSEWHERE: Mapping[str, Callable[[], Mapping[str, tuple[Kind, ...]]]] = {  # where kinds take more than lanes have
     "digital_batch:go_on": _of_ticks, "leg_runs:go_on": _of_ticks, "leg_runs:go_on_nearly": _of_ticks,
     "coupled_runs:go_on": _of_ticks, **{f"bench:{name}": _of_the_bench for name in _OF_BENCH},

@@ -17,7 +17,7 @@ from servotwin.models.engine.bus import event_log
 from servotwin.models.engine.bus.bus_inputs import Tables
 from servotwin.models.engine.bus.bus_records import ROOM, Mate, Seat, Shared
 from servotwin.models.engine.live.making import Weights
-from servotwin.models.engine.live.posts import Post
+from servotwin.models.engine.live.posts import Circuit, Post
 from servotwin.models.engine.live.sender import Sender
 from servotwin.models.engine.memory import Memory
 from servotwin.models.state.records import record_of, rows_of
@@ -48,7 +48,7 @@ _LONGEST = 600.0  # s that a compiler may take
 def recipe() -> Recipe:
     """Return what the kernel is made of; it is none of those that wheels have libraries of."""
     return Recipe("bench", tuple(f"servotwin.models.engine.live.bench:{name}" for name in (
-        "make", "begin", "change", "take", "count", "draw", "look",
+        "make", "begin", "begin_at", "heed", "change", "take", "count", "draw", "look",
         "tune", "snapped", "next_edge", "advance", "advance_together")))
 
 
@@ -101,7 +101,7 @@ def _compiled(compiler: Compiler, source: Path, made: Path) -> str:
 def layout() -> dict[str, Any]:
     """Return where a page finds what it writes and reads: fields of records, and arguments of entries."""
     kinds = {"shared": Shared, "seat": Seat, "mate": Mate, "post": Post,
-             "sender": Sender, "memory": Memory, "firm": Firm, "program": Firmware,
+             "sender": Sender, "circuit": Circuit, "memory": Memory, "firm": Firm, "program": Firmware,
              "given": Given, "weights": Weights}
     records = {name: {"size": record_of(kind).itemsize, "at": _places(record_of(kind))} for name, kind in kinds.items()}
     known = dict(signatures(recipe()))

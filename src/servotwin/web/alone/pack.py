@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import math
 import warnings
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from servotwin.bench import FEEDBACK_CONVERTER, INPUT_CONVERTER
+from servotwin import units
+from servotwin.bench import FEEDBACK_CONVERTER, INPUT_CONVERTER, ControlSupply, PulseGenerator
 from servotwin.errors import ServotwinError
 from servotwin.loads import Load, Pendulum
+from servotwin.models import DigitalServo
 from servotwin.models.engine.live import making, screen
 from servotwin.models.engine.live.posts import UNITS
 from servotwin.models.engine.live.shapes import FIELDS
@@ -21,27 +22,36 @@ from servotwin.models.terms.given import field_of
 from servotwin.parameters import GROUPS, catalog_names
 from servotwin.parameters.group import RULES
 from servotwin.parameters.quantity import SET_BY_USER
+from servotwin.parameters.servo import KINDS as KINDS_OF_SERVOS
 from servotwin.signals.signal import KINDS
 from servotwin.simulation.bus_supply import OF_BUS
 from servotwin.simulation.engine import failure
 from servotwin.simulation.files import shown_columns
 from servotwin.simulation.status import Status
 from servotwin.web.alone.bounds import bounds_of
+from servotwin.web.alone.csv_rules import csv_rules
 from servotwin.web.alone.limits import limits
+from servotwin.web.alone.register_tables import family_names, register_tables
 from servotwin.web.alone.words import WORDS
 from servotwin.web.lessons import mystery
 from servotwin.web.lessons.lessons import lessons
 from servotwin.web.live import said
-from servotwin.web.live.beginning import load_of, middle_of, models_of
+from servotwin.web.live.beginning import NO_PLAY, load_of, middle_of, models_of
+from servotwin.web.live.commands import command_signal
 from servotwin.web.live.export import APART, SCRIPT, STEP
 from servotwin.web.live.export import KINDS as KINDS_OF_FILES
-from servotwin.web.live.facts import facts_of, load_facts
+from servotwin.web.live.facts import SLIDER, facts_of, load_facts
 from servotwin.web.live.live_bench import WHOLE
 from servotwin.web.live.scene import TABLES, TOP, Scene
 from servotwin.web.live.scene_servo import SERVO_MODELS, SceneServo, model_named
 from servotwin.web.server.catalog import catalog_list, curves_data
 
+if TYPE_CHECKING:
+    from servotwin.models import Model
+    from servotwin.parameters import Servo
+
 _OF_ALL = ("name", "symbol", "unit", "dimension", "meaning", "shown", "rule", "choices")  # alike of all servos
+_SPREAD = ("std", "lower", "upper")
 _OF_EACH = ("value", "origin", "source", "spread", "low", "high")
 
 
@@ -67,24 +77,28 @@ def world(first: Scene) -> dict[str, Any]:
         "columns": screen.COLUMNS, "events": {str(code): word for code, word in screen.SHOWN.items()},
         "rules": {"actions": said.ACTIONS, "for_all": said.FOR_ALL, "scene": said.SCENE, "view": said.VIEW,
                   "servo": said.SERVO, "loads": {name: _load_rule(name) for name in _LOADS}},
-        "written": _written(), "mystery": {
+        "mystery": {
             "base": mystery.BASE, "hidden": mystery.unknowns(), "both_ways": mystery.BOTH_WAYS,
             "friction": mystery.FRICTION, "good": mystery.GOOD, "fair": mystery.FAIR, "seeds": mystery.SEEDS},
-        "files": _files(),
+        "file": {"groups": [*GROUPS], "spread": _SPREAD, "no_play": NO_PLAY, "usual": KINDS_OF_SERVOS[0], "units": {
+            name: {unit: units.factor(unit, name) for unit in known} for name, known in units.DIMENSIONS.items()}},
+        "files": _files(), "csv": csv_rules(),
         "no_load": _no_load(), "made": ["", "no_inertia"],
         "set": {"origin": "assumed", "source": SET_BY_USER, "spread": ""},
-        "ranges": {name: _ends(one) for name, one in RULES.items()},
+        "slider": SLIDER, "ranges": {name: _ends(one) for name, one in RULES.items()},
         "less": [[f"{title}.{name}" for name in pair] for title, group in GROUPS.items() for pair in group.less],
         "limits": limits(), "words": WORDS, "shapes": FIELDS, "units": UNITS,
         "kinds": {unit: KINDS[unit][0] for unit in UNITS}, "lines": "linear", "hold": "hold",
         "degrees": "deg", "whole": WHOLE, "status": [_failed(one) for one in Status],
         "scene": {"servo": [*said.SERVO["fields"]], "sources": said.SOURCES, "tables": TABLES, "top": TOP,
                   "row": (3, 4)},
+        "control": _control(),
         "converters": [{"name": name, "of": of, "gain": one.gain, "offset": one.offset, "highest": one.highest}
                        for name, of, one in (("command_count", "command_voltage", INPUT_CONVERTER),
                                              ("feedback_count", "feedback_voltage", FEEDBACK_CONVERTER))]}
 
 
+_GAIN = "firmware.proportional_gain"
 _LOADS = {"load.inertia": "inertia", "load.viscous_friction": "viscous_friction", "load.torque": "torque",
           "load.coulomb_torque": "coulomb_torque", "load.pendulum.mass": "mass", "load.pendulum.length": "arm",
           "load.pendulum.hanging_angle": "hanging_angle"}
@@ -127,27 +141,48 @@ def _servo(name: str) -> dict[str, Any]:
             continue
         facts = facts_of(model, scene)
         found = {key: facts[key] for key in ("id", "title", "kind", "models", "horn")}
+        found["registers"], found["family"] = register_tables(model), family_names(model.servo)
         found["values"] = [[one[key] for key in _OF_EACH] for one in facts["parameters"]]
+        found["stated"] = _stated(model.servo)
+        found |= {"notes": model.servo.notes, "sheet": dict(model.servo.sheet), "fit": dict(model.servo.fit)}
         models[kind] = {"columns": ["time", *facts["signals"]], "bounds": bounds_of(model), "middle": middle_of(model),
+                        "refused": _refused(model),
                         **{key: facts[key] for key in ("travel_deg", "pulse_us", "voltage", "loop")}}
+        if isinstance(model, DigitalServo) and facts["loop"]:
+            models[kind]["loop"] = {**facts["loop"], "gain": _GAIN,
+                                    "per_gain": model.loop_stiffness() / model.value(_GAIN)}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         default = models_of(Scene(servos=(SceneServo(id=name),)))[0]
     return {**found, "model": type(default).__name__, "of": models}
 
 
-def _written() -> dict[str, Any]:
-    """Return what the registers that lessons write make of their servos, by the words of a scene."""
+def _refused(model: Model) -> dict[str, str]:
+    """Return what is said of commands that a model does not take, by their units."""
     found = {}
-    for one in lessons():
-        for servo in one.scene.servos:
-            if servo.registers:
-                before, model = SceneServo(id=servo.id).servo(), model_named(servo.model)(servo.servo())
-                after = {name: model.servo.get(name) for name in model.servo.names()
-                         if model.servo.get(name) != before.get(name)}
-                found[f"{servo.id} {json.dumps(dict(servo.registers), separators=(',', ':'))}"] = {
-                    "values": after, "loop": facts_of(model, one.scene)["loop"]}
+    for unit in {*UNITS} - {*bounds_of(model)}:
+        try:
+            model.command(command_signal({"shape": "hold", "unit": unit, "value": 1.0}, 0.0))
+        except ServotwinError as error:
+            found[unit] = " ".join(str(error).split())
     return found
+
+
+def _stated(servo: Servo) -> dict[str, list[float | None]]:
+    """Return how sure a servo's record is of its numbers: std, lower and upper (SI) of those where it says so."""
+    found = {name: [getattr(servo.source(name), key) for key in _SPREAD] for name in servo.names()}
+    return {name: ends for name, ends in found.items() if any(end is not None for end in ends)}
+
+
+def _control() -> dict[str, Any]:
+    """Return the control circuit: what it is unless a scene says more, and its converter and generator."""
+    usual, generator = ControlSupply(), PulseGenerator()
+    return {"usual": {name: getattr(usual, name) for name in said.CONTROL_FIELDS},
+            "longest": generator.width(INPUT_CONVERTER.highest), "delay": said.CONTROL_FIELDS[2],
+            "fields": {"gain": INPUT_CONVERTER.gain, "offset": INPUT_CONVERTER.offset,
+                       "highest": INPUT_CONVERTER.highest, "step": generator.step, "base": generator.base,
+                       "counts_per_step": generator.counts_per_step}, "shares": said.CONTROL_FIELDS[:2],
+            "unit": UNITS[2], "bus": "bus_voltage", "full": "supply.open_circuit_voltage"}
 
 
 def _files() -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models.state.noise import drawn
 from servotwin.parameters import load_servo
-from servotwin.parameters.servo import unit_of
+from servotwin.parameters.servo import dimension_of, unit_of
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
@@ -86,11 +86,14 @@ def unknowns() -> list[dict[str, Any]]:
     >>> unknowns()[0]["name"], unknowns()[0]["unit"]
     ('electronics.deadband', 's')
     """
+    from servotwin.web.live.facts import shown_in
+
     base, found = load_servo(BASE), []
     for name, meaning, low, high in HIDDEN:
         own = BOTH_WAYS[0] if name == FRICTION else name
         usual: Any = base.get(own)
-        found.append({"name": name, "meaning": meaning, "unit": unit_of(own), "low": low * usual, "high": high * usual})
+        found.append({"name": name, "meaning": meaning, "unit": unit_of(own), "low": low * usual, "high": high * usual,
+                      "shown": shown_in(dimension_of(own))})
     return found
 
 

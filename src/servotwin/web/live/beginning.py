@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from servotwin.web.live.scene import Scene
 
 _ARM = 0.1  # m, of a scene that gives none
-_PLAY, _NO_PLAY = "gear.backlash", "none, unless it is changed at the bench"
+_PLAY = "gear.backlash"
+NO_PLAY = "none, unless it is changed at the bench"
+"""Source of the play of a servo of which none is known."""
 
 
 def models_of(scene: Scene) -> tuple[Model, ...]:
@@ -43,7 +45,7 @@ def _with_play(model: Model) -> Model:
     """Return a model whose play is given, 0 if it is not known, so that there can be some while time goes on."""
     if not isinstance(model, SwitchedServo) or model.servo.get(_PLAY) is not None:
         return model
-    return type(model)(model.servo.replace({_PLAY: 0.0}, source=_NO_PLAY))
+    return type(model)(model.servo.replace({_PLAY: 0.0}, source=NO_PLAY))
 
 
 def load_of(scene: Scene) -> Load:

@@ -25,9 +25,13 @@ if TYPE_CHECKING:
     from servotwin.parameters import Servo
     from servotwin.web.live.scene import Scene
 
-_SHOWN = {"time": "us", "angle": "deg", "inertia": "g cm2", "inductance": "mH", "torque per current": "mN m/A"}
+_SHOWN = {"time": "us", "angle": "deg", "inertia": "g cm2", "inductance": "mH", "torque": "mN m",
+          "torque per current": "mN m/A"}
 """Units in which people read some dimensions; SI else."""
-_WIDE = 4.0  # times the value: where a slider ends of which nothing else is known; assumed
+SLIDER: dict[str, Any] = {
+    "wide": 4.0, "of_none": (0.0, 1.0), "positive": "a positive number", "least": 1e-3,
+    "floors": {"a number of at least 1": 1.0, "a number of at least 0": 0.0}, "share": "a number from 0 to 1"}
+"""Where a slider ends of which nothing else is known, assumed: times the value, of 0, and what its rule leaves."""
 _GEAR_DENSITY = 1400.0  # kg/m³ of a servo with motor and gear: 40 g in 40 x 20 x 36 mm, a standard size; assumed
 _SHAPE = (40.0, 20.0, 36.0)  # length to width to height of standard servos [mm]; assumed for all
 _STANDARD_MASS = 0.04  # kg; assumed where a sheet prints none
@@ -158,11 +162,21 @@ def size_of(servo: Servo) -> dict[str, float]:
 
 def _control(name: str, symbol: str, dimension: str, meaning: str, value: Any, low: float | None,
              high: float | None) -> dict[str, Any]:
-    unit = "" if dimension == "word" else si_unit(dimension)
-    shown = unit if dimension == "word" else _SHOWN.get(dimension, unit)
-    return {"name": name, "symbol": symbol, "unit": unit, "dimension": dimension, "meaning": meaning,
-            "value": list(value) if isinstance(value, tuple) else value, "low": low, "high": high,
-            "shown": {"unit": shown, "factor": 1.0 if not unit else factor(shown, dimension)}}
+    return {"name": name, "symbol": symbol, "unit": "" if dimension == "word" else si_unit(dimension),
+            "dimension": dimension, "meaning": meaning, "value": list(value) if isinstance(value, tuple) else value,
+            "low": low, "high": high, "shown": shown_in(dimension)}
+
+
+def shown_in(dimension: str) -> dict[str, Any]:
+    """Return the unit in which the page shows a dimension, and how much of SI one of it is.
+
+    Examples
+    --------
+    >>> shown_in("torque"), shown_in("word")
+    ({'unit': 'mN m', 'factor': 0.001}, {'unit': '', 'factor': 1.0})
+    """
+    unit = "" if dimension == "word" else _SHOWN.get(dimension, si_unit(dimension))
+    return {"unit": unit, "factor": factor(unit, dimension) if unit else 1.0}
 
 
 def _range(value: Any, rule: str, known: Any) -> tuple[float | None, float | None]:
@@ -175,10 +189,10 @@ def _range(value: Any, rule: str, known: Any) -> tuple[float | None, float | Non
     elif known.std:
         low, high = value - 10.0 * known.std, value + 10.0 * known.std
     else:
-        low, high = sorted((value / _WIDE, value * _WIDE)) if value else (0.0, 1.0)
-    floor = {"a number of at least 1": 1.0, "a number of at least 0": 0.0, "a positive number": 1e-3 * abs(value)}
-    low = max(low, floor.get(rule, low))
-    return (max(low, 0.0), min(high, 1.0)) if rule == "a number from 0 to 1" else (low, high)
+        low, high = sorted((value / SLIDER["wide"], value * SLIDER["wide"])) if value else SLIDER["of_none"]
+    floors = {**SLIDER["floors"], SLIDER["positive"]: SLIDER["least"] * abs(value)}
+    low = max(low, floors.get(rule, low))
+    return (max(low, 0.0), min(high, 1.0)) if rule == SLIDER["share"] else (low, high)
 
 
 def _pulses_of(model: Model) -> list[float] | None:

@@ -24,7 +24,7 @@ RIG = ("delay", "frame_phase", "angle_offset")
 """What belongs to the rig of a log and not to its servo."""
 _FRAME_PERIOD = "electronics.frame_period"
 _ALIKE, _TINY = 1.02, 1e-6  # times the error, and rad or V beside: what is no better
-_STRETCHES = 500  # of a picture: of each, the extremes are shown
+STRETCHES = 500  # of a picture: of each, the extremes are shown
 
 
 def of_the_bench(log: Log, model: type[Model], servo: Servo, load: Load, frame_rate: float) -> Log:
@@ -134,9 +134,9 @@ def shown(*signals: NDArray[np.float64]) -> NDArray[np.int64]:
     ([0, 1, 2], True)
     """
     n = len(signals[0])
-    if n <= _STRETCHES * (2 * len(signals) + 1):
+    if n <= STRETCHES * (2 * len(signals) + 1):
         return np.arange(n)
-    ends = np.linspace(0, n, _STRETCHES + 1).astype(np.int64)
+    ends = np.linspace(0, n, STRETCHES + 1).astype(np.int64)
     picked = {0, n - 1}
     for a, b in zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True):
         for signal in signals:

@@ -9,12 +9,11 @@ SERVO = "hitec-hs-755hb"
 
 
 def first_scene() -> Scene:
-    """Return the paper's servo, pulse by pulse and in the mean of its pulses, side by side.
+    """Return the paper's servo, pulse by pulse.
 
     Examples
     --------
     >>> [one.model for one in first_scene().servos]
-    ['PulseServo', 'BoundedServo']
+    ['PulseServo']
     """
-    return Scene(servos=tuple(SceneServo(id=SERVO, model=model) for model in ("PulseServo", "BoundedServo")),
-                 load={"inertia": 1e-4})
+    return Scene(servos=(SceneServo(id=SERVO, model="PulseServo"),), load={"inertia": 1e-4})

@@ -39,7 +39,7 @@ def state_of(seen: Snapshot) -> dict[str, Any]:
     >>> from servotwin.web.server.first import first_scene
     >>> state = state_of(snapshot_of(LiveBench(first_scene())))
     >>> [servo["model"] for servo in state["servos"]], state["frame_rate"]
-    (['PulseServo', 'BoundedServo'], 50.0)
+    (['PulseServo'], 50.0)
     """
     scene = seen.scene
     return {"scene": scene.text(), "name": scene.name,

@@ -40,6 +40,16 @@ def begin(posts: Any, k: int, told: Told, memories: Memories) -> None:
     those.begin(posts, k, told, memories)
 
 
+def begin_at(posts: Any, k: int, told: Told, memories: Memories, angle: float) -> None:
+    """Let a servo stand, without drive, at an angle [rad]."""
+    those.begin_at(posts, k, told, memories, angle)
+
+
+def heed(posts: Any, k: int, told: Told, circuits: Any, time: float, sag: float) -> float:
+    """Let a control circuit read the command of a servo; return the width of the pulses that follow [s]."""
+    return those.heed(posts[k], told, circuits[0], time, sag)
+
+
 def change(posts: Any, k: int, memories: Memories) -> None:
     """Let a servo go on with the numbers that its record has by now."""
     those.change(posts, k, memories)

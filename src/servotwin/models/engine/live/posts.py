@@ -14,6 +14,7 @@ from servotwin.models.state.records import record_reader, record_writer
 from servotwin.models.terms import play
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.numbers import Numbers
+from servotwin.physics.converter import generated_width, supplied_count
 from servotwin.physics.pieces import piece_value
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ class Post(NamedTuple):
     highest: float
     torque: float  # of its load, constant [N m]
     push: float  # by hand, beside it [N m]
+    sent: float  # width of the next pulse, where a control circuit makes it; 0: as the command says [s]
     accuracy: float  # of what is integrated [rad]
     seed: int  # of its noise
     pulsed: int  # 1: it hears a pulse a frame; 0: the command as it is
@@ -63,6 +65,19 @@ class Post(NamedTuple):
     mesh: int
     motor: int
     share: int
+
+
+class Circuit(NamedTuple):
+    """A control circuit: its converter, the generator of its pulses, and how much of the supply's sag both feel."""
+
+    gain: float  # of the converter [1/V]
+    offset: float  # [counts]
+    step: float  # of the generator [s]
+    base: float  # [s]
+    command_share: float  # [1]
+    reference_share: float  # [1]
+    highest: int  # count
+    counts_per_step: int
 
 
 class Told(NamedTuple):
@@ -119,14 +134,41 @@ def asked(post: Any, told: Told, time: float) -> float:
     return piece_value(piece, time)
 
 
+def next_width(post: Any, told: Told, edge: float) -> float:
+    """Return what a servo is told at an edge [s]: the width that a circuit sends, or what its command asks for."""
+    return float(post.sent) if post.sent > 0.0 else asked(post, told, edge)
+
+
+def heed(post: Any, told: Told, circuit: Any, time: float, sag: float) -> float:
+    """Let a control circuit read the command at a time [s]; return the width of the pulses that follow [s].
+
+    The supply has lost a part `sag` of its voltage.
+    """
+    voltage = post.lines.per_volt * asked(post, told, time) + post.lines.volts
+    count = supplied_count(circuit.gain, circuit.offset, circuit.highest, voltage, sag, circuit.command_share,
+                           circuit.reference_share)
+    post.sent = generated_width(circuit.step, circuit.base, circuit.counts_per_step, count)
+    return float(post.sent)
+
+
 def begin(posts: Any, k: int, told: Told, memories: Memories) -> None:
     """Let a servo stand, without drive, where its first command asks for."""
     post = posts[k]
-    first = asked(post, told, 0.0)
+    first = next_width(post, told, 0.0)
     at, _ = train_of(told, len(posts), k)
     _put_pulse(told, at, NEVER, first)
     post.heard = 1
-    angle = min(max(post.lines.per_angle * first + post.lines.angle, post.lowest), post.highest)
+    _stand(posts, k, memories, min(max(post.lines.per_angle * first + post.lines.angle, post.lowest), post.highest))
+
+
+def begin_at(posts: Any, k: int, told: Told, memories: Memories, angle: float) -> None:
+    """Let a servo stand at an angle [rad], without drive, whatever its first command asks for."""
+    begin(posts, k, told, memories)
+    _stand(posts, k, memories, angle)
+
+
+def _stand(posts: Any, k: int, memories: Memories, angle: float) -> None:
+    post = posts[k]
     warm = post.numbers.heat.T_amb
     put_started(memories, k, Vector(angle, 0.0, 0.0, warm, warm, angle, 0.0),
                 INSIDE if play.present(numbers_of(post.numbers).play) else RIGID)
@@ -154,7 +196,7 @@ def hear(sender: Any, posts: Any, told: Told, pulses: Any, used: Any, until: flo
         lost = is_lost(sender)
         for k in range(len(posts)):
             if posts[k].pulsed == 1:
-                width = asked(posts[k], told, edge)
+                width = next_width(posts[k], told, edge)
                 if not lost:
                     _take(posts[k], told, train_of(told, len(posts), k)[0], edge, width, fresh)
                 n = used[USED * k + 2]

@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Indices = NDArray[np.int64]
 
-USED, NEXT = 4, 3  # numbers of what is used: rows, events, pulses, and the number of the next look
+USED, NEXT, LEFT = 5, 3, 4
+"""Numbers of what is used: rows, events, pulses, which look is next, and how many steps are left; 0: as it takes."""
+TOO_LONG = -2  # as a status: no steps are left
 COMMANDS = ("command_voltage", "command_angle", "pulse_width")
 COLUMNS = ("time", *Observed._fields, "output_angle", "output_speed", *COMMANDS)
 """What a row has, before one picks what a servo really shows (SI)."""
@@ -165,6 +167,12 @@ def put_row(rows: Any, n: int, time: float, shown: Observed, y: Vector, lines: L
     rows[n, _OUTPUT + 2] = lines.per_volt * command + lines.volts
     rows[n, _OUTPUT + 3] = lines.per_angle * command + lines.angle
     rows[n, _OUTPUT + 4] = lines.per_width * command + lines.width
+
+
+def is_late(used: Indices, k: int) -> bool:
+    """Count a step of a servo; tell whether it was the last one that is left."""
+    used[USED * k + LEFT] -= 1
+    return bool(used[USED * k + LEFT] == 0)
 
 
 def note(screen: Screen, time: float, code: int) -> None:

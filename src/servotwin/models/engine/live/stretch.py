@@ -10,6 +10,7 @@ from servotwin.models.engine.live.screen import (
     NEXT,
     REFUSED,
     SILENCE,
+    TOO_LONG,
     TRIPS,
     Lines,
     Looks,
@@ -17,6 +18,7 @@ from servotwin.models.engine.live.screen import (
     Screen,
     Switch,
     code_of,
+    is_late,
     note,
     reached,
     see,
@@ -66,6 +68,8 @@ def go_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, changed:
         idle = idle + 1 if memory.point.time == before.point.time else 0
         if idle > MOST_IDLE:
             return before, was, CHATTER
+        if is_late(screen.used, 0):
+            return before, was, TOO_LONG
         if PLAIN:
             screen.rows.tell(time_of(memory))
         shown = told_of(memory, program)

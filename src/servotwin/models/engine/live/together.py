@@ -13,12 +13,14 @@ from servotwin.models.engine.live.screen import (
     NEXT,
     REFUSED,
     SILENCE,
+    TOO_LONG,
     TRIPS,
     USED,
     Looks,
     Said,
     Screen,
     code_of,
+    is_late,
     note,
     switch_of,
     write,
@@ -95,6 +97,8 @@ def _run(told: Any, posts: Any, firms: Any, shared: Any, seats: Any, mates: Any,
         idle = idle + 1 if following == time else 0
         if idle > MOST_IDLE * count:
             return CHATTER
+        if is_late(used, 0):
+            return TOO_LONG
         at = k / looks.rate
         while at * late < origin + following and at < looks.until:
             _look(told, posts, shared, seats, mates, at - origin, at, rows, events, used)

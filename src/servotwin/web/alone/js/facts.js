@@ -1,6 +1,7 @@
 // The servos of a bench: what is given of them, what the panels show of them, and between what commands may be.
 
-import { Refused, filled, refuse, tidy, unknown, within, wrong } from "./check.js";
+import { Refused, filled, refuse, shown, tidy, unknown, within, wrong } from "./check.js";
+import { readServo } from "./servo_file.js";
 
 /** @typedef {{time: number, kind: string, value: any, servo: number|null}} Action */
 
@@ -14,8 +15,9 @@ export class Servo {
   constructor(world, one, scene, kernel) {
     this.world = world;
     this.mystery = "mystery" in one;
-    const id = this.mystery ? world.mystery.base : one.id ?? refuse("only_with_server");
-    const known = world.servos[id];
+    const file = "file" in one ? readServo(world, one.file) : null;
+    const id = this.mystery ? world.mystery.base : file?.id ?? one.id;
+    const known = file ? { ...world.servos[id], title: file.title } : world.servos[id];
     if (!known) unknown("servo", id, Object.keys(world.servos));
     this.known = this.mystery ? { ...known, id: "mystery", title: filled(world.words.mystery, { seed: one.mystery }) } : known;
     this.id = this.known.id;
@@ -30,12 +32,10 @@ export class Servo {
     this.changed = new Map();
     this.load = { ...world.no_load, ...scene.load };
     if (this.mystery) for (const [name, value] of Object.entries(hidden(world, kernel, one.mystery))) this.hide(name, value);
-    if (Object.keys(one.registers).length) {
-      const written = world.written[`${id} ${JSON.stringify(one.registers)}`] ?? refuse("only_with_server");
-      for (const [name, value] of Object.entries(written.values)) { this.values.set(name, value); this.changed.set(name, value); }
-      this.own = { ...this.own, loop: written.loop };
-    }
-    this.change(one.parameters);
+    /** @type {Map<string, number>} what was written into registers */
+    this.written = new Map();
+    if (Object.keys(one.registers).length) this.write(one.registers);
+    this.change({ ...file?.values, ...one.parameters });
   }
 
   /**
@@ -88,6 +88,40 @@ export class Servo {
     for (const [name, value] of Object.entries(values)) this.changed.set(name, value);
   }
 
+  /** @param {Record<string, number>} values by the maker's names; nothing has changed where one is refused */
+  write(values) {
+    const { registers } = this.known;
+    if (!registers) wrong(`registers of ${this.id}`, Object.keys(values).join(", "), this.world.words.no_registers);
+    const all = new Map([...this.written, ...Object.entries(values)]);
+    /** @type {Map<string, any>} */
+    const made = new Map();
+    for (const [name, value] of Object.entries(values)) {
+      const table = registers.find((/** @type {any} */ one) => one.name === name) ?? this.unwritten(name);
+      const now = held(table, value) ?? wrong(table.what, value, table.allowed);
+      if (table.shared.some((/** @type {string} */ other) => all.has(other))) refuse("only_with_server");
+      const before = held(table, this.written.get(name) ?? table.value) ?? [];
+      table.numbers.forEach((/** @type {string} */ number, /** @type {number} */ n) => { if (now[n] !== before[n]) made.set(number, now[n]); });
+    }
+    for (const [number, value] of made) { this.values.set(number, value); this.changed.set(number, value); }
+    this.written = all;
+  }
+
+  /** Refuse to write a register that has no table. @param {string} name @returns {never} */
+  unwritten(name) {
+    const { label, names } = this.known.family;
+    if (names.includes(name)) return refuse("only_with_server");
+    throw new Refused(filled(this.world.words.unknown_register, { label, name: shown(name), such: names[0] }));
+  }
+
+  /** @returns {any} the spring that its loop is: of a servo whose registers were written its stiffness alone, of one with other numbers nothing is said */
+  get loop() {
+    const { loop } = this.own;
+    if (!loop || !this.changed.size) return loop;
+    const numbers = this.known.registers.flatMap((/** @type {any} */ one) => (this.written.has(one.name) ? one.numbers : []));
+    if (![...this.changed.keys()].every((name) => numbers.includes(name))) return null;
+    return { stiffness_nm_per_rad: loop.per_gain * this.values.get(loop.gain) };
+  }
+
   /** @param {string} name @param {any} value @param {any[]} own what is alike of all servos */
   looked(name, value, own) {
     const { of_all: names, ranges } = this.world;
@@ -113,7 +147,7 @@ export class Servo {
    * @param {number[][]} ends lowest and highest of the command, and of what the servo follows; their pieces, and when these start [s]
    */
   bound(command, ends) {
-    const bounds = this.own.bounds[command.unit] ?? this.untold(this.world.kinds[command.unit]);
+    const bounds = this.own.bounds[command.unit] ?? this.untold(command.unit);
     const end = (/** @type {any} */ one, /** @type {number} */ none) => {
       const [name, usual] = Array.isArray(one) ? one : [null, one];
       return (name && this.value(name)) ?? usual ?? none;
@@ -130,24 +164,32 @@ export class Servo {
     }
   }
 
-  /** Refuse a kind of command that it does not take. @param {string} word @returns {never} */
-  untold(word) {
+  /** Refuse a kind of command that it does not take. @param {string} unit @returns {never} */
+  untold(unit) {
+    const word = this.world.kinds[unit];
     const goals = this.values.get("firmware.command_kind") === "goal" && this.reads.has("firmware.command_kind");
-    return refuse(goals ? "takes_goals" : "no_such_command", null, { name: this.id, word, kind: word.replaceAll("_", " ") });
+    if (goals) return refuse("takes_goals", null, { name: this.id, word, kind: word.replaceAll("_", " ") });
+    throw new Refused(this.own.refused[unit]);
   }
 
   /** @param {number} k @returns {any} what the panels know of it */
   facts(k) {
     const { world, known, own } = this;
     return { servo: k, id: known.id, title: known.title, kind: known.kind, model: this.model, models: known.models,
-      horn: known.horn, registers: null, columns: own.columns, travel_deg: own.travel_deg, pulse_us: own.pulse_us,
-      voltage: own.voltage, loop: own.loop,
+      horn: known.horn, registers: this.registers(), columns: own.columns, travel_deg: own.travel_deg, pulse_us: own.pulse_us,
+      voltage: own.voltage, loop: this.loop,
       signals: Object.fromEntries(own.columns.slice(1).map((/** @type {string} */ name) => [name, world.signals[name]])),
       parameters: world.parameters.map((/** @type {any[]} */ alike, /** @type {number} */ n) => {
         const name = alike[0];
-        const set = this.changed.has(name) ? { value: this.changed.get(name), ...world.set } : {};
+        const value = this.changed.get(name);
+        const set = this.changed.has(name) ? { value, ...world.set, ...ends(world.slider, value, alike[world.of_all.indexOf("rule")]) } : {};
         return { ...joined(world.of_all, alike), ...joined(world.of_each, known.values[n]), ...set, read: this.reads.has(name) };
       }).filter((/** @type {any} */ one) => !this.hides(one.name)) };
+  }
+
+  /** @returns {any[]|null} its registers with what they hold */
+  registers() {
+    return this.known.registers && this.known.registers.map((/** @type {any} */ one) => ({ ...one, value: this.written.get(one.name) ?? one.value }));
   }
 
   /** @returns {Servo} the same, of which something may change */
@@ -156,6 +198,7 @@ export class Servo {
     copy.load = { ...this.load };
     copy.values = new Map(this.values);
     copy.changed = new Map(this.changed);
+    copy.written = new Map(this.written);
     return copy;
   }
 }
@@ -167,3 +210,18 @@ export function hidden(world, kernel, seed) {
 
 /** @param {string[]} names @param {any[]} values */
 function joined(names, values) { return Object.fromEntries(names.map((name, k) => [name, values[k]])); }
+
+/** @param {any} table of a register @param {any} value @returns {any[]|null} the numbers that follow; null of a value that is none of the register's */
+function held({ low, high, only, pieces }, value) {
+  if (!Number.isInteger(value) || value < low || value > high || (only.length && !only.includes(value))) return null;
+  const [from, at, slopes] = pieces.filter((/** @type {any[]} */ piece) => piece[0] <= value).at(-1);
+  return at ? at.map((/** @type {any} */ one, /** @type {number} */ n) => (typeof one === "number" ? one + slopes[n] * (value - from) : one)) : null;
+}
+
+/** @param {any} slider @param {any} value @param {string} rule @returns {{low?: number, high?: number}} where a slider ends of a number that was set */
+function ends({ wide, of_none: none, floors, positive, least, share }, value, rule) {
+  if (!Number.isFinite(value)) return {};
+  const [from, to] = value ? [value / wide, value * wide].sort((a, b) => a - b) : none;
+  const low = Math.max(from, rule === positive ? least * Math.abs(value) : floors[rule] ?? from);
+  return rule === share ? { low: Math.max(low, 0), high: Math.min(to, 1) } : { low, high: to };
+}

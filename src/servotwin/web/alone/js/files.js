@@ -1,24 +1,26 @@
 // What leaves the page as files: a table, a script, the text of the bench.
 
-import { refuse, wrong } from "./check.js";
+import { wrong } from "./check.js";
 import { Kernel } from "./kernel.js";
 import { Live } from "./live.js";
 import { written } from "./scene.js";
+import { servoFile } from "./servo_file.js";
 
 /**
  * @param {{module: WebAssembly.Module, world: any}} parts
- * @param {any} scene
+ * @param {Live} live
  * @param {string} kind
  * @param {number} servo
  * @returns {Promise<{name: string, type: string, text: string}>}
  */
-export async function file({ module, world }, scene, kind, servo) {
+export async function file({ module, world }, live, kind, servo) {
+  const scene = live.now();
   if (!world.files.kinds.includes(kind)) wrong("export", kind, world.files.kinds.join(", "));
   if (!(Number.isInteger(servo) && servo in scene.servos)) wrong("servo of an export", servo, `a whole number from 0 to ${scene.servos.length - 1}`);
   const text = written(world, scene);
   if (kind === "scene") return { name: "bench.toml", type: "application/toml", text };
   if (kind === "script") return { name: "bench.py", type: "text/x-python", text: script(world, scene, text) };
-  if (kind === "servo") return refuse("only_with_server");
+  if (kind === "servo") return servoFile(world, live.servos[servo]);
   return { name: "bench.csv", type: "text/csv", text: await table(new Kernel(module, world.layout), world, scene, servo) };
 }
 

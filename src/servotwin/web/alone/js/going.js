@@ -171,6 +171,9 @@ export class Going {
   /** @param {number} k */
   begin(k) { this.kernel.call("begin", this.posts, k, this.told, this.memories); }
 
+  /** @param {number} k @param {number} angle where it stands, whatever its command says [rad] */
+  beginAt(k, angle) { this.kernel.call("begin_at", this.posts, k, this.told, this.memories, angle); }
+
   /** @param {number} k @returns {Float64Array} the row of a servo as it stands */
   now(k) {
     this.kernel.call("look", this.posts, k, this.told, this.programs, this.memories, this.rows, this.used);
@@ -204,6 +207,8 @@ export class Going {
     const { kernel, world } = this;
     const together = this.bus ? [kernel.layout.lanes.map((/** @type {string} */ name) => (
       name === "pieces" ? this.commands : this.bus.lanes[name])), ...this.bus.rest] : [];
+    const left = kernel.wholes(this.used);
+    for (let k = 0; k < this.columns.length; k += 1) left[k * world.limits.used + world.limits.left] = BigInt(world.limits.steps);
     const status = kernel.call(this.bus ? "advance_together" : "advance", this.posts, this.told, this.programs, this.memories,
       this.sender, ...together, until, rate, Number(switches), this.rows, this.events, this.pulses, this.used);
     const used = [...kernel.wholes(this.used)].map(Number);
@@ -224,7 +229,7 @@ export class Going {
       }
       return { columns, points, pulses: kernel.numbers(this.pulses, k * pulses * 2, heard * 2).slice() };
     });
-    const wrong = status === 0 || status === PAUSED ? null : world.status[status];
+    const wrong = status === 0 || status === PAUSED ? null : status === world.limits.too_long ? world.words.too_long : world.status[status];
     return { time: this.time, parts, events: said, wrong };
   }
 }

@@ -1,5 +1,6 @@
 // The bench of the page as one file: what was done at it, and its servos that go on.
 
+import { Circuit } from "./circuit_of.js";
 import { Refused, checked, refuse, tidy, unknown, wrong } from "./check.js";
 import { Servo } from "./facts.js";
 import { Going } from "./going.js";
@@ -17,13 +18,13 @@ export class Live {
     this.scene = { ...scene };
     /** @type {Servo[]} */
     this.servos = scene.servos.map((/** @type {any} */ one) => new Servo(world, one, scene, kernel));
-    if (Object.keys(scene.control).length) refuse("only_with_server");
     this.shared = Object.keys(scene.supply).length > 0;
     if (this.shared) {
       this.servos.forEach((/** @type {Servo} */ one, /** @type {number} */ k) => one.hang(scene.supply, k + 1));
       if (new Set(this.servos.map((/** @type {Servo} */ one) => one.columns.includes("duty"))).size > 1) refuse("mixed");
     }
     this.going = new Going(kernel, world, this.servos, scene);
+    this.circuit = Object.keys(scene.control).length ? new Circuit(world, this, scene.control) : null;
     /** @type {{command: any, time: number}[]} what each servo is told now */
     this.told = [];
     /** @type {Record<string, number>} what was changed of loads since the start, by dotted names */
@@ -37,6 +38,7 @@ export class Live {
     this.servos.forEach((/** @type {Servo} */ _, /** @type {number} */ k) => {
       const first = this.todo.find((one) => one.kind === "command" && (one.servo === null || one.servo === k));
       this.follow(k, this.takes(k, /** @type {Action} */ (first).value, 0));
+      this.circuit?.heed(k, 0);
       this.going.begin(k);
     });
     this.fits(scene.frame_rate);
@@ -74,6 +76,8 @@ export class Live {
 
   /** @param {number} k @param {any} command @param {number} time @param {Servo} [servo] that is to follow it */
   takes(k, command, time, servo = this.servos[k]) {
+    const { unit } = this.world.control;
+    if (this.circuit && command.unit !== unit) wrong("unit of a command to a control circuit", command.unit, unit);
     const taken = this.going.taken(k, command, time);
     servo.bound(command, taken.ends);
     return { ...taken, command, time };
@@ -87,6 +91,8 @@ export class Live {
 
   /** Refuse frames that some pulse does not fit into. @param {number} rate [Hz] */
   fits(rate) {
+    if (this.circuit && this.circuit.longest * rate >= 1) refuse("frame_rate", `${tidy(rate)} Hz`);
+    if (this.circuit) return;
     if (this.told.some((one, k) => this.going.hears(k) && /** @type {any} */ (one).ends[1][1] * rate >= 1)) refuse("frame_rate", `${tidy(rate)} Hz`);
   }
 
@@ -126,8 +132,9 @@ export class Live {
   advance(until, rate, switches = true) {
     this.catchUp();
     const end = this.todo.length ? Math.min(until, this.todo[0].time) : until;
-    const push = this.going.advance(end, rate, switches);
-    if (push.wrong) throw new Refused(push.wrong.replace("{time}", String(this.time)));
+    const push = this.going.advance(this.circuit ? Math.min(end, this.circuit.next) : end, rate, switches);
+    this.circuit?.look(push.parts);
+    if (push.wrong) throw new Refused(push.wrong.replace("{time}", tidy(this.time)));
     this.catchUp();
     return push;
   }
@@ -158,13 +165,34 @@ function set(live, action) {
   const those = live.those(all ? { ...action, servo: null } : action).map((k) => ({ k, own: names.filter((name) => isLoad(name) || live.servos[k].reads.has(name)) }))
     .filter(({ own }) => own.length);
   if (!those.length) wrong(names.join(", "), "no servo here reads it", "what a model here reads");
+  return [...remade(live, those.map(({ k }) => k), (servo, n) => {
+    const { own } = those[n];
+    for (const name of own.filter(isLoad)) servo.load[world.load[name]] = checked(world.rules.loads[name], action.value[name], name);
+    servo.change(Object.fromEntries(own.filter((name) => !isLoad(name)).map((name) => [name, action.value[name]])));
+  }), () => Object.assign(live.loads, Object.fromEntries(names.filter(isLoad).map((name) => [name, action.value[name]])))];
+}
+
+/** @param {Live} live @param {Action} action @returns {(() => void)[]} */
+function register(live, action) {
+  const those = live.those(action).filter((k) => action.servo === k || live.servos[k].known.registers);
+  if (!those.length) wrong(Object.keys(action.value).join(", "), "no bus servo", live.world.words.bus_registers);
+  return remade(live, those, (servo) => servo.write(action.value));
+}
+
+/**
+ * Make servos anew that are changed; all stay as they were where one cannot be.
+ * @param {Live} live
+ * @param {number[]} those
+ * @param {(servo: Servo, n: number) => void} change
+ * @returns {(() => void)[]} what lets them go on
+ */
+function remade(live, those, change) {
   /** @type {{k: number, servo: Servo, taken?: any}[]} */
   const made = [];
   try {
-    for (const { k, own } of those) {
+    for (const [n, k] of those.entries()) {
       const servo = live.servos[k].copy();
-      for (const name of own.filter(isLoad)) servo.load[world.load[name]] = checked(world.rules.loads[name], action.value[name], name);
-      servo.change(Object.fromEntries(own.filter((name) => !isLoad(name)).map((name) => [name, action.value[name]])));
+      change(servo, n);
       made.push({ k, servo });
       live.going.make(k, servo);
       const { command, time } = live.told[k];
@@ -174,11 +202,11 @@ function set(live, action) {
     for (const { k } of made) live.going.make(k, live.servos[k]); // as before
     throw error;
   }
-  return [...made.map(({ k, servo, taken }) => () => {
+  return made.map(({ k, servo, taken }) => () => {
     live.servos[k] = servo;
     live.follow(k, taken);
     live.going.change(k);
-  }), () => Object.assign(live.loads, Object.fromEntries(names.filter(isLoad).map((name) => [name, action.value[name]])))];
+  });
 }
 
 /** @type {Record<string, (live: Live, action: Action) => (() => void)[]>} */
@@ -201,6 +229,12 @@ const WAYS = {
     }];
   },
   set,
-  register: () => refuse("only_with_server"),
-  control: () => refuse("only_with_server"),
+  register,
+  control: (live, { value }) => {
+    const { circuit, world } = live;
+    if (!circuit) return wrong("control circuit", Object.keys(value).join(", "), world.words.no_circuit);
+    const { delay } = world.control;
+    if (circuit.longestWith(value) * live.going.rate >= 1) wrong(`${delay} of the control circuit`, value[delay], world.words.late_circuit);
+    return [() => circuit.change(value)];
+  },
 };

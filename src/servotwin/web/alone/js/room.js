@@ -2,21 +2,22 @@
 
 import { hidden } from "./facts.js";
 import { file } from "./files.js";
+import { Kernel } from "./kernel.js";
 import { Live } from "./live.js";
 import { Refused, filled as filledIn, refuse, unknown, wrong } from "./check.js";
 import { Pace } from "./pace.js";
+import { OwnLog } from "./own.js";
 import { fragment, read, servo, unfragment, view, written } from "./scene.js";
 
 const now = () => performance.now() / 1000; // s
 
 export class Room {
   /**
-   * @param {any} parts kernel and world
+   * @param {{module: WebAssembly.Module, world: any}} parts
    * @param {{told: (message: any) => void, pushed: (header: any, parts: any[]) => void}} page
    */
   constructor(parts, page) {
-    const { kernel, world } = parts;
-    this.kernel = kernel;
+    const { world } = parts;
     this.parts = parts;
     /** @type {Live|undefined} */
     this.live = undefined;
@@ -27,6 +28,7 @@ export class Room {
     this.broken = null;
     this.end = 0;
     this.step = world.limits.first_stretch;
+    this.own = new OwnLog(parts, page);
     /** @type {any[]} */
     this.lcd = [];
     this.put(read(world, world.first));
@@ -34,13 +36,8 @@ export class Room {
 
   /** @param {any} scene begin with this bench; what was done at it is done again, as fast as it goes */
   put(scene) {
-    const before = this.live;
-    try {
-      this.live = new Live(this.kernel, this.world, { ...scene, end: 0 });
-    } catch (error) {
-      if (before) this.live = this.again(before); // the kernel has one bench at a time
-      throw error;
-    }
+    // in a kernel of its own: the bench before stays as it is where this one is refused
+    this.live = new Live(new Kernel(this.parts.module, this.world.layout), this.world, { ...scene, end: 0 });
     this.end = scene.end;
     this.broken = null;
     this.step = this.world.limits.first_stretch;
@@ -48,14 +45,6 @@ export class Room {
     this.pace.begin(now(), this.live.time);
     this.page.told({ scene: this.state() });
     this.glance();
-  }
-
-  /** @param {Live} before @returns {Live} the same bench once more, at the time that it had come to */
-  again(before) {
-    const scene = before.now();
-    const live = new Live(this.kernel, this.world, { ...scene, end: 0 });
-    while (!live.going.reached(scene.end)) live.advance(scene.end, this.world.limits.coarsest);
-    return live;
   }
 
   state() {
@@ -159,7 +148,7 @@ export class Room {
       return Number.isFinite(found) ? found : null;
     };
     const counts = Object.fromEntries(this.world.converters.map((/** @type {any} */ one) => [one.name,
-      value(one.of) === null ? null : this.kernel.call("count", one.gain, one.offset, one.highest, value(one.of))]));
+      value(one.of) === null ? null : live.going.kernel.call("count", one.gain, one.offset, one.highest, value(one.of))]));
     return { command_voltage: value("command_voltage"), feedback_voltage: value("feedback_voltage"), ...counts,
       pulse_rate: columns.includes("pulse_width") ? live.going.rate : null, output_angle: value("output_angle"),
       pulse_width: value("pulse_width") };
@@ -203,7 +192,7 @@ export class Room {
     if ("do" in message) {
       if (this.replaying) refuse("repeating");
       const { time, kind, servo } = live.do(message.do, message.value, message.servo ?? null);
-      if (kind === "set") {
+      if (kind === "set" || kind === "register") {
         this.step = world.limits.first_stretch;
         const those = live.servos.map((one, k) => one.facts(k)).filter((one) => servo === null || one.servo === servo);
         this.page.told({ changed: those, loads: this.loads() });
@@ -224,9 +213,10 @@ export class Room {
     else if ("text" in message) {
       const text = written(world, live.now());
       return { text, fragment: await fragment(text) };
-    } else if ("export" in message) return { file: await file(this.parts, live.now(), message.export, message.servo ?? 0) };
+    } else if ("export" in message) return { file: await file(this.parts, live, message.export, message.servo ?? 0) };
     else if ("mystery" in message) this.put(read(world, this.hidden(message.mystery)));
     else if ("guess" in message) return { compared: this.compared(live.scene.servos[0].mystery, message.guess) };
+    else if ("log" in message) return message.log.play ? this.answer({ do: "command", value: this.own.played() }) : this.own.answer(live, message.log);
     else refuse("only_with_server");
     return { time: /** @type {Live} */ (this.live).time };
   }
@@ -243,7 +233,7 @@ export class Room {
     const { good, fair } = this.world.mystery;
     if (seed === undefined) wrong("guess", "a bench without a mystery", "a mystery servo");
     if (!guess || typeof guess !== "object" || !Object.keys(guess).length) wrong("guess", guess, "a table of numbers in SI");
-    const truth = hidden(this.world, this.kernel, /** @type {number} */ (seed));
+    const truth = hidden(this.world, /** @type {Live} */ (this.live).going.kernel, /** @type {number} */ (seed));
     for (const [name, value] of Object.entries(guess)) {
       if (!(name in truth)) unknown("number of a mystery servo", name, Object.keys(truth));
       if (!Number.isFinite(value)) wrong(`guess of ${name}`, value, "a finite number in SI");

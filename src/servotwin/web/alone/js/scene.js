@@ -1,14 +1,14 @@
 // The text of a bench: read, written, and packed into a link.
 
-import { Refused, checked, unknown, wrong } from "./check.js";
+import { checked, unknown, wrong } from "./check.js";
 import { said } from "./live.js";
-import { parse } from "./toml_parse.js";
+import { line, parsed, value } from "./toml.js";
 
 /** @param {any} world @param {string} text @returns {any} the scene that a text describes */
 export function read(world, text) {
   const { rules, limits, scene: keys } = world;
   if (text.length > limits.text) wrong("scene", `${text.length} characters`, `at most ${limits.text}`);
-  const content = parsed(text.replace(/^\ufeff/, ""));
+  const content = parsed("scene", text);
   for (const key of Object.keys(content)) if (!keys.top.includes(key)) unknown("key of a scene", key, keys.top);
   if (content.format !== limits.format) wrong("format of a scene", content.format, String(limits.format));
   const servos = content.servo;
@@ -57,15 +57,6 @@ function action(world, servos, row) {
   return said(world, servos, row);
 }
 
-/** @param {string} text @returns {any} */
-function parsed(text) {
-  try {
-    return parse(text);
-  } catch (error) {
-    throw new Refused(`scene: not valid TOML: ${(error instanceof Error ? error.message : String(error)).split("\n")[0]}`);
-  }
-}
-
 /** @param {any} world @param {any} scene @returns {string} */
 export function written(world, scene) {
   const float = (/** @type {number} */ x) => (Number.isInteger(x) ? `${x}.0` : String(x));
@@ -89,30 +80,6 @@ export function written(world, scene) {
 function filled(one) {
   return !(one === undefined || one === null || one === "" || (typeof one === "object" && !Object.keys(one).length));
 }
-
-/** @param {string} key @param {any} one @returns {string} */
-function line(key, one) {
-  if (typeof one === "string" && one.includes("\n")) {
-    return `${name(key)} = """\n${one.split("\n").map((part) => quoted(part).slice(1, -1)).join("\n")}"""`;
-  }
-  return `${name(key)} = ${value(one)}`;
-}
-
-/** @param {any} one @returns {string} */
-function value(one) {
-  if (typeof one === "string") return quoted(one);
-  if (Array.isArray(one)) return `[${one.map(value).join(", ")}]`;
-  if (one !== null && typeof one === "object") {
-    return `{${Object.entries(one).map(([key, inner]) => `${name(key)} = ${value(inner)}`).join(", ")}}`;
-  }
-  return String(one);
-}
-
-/** @param {string} key @returns {string} */
-function name(key) { return /^[\w-]+$/.test(key) ? key : quoted(key); }
-
-/** @param {string} text @returns {string} */
-function quoted(text) { return JSON.stringify(/** @type {any} */ (text).toWellFormed?.() ?? text).replaceAll("\x7f", "\\u007f"); }
 
 /** @param {string} text @returns {Promise<string>} the text packed for the part of a link after its # */
 export async function fragment(text) {

@@ -1,6 +1,7 @@
 // The bench as the page knows it: what it is, what it has shown, and how to do something at it.
 
 import { History } from "./history.js";
+import { before } from "./kept.js";
 import { connect } from "./line.js";
 
 const AGAIN = [500, 1000, 2000, 4000, 8000]; // ms until the next attempt
@@ -147,8 +148,24 @@ export class Bench extends EventTarget {
     this.attempt = 0;
     this.emit("hello", hello);
     if (hello.role === "watcher") return;
-    if (again && this.kept) this.tell({ scene: this.kept });
+    const kept = again ? this.kept && { text: this.kept, running: true } : this.role === "own" && before();
+    if (kept) this.goOnWith(kept);
     else this.begin();
+  }
+
+  /**
+   * Begin with a bench of before: what was done at it is done again, and time goes on if it went on.
+   * @param {{text: string, running: boolean}} kept
+   */
+  async goOnWith({ text, running }) {
+    if (!await this.tell({ scene: text }) || !running) return;
+    const state = this.state;
+    const goOn = () => {
+      if (this.state === state && this.header && this.header.replaying !== null) return;
+      this.removeEventListener("push", goOn);
+      if (this.state === state && !this.running) this.tell({ run: true });
+    };
+    this.addEventListener("push", goOn);
   }
 
   /** Begin with what the link of the page carries. */
@@ -192,6 +209,7 @@ export class Bench extends EventTarget {
     this.waiting.delete(/** @type {number} */ (id));
     if (wrong) waits.failed(new Error(wrong));
     else waits.done(found);
+    if (found && "time" in found) this.emit("did");
   }
 
   /** @param {CloseEvent} event */
@@ -213,6 +231,8 @@ export class Bench extends EventTarget {
   async keep() {
     if (this.role === "watcher" || !this.line?.open) return;
     const found = await this.tell({ text: true });
-    if (found) this.kept = found.text;
+    if (!found) return;
+    this.kept = found.text;
+    this.emit("kept");
   }
 }

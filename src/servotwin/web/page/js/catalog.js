@@ -65,9 +65,9 @@ export function mount(root, bench) {
     }
     const servo = all.find((one) => one.id === id);
     picture.replaceChildren(el("h3", { text: `${servo.title} at full drive, ${plain(found.voltage)} V` }),
-      chart(found.speed, found.torque, found.current),
+      chart(found.speed, found.torque.map((/** @type {number} */ one) => 1000 * one), found.current),
       el("p", { class: "soft", text: `${(1000 * servo.mass_kg).toFixed(0)} g; stalls at ${
-        engineering(Math.max(...found.torque), "N m", 3)}, turns 60° in ${engineering(Math.PI / 3 / Math.max(...found.speed), "s", 3)}` }));
+        plain(1000 * Math.max(...found.torque), 3)} mN m, turns 60° in ${engineering(Math.PI / 3 / Math.max(...found.speed), "s", 3)}` }));
   };
 
   bench.on("scene", async () => {
@@ -96,7 +96,7 @@ function number(label, unit, first) {
 /**
  * Two curves over speed in one picture, each with an axis of its own.
  * @param {number[]} x [rad/s]
- * @param {number[]} torque [N m]
+ * @param {number[]} torque [mN m]
  * @param {number[]} current [A]
  */
 function chart(x, torque, current) {
@@ -111,14 +111,14 @@ function chart(x, torque, current) {
     svg("text", { x: at, y, "text-anchor": anchor, text });
   const last = Math.floor(most / nice(most)) * nice(most);
   return svg("svg", { class: "curve", viewBox: `0 0 ${w} ${h}`, role: "img", "aria-label": `torque over speed: ${
-    plain(torque[0], 3)} N m at rest, none at ${plain(most, 3)} rad/s; current: ${plain(current[0], 3)} A at rest, ${
+    plain(torque[0], 3)} mN m at rest, none at ${plain(most, 3)} rad/s; current: ${plain(current[0], 3)} A at rest, ${
     plain(current[current.length - 1], 3)} A at ${plain(most, 3)} rad/s` },
   ...[0.25, 0.5, 0.75, 1].map((share) => svg("path", { class: "rule", d: `M${left} ${py(share)}H${w - right}` })),
   svg("path", { class: "axis", d: `M${left} ${top - 4}V${h - low}H${w - right}V${top - 4}` }),
   svg("path", { class: "line", d: path(torque, strong) }), svg("path", { class: "line second", d: path(current, ampere) }),
   ...[0, 0.5, 1].flatMap((share) => [label(left - 5, py(share) + 4, plain(share * strong, 2), "end"),
     label(w - right + 5, py(share) + 4, plain(share * ampere, 2), "start")]),
-  label(2, 11, "torque [N m]", "start"), label(w - 2, 11, "current [A], dashed", "end"),
+  label(2, 11, "torque [mN m]", "start"), label(w - 2, 11, "current [A], dashed", "end"),
   ...[0, last / 2, last].map((value) => label(px(value), h - low + 14, plain(value, 2))), label((left + w - right) / 2, h - 4, "speed [rad/s]"));
 }
 

@@ -8,7 +8,6 @@ const MOST = [ // parameters that stand here; all others are found in the search
   "friction.coulomb_torque_forward", "gear.backlash", "electronics.off_state", "potentiometer.noise"];
 const USUAL = /** @type {Record<string, [number, number, number]>} */ ({ // low, high and off of what a file may lack
   "supply.internal_resistance": [0, 2, 0], "gear.backlash": [0, 0.035, 0], "potentiometer.noise": [0, 0.01, 0] });
-const SMALL = 0.01; // N m: less is told in mN m
 const BOTH_WAYS = "friction.coulomb_torque_backward";
 
 /** @param {HTMLElement} root @param {import("./bench.js").Bench} bench */
@@ -25,9 +24,7 @@ export function mount(root, bench) {
 
   /** @param {any} of a record of a parameter @param {number} [low] @param {number} [high] @param {string} [label] */
   const control = (of, low = of.low, high = of.high, label = of.meaning) => {
-    const small = of.shown.unit === "N m" && high < SMALL;
-    const unit = small ? "mN m" : of.shown.unit;
-    const factor = small ? 1e-3 : of.shown.factor;
+    const { unit, factor } = of.shown;
     let next = 0;
     const send = bench.onceAFrame(() => set(of.name, next));
     const made = slider({ label, unit, low: low / factor, high: high / factor,

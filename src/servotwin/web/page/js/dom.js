@@ -126,17 +126,17 @@ export function onceAFrame(act) {
  * Draw at most so often; a few times a second where the system asks for little motion.
  * @param {() => void} draw
  * @param {number} [rate] times a second; with every frame unless given
- * @returns {() => void}
+ * @returns {(() => void) & {now: () => void}} `now` draws at once: what is printed waits for no frame
  */
 export function paced(draw, rate = Infinity) {
   let last = -Infinity;
   let waits = false;
   const frame = onceAFrame(() => { last = performance.now(); waits = false; draw(); });
-  return () => {
+  return Object.assign(() => {
     if (waits) return;
     waits = true;
     const left = last + 1000 / (calm.matches ? Math.min(rate, CALM) : rate) - performance.now();
     if (left > 4) setTimeout(frame, left);
     else frame();
-  };
+  }, { now: draw });
 }

@@ -32,6 +32,7 @@ export function mount(root, bench) {
     if (!found) return;
     if (found.fragment.length > LONGEST_LINK) { bench.notice("too much was done for a link: save the bench as a file"); return; }
     history.replaceState(null, "", `${location.pathname}${location.search}#${found.fragment}`);
+    bench.emit("linked");
     link.value = location.href;
     link.select();
     navigator.clipboard?.writeText(location.href).catch(() => {});
@@ -48,7 +49,6 @@ export function mount(root, bench) {
     const given = event.dataTransfer?.files[0];
     event.preventDefault();
     if (given?.name.endsWith(".toml")) open(await given.text(), given.name);
-    else if (given && bench.hello.alone) bench.notice(bench.hello.alone);
     else if (given) bench.emit("dropped", given);
   });
 

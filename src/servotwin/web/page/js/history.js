@@ -86,6 +86,19 @@ export class History {
     return (1 - share) * this.value(name, k - 1) + share * this.value(name, k);
   }
 
+  /** @param {string} name @param {number} start @param {number} end @returns {number} the mean over a time, on lines between rows */
+  mean(name, start, end) {
+    const { time, value } = this.slice(name, start, end);
+    let [sum, whole] = [0, 0];
+    for (let k = 1; k < time.length; k += 1) {
+      const lasts = Math.min(time[k], end) - Math.max(time[k - 1], start);
+      if (!(lasts > 0)) continue;
+      sum += (lasts * (value[k] + value[k - 1])) / 2;
+      whole += lasts;
+    }
+    return sum / whole;
+  }
+
   /**
    * @param {string} name
    * @param {number} start

@@ -1,6 +1,7 @@
 // A log of one's own: handed in, how its columns were read, laid over a servo of the bench, its command played.
 
 import { choice, el, panel, unique } from "./dom.js";
+import { handedIn } from "./line.js";
 import { fullName } from "./names.js";
 import { plain, printed } from "./units.js";
 
@@ -32,7 +33,8 @@ export function mount(root, bench) {
   const mend = el("input", { type: "text", id: mendId, placeholder: "torn,reset", autocomplete: "off", spellcheck: "false",
     onkeydown: (/** @type {KeyboardEvent} */ event) => { if (event.key === "Enter") again(); } });
   const table = el("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "how the columns were read" });
-  body.append(el("p", { class: "soft", text: "Drop a table (CSV, TSV) or a JSON log of a known format anywhere on the page, 20 MB at most." }),
+  const hint = el("p", { class: "soft", text: "Drop a table (CSV, TSV) or a JSON log of a known format anywhere on the page, 20 MB at most." });
+  body.append(hint,
     el("label", {}, "Open a log ", input), said, place, words);
   words.append(el("label", { for: id, text: "What its columns mean (as --columns of servotwin fit; time=50Hz is --rate, command=30deg@0s --commanded)" }), columns,
     el("label", { for: mendId, text: "What to mend (as --mend)" }), mend,
@@ -44,6 +46,7 @@ export function mount(root, bench) {
 
   /** @param {string} line */
   const say = (line) => { said.textContent = line; };
+  const alone = () => Boolean(bench.hello.alone); // words for columns, and fits of the rig, need the server
   const number = () => Number(run.select.value) || 0;
   const tell = () => bench.emit("brought", facts && { ...facts, run: number() });
 
@@ -67,12 +70,10 @@ export function mount(root, bench) {
     file = given;
     say(`Reading ${given.name} …`);
     try {
-      const answer = await fetch(`/api/log?name=${encodeURIComponent(given.name)}`,
-        { method: "POST", headers: { "x-visitor": bench.hello.visitor ?? "" }, body: given });
-      const found = await answer.json();
+      const found = await handedIn(given, bench.hello.visitor ?? "");
       if (file !== given) return;
       columns.value = mend.value = "";
-      if (found.log) took(found.log); else wrong(found.wrong ?? found.error, Boolean(found.wrong));
+      if (found.log) took(found.log); else wrong(found.wrong ?? found.error ?? "", Boolean(found.wrong));
     } catch {
       wrong(`${given.name}: the line to the bench was cut, or the file cannot be read`, false);
     }
@@ -82,7 +83,7 @@ export function mount(root, bench) {
   const wrong = (line, kept) => {
     facts = null;
     place.hidden = true;
-    words.hidden = !kept;
+    words.hidden = !kept || alone();
     say(line);
     tell();
   };
@@ -97,7 +98,8 @@ export function mount(root, bench) {
   /** @param {any} found */
   const took = (found) => {
     facts = found;
-    place.hidden = words.hidden = false;
+    place.hidden = false;
+    words.hidden = alone();
     run.select.replaceChildren(...found.runs.map((/** @type {any} */ one, /** @type {number} */ k) => el("option", { value: k, text: one.name })));
     run.row.hidden = found.runs.length < 2;
     table.hidden = !found.columns.length;
@@ -109,7 +111,7 @@ export function mount(root, bench) {
 
   const compare = async () => {
     if (!facts) return;
-    say(`${described(facts, number())} Comparing … ${FIRST}`);
+    say(`${described(facts, number())} Comparing …${alone() ? "" : ` ${FIRST}`}`);
     try {
       await bench.ask({ log: { show: true, servo: Number(of.select.value) || 0, run: number(), rig: rig.input.checked } });
     } catch (error) { say(error instanceof Error ? error.message : String(error)); }
@@ -144,7 +146,11 @@ export function mount(root, bench) {
     if (Number(before) < bench.facts.length && before) of.select.value = before;
     of.row.hidden = bench.facts.length < 2;
   });
-  bench.on("hello", () => { if (file) bring(file); });
+  bench.on("hello", (hello) => {
+    rig.row.hidden = alone();
+    if (hello.log_hint) hint.textContent = hello.log_hint;
+    if (file) bring(file);
+  });
 }
 
 /** @param {string} label @param {boolean} checked @returns {{row: HTMLElement, input: HTMLInputElement}} */

@@ -12,7 +12,9 @@ import * as exports from "./exports.js";
 import * as fit from "./fit.js";
 import * as fitFound from "./fit_found.js";
 import * as horn from "./horn.js";
+import * as kept from "./kept.js";
 import * as lcd from "./lcd.js";
+import * as lesson from "./lesson.js";
 import * as lessons from "./lessons.js";
 import * as log from "./log.js";
 import * as logDraw from "./log_draw.js";
@@ -28,7 +30,7 @@ const SIDE = /** @type {[string, {mount: (root: HTMLElement, bench: Bench) => vo
   ["command", command], ["load", controls], ["circuit", circuit], ["registers", registers], ["any", parameters], ["servos", catalog],
   ["lessons", lessons], ["mystery", mystery], ["own", log], ["fit", fit], ["files", exports]]);
 const INSTRUMENTS = /** @type {[string, {mount: (root: HTMLElement, bench: Bench) => void}][]} */ ([
-  ["horn", horn], ["lcd", lcd], ["scope", scope], ["traces", traces], ["log", logDraw], ["found", fitFound], ["words", summary]]);
+  ["lesson", lesson], ["horn", horn], ["lcd", lcd], ["scope", scope], ["traces", traces], ["log", logDraw], ["found", fitFound], ["words", summary]]);
 
 /** @param {string} id @returns {HTMLElement} */
 const place = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
@@ -38,9 +40,9 @@ clock.mount(place("clock"), bench);
 theme.mount(place("theme"), bench);
 classroom.mount(place("instruments"), bench);
 const left = el("div", { class: "left" });
-place("instruments").append(left);
 for (const [name, one] of INSTRUMENTS) {
   const section = el("section", { class: `panel ${name}-panel` });
+  if (name === "horn") place("instruments").append(left); // behind the lesson, which comes first on a phone
   (name === "horn" || name === "lcd" ? left : place("instruments")).append(section);
   one.mount(section, bench);
 }
@@ -65,12 +67,14 @@ const settle = () => {
 narrow.addEventListener("change", settle);
 settle();
 
-const alone = el("p", { class: "alone-says soft", hidden: true });
-place("controls").append(alone);
+kept.mount(bench);
+const why = el("p");
+const alone = el("details", { class: "alone-says soft", hidden: true }, el("summary", { text: "Computes here" }), why);
+place("theme").before(alone);
 bench.on("hello", (hello) => { // the page as one file, which has no server
   document.body.classList.toggle("alone", Boolean(hello.alone));
   alone.hidden = !hello.alone;
-  alone.textContent = hello.alone ?? "";
+  why.textContent = hello.alone ?? "";
 });
 
 const notice = place("notice");

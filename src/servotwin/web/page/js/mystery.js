@@ -18,7 +18,7 @@ export function mount(root, bench) {
   /** @type {any[]} */
   let fields = [];
   bench.on("guess", (guess) => {
-    for (const { one, input } of fields) if (one.name in guess) input.value = plain(guess[one.name], 6);
+    for (const { one, input } of fields) if (one.name in guess) input.value = plain(guess[one.name] / one.shown.factor, 6);
     fields[0]?.input.focus();
   });
   bench.on("scene", (state) => {
@@ -32,20 +32,23 @@ export function mount(root, bench) {
       const field = unique();
       const input = el("input", { type: "number", id: field, step: "any" });
       return { one, input, row: el("div", { class: "card" }, el("label", { for: field }, breakable(one.name)),
-        el("span", { class: "typed" }, input, el("span", { class: "unit", text: printed(one.unit) })),
-        el("p", { class: "soft", text: `${one.meaning}, between ${plain(one.low, 3)} and ${plain(one.high, 3)} ${printed(one.unit)}` })) };
+        el("span", { class: "typed" }, input, el("span", { class: "unit", text: printed(one.shown.unit) })),
+        el("p", { class: "soft", text: `${one.meaning}, between ${inUnit(one, one.low)} and ${inUnit(one, one.high)} ${printed(one.shown.unit)}` })) };
     });
     place.append(...fields.map((/** @type {any} */ field) => field.row), el("button", { class: "primary", text: "Compare with the truth",
       onclick: async () => {
         const guess = Object.fromEntries(fields.filter((/** @type {any} */ field) => field.input.value !== "")
-          .map((/** @type {any} */ field) => [field.one.name, Number(field.input.value)]));
+          .map((/** @type {any} */ field) => [field.one.name, Number(field.input.value) * field.one.shown.factor]));
         const found = await bench.tell({ guess });
         if (found) {
           said.replaceChildren(el("table", {}, el("caption", { text: "Your guess and the truth" }), el("tbody", {},
-            ...found.compared.map((/** @type {any} */ row) => el("tr", {}, el("th", { scope: "row", text: row.name }),
-              el("td", { text: row.guess === null ? "–" : plain(row.guess) }), el("td", { text: row.truth === null ? "?" : plain(row.truth) }),
-              el("td", { text: row.error === null ? "" : `${(100 * row.error).toFixed(1)} %` }), el("td", { text: row.said }))))));
+            ...found.compared.map((/** @type {any} */ row, /** @type {number} */ k) => el("tr", {}, el("th", { scope: "row", text: row.name }),
+              el("td", { text: row.guess === null ? "–" : inUnit(unknowns[k], row.guess, 4) }), el("td", { text: row.truth === null ? "?" : inUnit(unknowns[k], row.truth, 4) }),
+              el("td", { text: printed(unknowns[k].shown.unit) }), el("td", { text: row.error === null ? "" : `${(100 * row.error).toFixed(1)} %` }), el("td", { text: row.said }))))));
         }
       } }), said);
   });
 }
+
+/** @param {any} one what is hidden @param {number} value in SI @param {number} [digits] @returns {string} in the unit that is shown */
+function inUnit(one, value, digits = 3) { return plain(value / one.shown.factor, digits); }

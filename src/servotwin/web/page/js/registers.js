@@ -24,8 +24,8 @@ export function mount(root, bench) {
     const rows = [...(facts.registers ?? [])].sort((a, b) => rank(a.name) - rank(b.name));
     return el("div", {}, bench.facts.length > 1 ? el("h3", { text: `${k + 1}: ${facts.title}` }) : null,
       loop ? el("p", { class: "stiffness" }, "The loop is a spring of ", el("strong", {
-        text: `${plain(loop.stiffness_nm_per_rad, 3)} N m/rad` }), ` up to ${plain(loop.cap_torque_nm, 3)} N m at an error of ${
-        plain((loop.cap_error_rad * 180) / Math.PI, 3)}°.`) : null,
+        text: `${plain(loop.stiffness_nm_per_rad, 3)} N m/rad` }), `${loop.cap_torque_nm === undefined ? "" : ` up to ${
+        plain(1000 * loop.cap_torque_nm, 3)} mN m at an error of ${plain((loop.cap_error_rad * 180) / Math.PI, 3)}°`}.`) : null,
       el("label", { class: "tick" }, torque(k), " torque is on"),
       ...rows.map((one) => register(facts, one, k)));
   };

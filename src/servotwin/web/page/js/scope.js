@@ -286,7 +286,7 @@ export function mount(root, bench) {
     return [(event.clientX - box.left) / box.width, onScreen((event.clientY - box.top) / box.height, box.height)];
   };
   bench.on("push", draw);
-  bench.on("theme", () => { size.style = null; draw(); });
+  bench.on("theme", () => { size.style = null; draw.now(); });
   new ResizeObserver((entries) => {
     for (const { contentRect } of entries) [size.width, size.height] = [contentRect.width, contentRect.height];
     draw();

@@ -1,13 +1,12 @@
 // What the drawings show, as a sentence that is spoken and as a table.
 
 import { el } from "./dom.js";
+import { meanCurrent, moves } from "./moves.js";
 import { fullName, shortNames } from "./names.js";
 import { SHOWN, engineering, shown } from "./units.js";
 
 const ROWS = 20;
 const LATEST = 2; // s of the table
-const [STILL, QUIET] = [0.02, 0.003]; // rad/s, rad within a second: what is slower, or less, stands
-const HUNTS = 5; // turns back within a second are more than a step's
 const NAMES = ["command_angle", "output_angle", "output_speed", "load_torque", "armature_current", "bus_voltage"];
 
 /** @param {HTMLElement} root @param {import("./bench.js").Bench} bench */
@@ -57,19 +56,7 @@ export function sentence(bench, k) {
   const degrees = (/** @type {string} */ name) => (180 / Math.PI) * seen.latest(name);
   const angle = degrees("output_angle");
   const error = degrees("command_angle") - angle;
-  const from = seen.at(bench.time - 1);
-  let turns = 0;
-  let [low, high, before] = [Infinity, -Infinity, 0];
-  for (let n = from; n < seen.length; n += 1) {
-    const speed = seen.value("output_speed", n);
-    const q = seen.value("output_angle", n);
-    [low, high] = [Math.min(low, q), Math.max(high, q)];
-    const way = Math.abs(speed) > STILL ? Math.sign(speed) : 0;
-    if (way && before && way !== before) turns += 1;
-    before = way || before;
-  }
-  const does = high - low <= QUIET ? "stands" : turns > HUNTS ? "hunts" : "moves";
   const off = Number.isFinite(error) ? `, ${Math.abs(error).toFixed(2)} degrees ${error > 0 ? "below" : "above"} its command` : "";
-  return `${fullName(bench.facts[k])}, ${does} at ${angle.toFixed(1)} degrees${off}, with ${
-    engineering(seen.latest("armature_current"), "A", 3)} through its motor.`;
+  return `${fullName(bench.facts[k])}, ${moves(bench, k).replace("°", " degrees")} at ${angle.toFixed(1)} degrees${off}, with ${
+    engineering(meanCurrent(bench, k), "A", 3)} on average.`;
 }

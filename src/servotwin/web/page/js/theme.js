@@ -16,6 +16,16 @@ export function mount(root, bench) {
     button.setAttribute("aria-label", `${button.textContent} colours`);
     bench.emit("theme");
   };
+  let screen = own.dataset.theme;
+  addEventListener("beforeprint", () => { // paper is white
+    [screen, own.dataset.theme] = [own.dataset.theme, "light"];
+    bench.emit("theme");
+  });
+  addEventListener("afterprint", () => {
+    if (screen) own.dataset.theme = screen;
+    else delete own.dataset.theme;
+    bench.emit("theme");
+  });
   dark.addEventListener("change", said);
   root.append(button);
   said();

@@ -9,7 +9,7 @@ import { SHOWN, plain, printed, shown } from "./units.js";
 /** Title, signals, whether it is shown first, and how much the axis spans at least, in the unit that is shown. */
 const CHARTS = /** @type {[string, string[], boolean, number][]} */ ([
   ["Angle", ["output_angle", "command_angle"], true, 1], ["Speed", ["output_speed"], false, 20],
-  ["Torque", ["load_torque"], false, 0.02], ["Current", ["armature_current"], true, 0.2],
+  ["Torque", ["load_torque"], false, 20], ["Current", ["armature_current"], true, 0.2],
   ["Supply", ["bus_voltage"], false, 0.5], ["Temperature", ["winding_temperature", "housing_temperature"], false, 2],
   ["Duty", ["duty"], false, 0.2]]);
 const WINDOWS = [0.02, 0.1, 0.5, 1, 2, 5, 10, 30, 60];
@@ -190,7 +190,7 @@ export function mount(root, bench) {
     begin();
   });
   bench.on("push", draw);
-  bench.on("theme", begin);
+  bench.on("theme", () => { begin(); draw.now(); read.now(); });
   bench.on("log", (found) => { log = found; begin(); });
   new ResizeObserver(paced(() => charts.forEach(({ plot, box }) => {
     if (box.clientWidth > 50 && plot.width !== box.clientWidth) plot.setSize({ width: box.clientWidth, height: plot.height });

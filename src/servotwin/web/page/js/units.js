@@ -46,7 +46,7 @@ export const SHOWN = /** @type {Record<string, [string, number, string]>} */ ({
   goal_angle: ["°", 180 / Math.PI, "goal"], reference_angle: ["°", 180 / Math.PI, "reference"],
   load_angle: ["°", 180 / Math.PI, "load angle"], output_speed: ["°/s", 180 / Math.PI, "speed"],
   motor_angle: ["rad", 1, "motor angle"], motor_speed: ["rad/s", 1, "motor speed"],
-  load_torque: ["N m", 1, "torque at the horn"], motor_torque: ["mN m", 1e3, "motor torque"],
+  load_torque: ["mN m", 1e3, "torque at the horn"], motor_torque: ["mN m", 1e3, "motor torque"],
   armature_current: ["A", 1, "motor current"], armature_voltage: ["V", 1, "motor voltage"],
   supply_current: ["A", 1, "supply current"], bus_voltage: ["V", 1, "supply voltage"],
   feedback_voltage: ["V", 1, "feedback voltage"], command_voltage: ["V", 1, "input voltage"],

@@ -28,9 +28,11 @@ _STEM = "uploaded-log"
 _ENDINGS = (".csv", ".tsv", ".txt", ".json")
 _COMPUTED = ("motor_torque", "error_time", "drive")
 """Signals that a simulation writes and no sensor measures."""
-_UNITS = {"pulse_width": ("us", 1e6), "angle": ("deg", 180.0 / np.pi), "voltage": ("V", 1.0)}
+UNITS = {"pulse_width": ("us", 1e6), "angle": ("deg", 180.0 / np.pi), "voltage": ("V", 1.0)}
+"""In which unit a bench is told a command of each kind, and how many of it an SI unit has."""
 MOST_PLAYED = 20_000
 """Changes of a command that a bench can play."""
+DIGITS = 9  # of a command that is played
 _MEMORY = 2_000_000_000  # bytes: a usual log of 20 MB takes half of it
 _MOST_RUNS = 1000
 
@@ -63,7 +65,7 @@ def work(given: dict[str, Any], tell: Tell) -> tuple[dict[str, Any], list[bytes]
         raise InputError(given["label"], got=f"{(len(packed) + len(kept)) / 1e6:.0f} MB once packed",
                          allowed=f"at most {LONGEST_UPLOAD / 1e6:.0f} MB: a shorter log")
     played = zlib.compress(json.dumps([_played(log) for log in logs]).encode(), 1)
-    return _facts(logs, given["label"], more), [packed, kept, played]
+    return log_facts(logs, given["label"], more), [packed, kept, played]
 
 
 def _read(raw: bytes, given: dict[str, Any]) -> tuple[list[Log], list[str]]:
@@ -98,7 +100,8 @@ def _plain(line: str, label: str) -> str:
     return line.replace(_STEM, label)
 
 
-def _facts(logs: list[Log], label: str, more: list[str]) -> dict[str, Any]:
+def log_facts(logs: list[Log], label: str, more: list[str]) -> dict[str, Any]:
+    """Return what a page is told of logs: how their columns were read, and what each run holds."""
     groups = reading_facts(logs)
     first: Reading | None = logs[0].reading
     remarks = dict.fromkeys([*more, *(remark for group in groups for remark in group["remarks"])])
@@ -114,7 +117,7 @@ def is_computed(log: Log) -> bool:
 
 
 def _run_facts(log: Log) -> dict[str, Any]:
-    unit, factor = _UNITS[log.command_kind]
+    unit, factor = UNITS[log.command_kind]
     held = factor * log.held
     return {"name": log.name, "motion": log.motion, "rows": len(log), "duration": log.duration,
             "command": {"kind": log.command_kind, "unit": unit, "low": float(held.min()), "high": float(held.max()),
@@ -134,10 +137,10 @@ def _played(log: Log) -> dict[str, Any] | None:
     some = _changes(log)
     if some is None:
         return None
-    unit, factor = _UNITS[log.command_kind]
+    unit, factor = UNITS[log.command_kind]
     return {"shape": "recorded", "unit": unit, "hold": log.command_hold,
-            "time": [float(f"{x:.9g}") for x in (log.time - log.start)[some].tolist()],
-            "value": [float(f"{x:.9g}") for x in (factor * log.held)[some].tolist()]}
+            "time": [float(f"{x:.{DIGITS}g}") for x in (log.time - log.start)[some].tolist()],
+            "value": [float(f"{x:.{DIGITS}g}") for x in (factor * log.held)[some].tolist()]}
 
 
 def _bound_memory() -> None:
