@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from servotwin.logs.layout import Layout
     from servotwin.tables import TextTable
 
-_PULSES = (200e-6, 4e-3)  # s: servos take 500 to 2500 us, those of helicopters half of it
+PULSES = (200e-6, 4e-3)  # s: servos take 500 to 2500 us, those of helicopters half of it
 _PEAKS = ("armature_current", "supply_current")  # milliamperes that count as amperes are too large at peaks alone
 _MOST = 0.2  # of the rows: with more it is the unit that is wrong
 
@@ -44,9 +44,9 @@ def check_said(table: TextTable, layout: Layout) -> None:
         return
     values = column.to_si(table.numbers(column.column, missing=np.nan), "pulse_width")
     longest = float(np.nanmax(values, initial=-np.inf))
-    if 0.0 < longest < _PULSES[0]:
+    if 0.0 < longest < PULSES[0]:
         raise InputError(f"{table.path}: pulses of {column.column}", got=f"{1e6 * longest:.4g} us at most",
-                         allowed=f"{1e6 * _PULSES[0]:g} us or more: milliseconds, degrees or ticks?")
+                         allowed=f"{1e6 * PULSES[0]:g} us or more: milliseconds, degrees or ticks?")
 
 
 def refuse(one: TextTable, layout: Layout) -> None:
@@ -68,7 +68,7 @@ def _bounded(layout: Layout) -> Iterator[tuple[str, Column]]:
 
 
 def _range(name: str) -> tuple[float, float]:
-    return _PULSES if name == "pulse_width" else (-largest_of(name), largest_of(name))
+    return PULSES if name == "pulse_width" else (-largest_of(name), largest_of(name))
 
 
 def _beyond(table: TextTable, name: str, column: Column) -> NDArray[np.bool_]:

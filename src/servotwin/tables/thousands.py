@@ -18,7 +18,8 @@ _HUNDREDS = 100  # in the same column: 2.500 beside 1 and 3 was written by hand
 _FAR = 10.0  # times: whole numbers that are larger than all others, were the mark one of decimals
 BLANKS = "\u00a0\u202f\u2009'\u2019"  # that do not end a line, and marks of Switzerland
 _BLANK = re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:[{BLANKS}]\d{{3}})+(?:[.,]\d*)?")
-_WHOLE = re.compile(r"[+-]?\d{1,3}")
+WHOLE = re.compile(r"[+-]?\d{1,3}")
+BY_POINTS = r"[+-]?[1-9]\d{0,2}(?:\.\d{3})+"
 
 
 class Grouped(NamedTuple):
@@ -87,7 +88,7 @@ def _mixed(table: TextTable, mark: str) -> Iterator[str]:
     for k in range(len(table.header)):
         cells = [row.cells[k] for row in table.rows if k < len(row.cells)]
         marked = [cell for cell in cells if mark in cell]
-        whole = [cell for cell in cells if _WHOLE.fullmatch(cell) and int(cell) != 0]
+        whole = [cell for cell in cells if WHOLE.fullmatch(cell) and int(cell) != 0]
         if not marked or not whole:
             continue
         largest = max(abs(float(cell.replace(mark, ".", 1).replace(mark, ""))) for cell in marked)

@@ -8,8 +8,10 @@ import numpy as np
 
 from servotwin.identification.report.shown import sensor_shown
 from servotwin.logs.columns import COMMANDS, SWITCH, TIME, own_columns
+from servotwin.logs.impossible import PULSES
 from servotwin.logs.log_checks import FEWEST, LIMITS
 from servotwin.tables.dialect import MISSING, WHOLE_OR_POINT
+from servotwin.tables.thousands import BY_POINTS, WHOLE
 from servotwin.web.live.overlay import STRETCHES
 from servotwin.web.server.own.reading import DIGITS, MOST_PLAYED, UNITS
 
@@ -32,6 +34,7 @@ def csv_rules() -> dict[str, Any]:
         "time": TIME, "angle": ANGLE, "switch": SWITCH, "commands": COMMANDS, "positive": "pulse_width",
         "units": {kind: [unit, factor] for kind, (unit, factor) in UNITS.items()},
         "known": _NAMED, "missing": sorted(MISSING), "number": WHOLE_OR_POINT.pattern, "fewest": FEWEST,
+        "grouped": BY_POINTS, "whole": WHOLE.pattern, "pulses": PULSES,
         "limits": {name: [limit, unit, meant] for name, (unit, limit, meant) in LIMITS.items()},
         "played": MOST_PLAYED, "digits": DIGITS, "stretches": STRETCHES, "shown": sensor_shown(ANGLE),
         "hold": "previous"}

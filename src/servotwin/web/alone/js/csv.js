@@ -24,6 +24,8 @@ export function readLog(world, name, bytes) {
   if (named.includes(rules.switch)) refuse("no_plain_log", rules.switch, { name });
   const number = new RegExp(`^(?:${rules.number})$`);
   const missing = new Set(rules.missing);
+  const grouped = groupedIn(rules, rows);
+  if (grouped) refuse("no_plain_log", grouped, { name });
   const columns = Object.fromEntries(named.map((signal, k) => {
     const [, , factor] = signals[k];
     const needed = signal === rules.time || signal === command;
@@ -37,6 +39,19 @@ export function readLog(world, name, bytes) {
   const log = { name: name.replace(/\.\w+$/, ""), time: columns[rules.time], command: columns[/** @type {string} */ (command)], kind, angle: columns[rules.angle] };
   look(world, name, log, columns, rows);
   return { log, facts: factsOf(world, name, log, header, signals, remarks) };
+}
+
+/**
+ * @param {any} rules
+ * @param {{cells: string[]}[]} rows
+ * @returns {string | undefined} a number whose point may separate thousands: whole ones stand in its column
+ */
+function groupedIn(rules, rows) {
+  const [form, whole] = [rules.grouped, rules.whole].map((one) => new RegExp(`^(?:${one})$`));
+  const pointed = rows.flatMap(({ cells }) => cells.filter((cell) => cell.includes(".")));
+  if (!pointed.every((cell) => form.test(cell))) return undefined;
+  const mixed = rows[0].cells.findIndex((_, k) => rows.some(({ cells }) => whole.test(cells[k]) && Number(cells[k])) && rows.some(({ cells }) => form.test(cells[k])));
+  return mixed < 0 ? undefined : rows.map(({ cells }) => cells[mixed]).find((cell) => form.test(cell));
 }
 
 /** @param {any} world @param {string} name @param {ArrayBuffer} bytes */
@@ -72,6 +87,9 @@ function look(world, name, log, columns, rows) {
   const back = log.time.findIndex((one, k) => k > 0 && !(one > log.time[k - 1]));
   if (back > 0) refuse("no_plain_log", `line ${rows[back].line}, where time does not increase`, { name });
   if (log.kind === positive) {
+    const [least, most] = world.csv.pulses;
+    const odd = log.command.findIndex((one) => one === 0 || (one > 0 && one < least) || (one > most && one <= limits[positive][0]));
+    if (odd >= 0) refuse("no_plain_log", `a pulse of ${tidy(log.command[odd])} s`, { name });
     const none = log.command.findIndex((one) => !(one > 0));
     if (none >= 0) wrong(`${name}: pulse width of sample ${none}`, `${tidy(log.command[none])} s`, world.words.a_width);
   }
