@@ -45,13 +45,13 @@ def shared(ours, theirs):
     return found
 
 
-def compare(benches, seeds):
+def compare(benches, seeds, draw=drawn):
     """Let benches go on both ways and compare what shows, what happened, and what was refused.
 
     `benches` makes of jobs what shows of each at the page as one file.
     """
     jobs = [{**job, "steps": [{**step, "value": whole(step.get("value"))} for step in job["steps"]]}
-            for job in map(drawn, seeds)]
+            for job in map(draw, seeds)]
     refused = moved = 0
     for seed, job, page in zip(seeds, jobs, benches(jobs), strict=True):
         with warnings.catch_warnings():

@@ -1,6 +1,7 @@
 """Random benches, and what is done at them."""
 
 import random
+from collections.abc import Sequence
 
 from servotwin.errors import ServotwinError
 from servotwin.parameters import catalog_names
@@ -20,11 +21,15 @@ REGISTERS = ("P_Coefficient", "Torque_Limit", "Minimum_Startup_Force", "Integral
              "Minimum_Velocity_Limit")  # no two of them make one number
 
 
-def drawn(seed: int, servos: int = 0) -> dict:
+ON_A_SUPPLY = SERVO_MODELS[3:]  # models that may share one
+
+
+def drawn(seed: int, servos: int = 0, kinds: Sequence[str] = ()) -> dict:
     """Return a bench and what is done at it, as the harness takes it."""
     rng = random.Random(seed)
     found = []
-    count, kinds = servos or rng.choice((1, 1, 2, 3)), rng.choice((SERVO_MODELS, SERVO_MODELS[3:5], SERVO_MODELS[5:]))
+    count = servos or rng.choice((1, 1, 2, 3))
+    kinds = kinds or rng.choice((SERVO_MODELS, SERVO_MODELS[3:5], SERVO_MODELS[5:]))
     while len(found) < count:
         servo = SceneServo(id=rng.choice(catalog_names()), model=rng.choice(kinds))
         try:
@@ -35,7 +40,7 @@ def drawn(seed: int, servos: int = 0) -> dict:
     kinds = {servo.model for servo in found}
     pulsed = kinds <= {"PulseServo", "PulseServoInductive"}
     supply: dict[str, float] = {}
-    if (pulsed or kinds == {"DigitalServo"}) and rng.random() < 0.5:
+    if kinds <= set(ON_A_SUPPLY) and rng.random() < 0.5:
         supply = {"open_circuit_voltage": rng.uniform(5.0, 7.0), "internal_resistance": rng.uniform(0.1, 1.0)}
         supply |= {"current_limit": rng.uniform(1.0, 4.0)} if rng.random() < 0.3 else {}
     load = {name: rng.uniform(*ends) for name, ends in LOADS.items() if rng.random() < 0.4}

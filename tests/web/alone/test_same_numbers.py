@@ -8,7 +8,7 @@ import pytest
 
 from bench_compare import compare
 from bench_made import benches, wild
-from bench_scenes import drawn
+from bench_scenes import ON_A_SUPPLY, drawn
 from servotwin.web.live import read_scene
 
 
@@ -23,6 +23,15 @@ def test_benches_with_a_control_circuit(folder):
     _, moved = compare(partial(benches, folder), seeds)
     assert len(seeds) > 3
     assert moved > 2
+
+
+def test_programs_and_chips_share_a_supply(folder):
+    draw = partial(drawn, servos=3, kinds=ON_A_SUPPLY)
+    seeds = [seed for seed in range(150) if "[supply]" in draw(seed)["scene"] and "DigitalServo" in draw(seed)["scene"]
+             and "PulseServo" in draw(seed)["scene"]][:10]
+    _, moved = compare(partial(benches, folder), seeds, draw)
+    assert len(seeds) == 10
+    assert moved > 8
 
 
 @pytest.mark.slow

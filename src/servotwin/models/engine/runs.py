@@ -132,9 +132,10 @@ def inputs_of(lanes: Lanes, curve: Floats, torque: Floats, lane: int) -> Inputs:
     first, last = lanes.piece_first[lane], lanes.piece_first[lane] + lanes.piece_count[lane]
     own = lanes.edge_count[lane]
     edges = lanes.edges[lanes.edge_first[lane]:lanes.edge_first[lane] + max(own, 0)]
-    regular = lanes.firmware[lane].T_f if firmware.present(lanes.firmware[0]) else chip_of(lanes, lane).frame_period
+    place = min(lane, len(lanes.firmware) - 1)  # one stands for all where none has a program
+    program = lanes.firmware[place:place + 1]
+    regular = program[0].T_f if firmware.present(program[0]) else chip_of(lanes, lane).frame_period
     period = 0.0 if own >= 0 else regular
-    program = lanes.firmware[lane:lane + 1] if firmware.present(lanes.firmware[0]) else lanes.firmware
     return Inputs(lanes.pieces[first:last], torque, lanes.torque[lane], period, edges, curve, lanes.seeds[lane],
                   lanes.accuracy, program)
 

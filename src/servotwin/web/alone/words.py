@@ -38,8 +38,6 @@ WORDS = {
                  "Supply(open_circuit_voltage=6.0, internal_resistance=0.5)",
     "bus_models": MODEL_NAMES,
     "rigid": "a stiff gear and shaft: on a shared supply there are no springs between two bodies",
-    "mixed": "servos on a shared supply: got 'some with programs, some without', allowed: one kind; "
-             "both " + ONLY_WITH_SERVER,
     "no_inertia": "gear.backlash: got {got}, allowed: play only with inertia behind it: gear.output_inertia, or a load "
                   "that has some",
     "frame_rate": "frame rate: got {got}, allowed: frames that a pulse fits into",

@@ -19,10 +19,7 @@ export class Live {
     /** @type {Servo[]} */
     this.servos = scene.servos.map((/** @type {any} */ one) => new Servo(world, one, scene, kernel));
     this.shared = Object.keys(scene.supply).length > 0;
-    if (this.shared) {
-      this.servos.forEach((/** @type {Servo} */ one, /** @type {number} */ k) => one.hang(scene.supply, k + 1));
-      if (new Set(this.servos.map((/** @type {Servo} */ one) => one.columns.includes("duty"))).size > 1) refuse("mixed");
-    }
+    if (this.shared) this.servos.forEach((/** @type {Servo} */ one, /** @type {number} */ k) => one.hang(scene.supply, k + 1));
     this.going = new Going(kernel, world, this.servos, scene);
     this.circuit = Object.keys(scene.control).length ? new Circuit(world, this, scene.control) : null;
     /** @type {{command: any, time: number}[]} what each servo is told now */
