@@ -12,9 +12,12 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 
-_SUGGESTIONS = 5
-_NEAR = 0.4  # share of letters that two names have in common, in their order
-_LONGEST_NAME = 200
+SUGGESTIONS = 5
+NEAR = 0.4  # share of letters that two names have in common, in their order
+LONGEST_NAME = 200
+LONGEST_SHOWN = 120  # letters of a value in a message
+FEWEST_LETTERS = 3  # that say something where another name holds them
+BEGINS, HOLDS = 3.0, 2.0  # how near such a name is at least
 
 
 class ServotwinError(Exception):
@@ -115,7 +118,7 @@ class UnknownNameError(InputError, KeyError):
         self.known = tuple(known)
         near = [] if meant is None else [meant]
         near += [one for one in _nearest(str(name), self.known) if one != meant]
-        self.suggestions = tuple(near[:1 if allowed is None else _SUGGESTIONS])
+        self.suggestions = tuple(near[:1 if allowed is None else SUGGESTIONS])
         self.suggestion = self.suggestions[0] if near else None
         hint = f"; did you mean {_either(self.suggestions)}?" if near else ""
         super().__init__(f"unknown {kind} {_shown(name)}{hint}", allowed=allowed or ", ".join(self.known) or "none")
@@ -208,17 +211,17 @@ def _rebuild(kind: type[InputError], args: tuple[object, ...], state: dict[str, 
 def _nearest(name: str, known: tuple[str, ...]) -> list[str]:
     """Return what is near a name, the nearest first: what begins so, what holds it, what is spelled alike."""
     asked = _letters(name)
-    if not 0 < len(asked) < _LONGEST_NAME:
+    if not 0 < len(asked) < LONGEST_NAME:
         return []
     scores: dict[str, float] = {}
     for one in known:
         letters = _letters(str(one))
         parts = (letters, *map(_letters, str(one).replace("-", ".").split(".")))
-        if len(asked) > 2 and asked in letters:
-            scores[one] = (3.0 if letters.startswith(asked) else 2.0) + len(asked) / len(letters)
+        if len(asked) >= FEWEST_LETTERS and asked in letters:
+            scores[one] = (BEGINS if letters.startswith(asked) else HOLDS) + len(asked) / len(letters)
         else:
             scores[one] = max(difflib.SequenceMatcher(None, part, asked).ratio() for part in parts)
-    return sorted((one for one in scores if scores[one] >= _NEAR), key=lambda one: -scores[one])
+    return sorted((one for one in scores if scores[one] >= NEAR), key=lambda one: -scores[one])
 
 
 def _letters(name: str) -> str:
@@ -232,4 +235,4 @@ def _either(names: tuple[str, ...]) -> str:
 
 def _shown(value: object) -> str:
     text = repr(value)
-    return text if len(text) <= 120 else text[:117] + "..."
+    return text if len(text) <= LONGEST_SHOWN else text[:LONGEST_SHOWN - 3] + "..."

@@ -29,14 +29,14 @@ from servotwin.units import si_unit
 
 Value = float | tuple[float, ...] | str
 KINDS = ("analog", "digital", "bus")
-_USUAL = {  # what people call it -> its name
+USUAL_NAMES = {  # what people call it -> its name
     "voltage": "supply.open_circuit_voltage", "supply_voltage": "supply.open_circuit_voltage",
     "resistance": "motor.armature_resistance", "inductance": "motor.armature_inductance",
     "inertia": "motor.rotor_inertia", "viscous_friction": "motor.motor_viscous_friction",
     "ratio": "gear.gear_reduction", "gear_ratio": "gear.gear_reduction", "reduction": "gear.gear_reduction",
     "play": "gear.backlash", "coulomb_torque": "friction.coulomb_torque_forward",
     "dead_band": "electronics.deadband", "frame": "electronics.frame_period", "gain": "electronics.stretcher_gain"}
-_PLACES = {f"{group}.{f.name}": (group, f.name) for group, kind in GROUPS.items() for f in fields(kind)}
+PLACES = {f"{group}.{f.name}": (group, f.name) for group, kind in GROUPS.items() for f in fields(kind)}
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -135,7 +135,7 @@ class Servo:
 
     def names(self) -> tuple[str, ...]:
         """Return the dotted names of all values that are given, in the order of the groups."""
-        return tuple(name for name, (group, key) in _PLACES.items() if getattr(getattr(self, group), key) is not None)
+        return tuple(name for name, (group, key) in PLACES.items() if getattr(getattr(self, group), key) is not None)
 
     def get(self, name: str) -> Value | None:
         """Return a value (SI) by its dotted name, None where it is absent.
@@ -311,14 +311,14 @@ def check_name(name: str) -> tuple[str, str]:
     >>> check_name("motor.rotor_inertia")
     ('motor', 'rotor_inertia')
     """
-    place = _PLACES.get(name)
+    place = PLACES.get(name)
     if place is None:
         group, _, key = str(name).partition(".")
-        meant = _USUAL.get(key or group)
+        meant = USUAL_NAMES.get(key or group)
         if group in GROUPS:
-            near = [n for n in _PLACES if n.startswith(f"{group}.")]
+            near = [n for n in PLACES if n.startswith(f"{group}.")]
             raise UnknownNameError("parameter", name, near, meant=meant if meant in near else None)
-        raise UnknownNameError("parameter", name, _PLACES, meant=meant,
+        raise UnknownNameError("parameter", name, PLACES, meant=meant,
                                allowed=f"GROUP.NAME, with a group of {', '.join(GROUPS)}")
     return place
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from servotwin import errors
 from servotwin.parameters import GROUPS
+from servotwin.parameters.servo import PLACES, USUAL_NAMES
 from servotwin.simulation.bus_supply import MODEL_NAMES
 
 ONLY_WITH_SERVER = "only with the server: servotwin web"
@@ -22,6 +24,10 @@ WORDS = {
     "types": {"number": "float", "whole": "int", "string": "str", "boolean": "bool", "array": "list", "object": "dict"},
     "digits": 6, "smallest": -4,
     "known": {"parameter": "GROUP.NAME, with a group of " + ", ".join(GROUPS)},
+    "places": {"parameter": tuple(PLACES)}, "groups": {"parameter": tuple(GROUPS)}, "usual": {"parameter": USUAL_NAMES},
+    "near": {"least": errors.NEAR, "longest": errors.LONGEST_NAME, "suggestions": errors.SUGGESTIONS,
+             "letters": errors.FEWEST_LETTERS, "begins": errors.BEGINS, "holds": errors.HOLDS},
+    "none": "none", "longest": errors.LONGEST_SHOWN, "dots": "...",
     "stands": "the bench stands: ",
     "too_long": "motion: got 'one that takes too long to compute at t = {time} s', allowed: numbers of a servo that is "
                 "not so fast, and a new beginning",
@@ -41,7 +47,7 @@ WORDS = {
     "no_inertia": "gear.backlash: got {got}, allowed: play only with inertia behind it: gear.output_inertia, or a load "
                   "that has some",
     "frame_rate": "frame rate: got {got}, allowed: frames that a pulse fits into",
-    "unknown_register": "unknown register of {label} {name}: allowed: the name of a register, such as {such}",
+    "a_register": "the name of a register, such as {such}",
     "no_servo_file": "servo file: got {got}, allowed: a file of a servo of the catalog with its parameters; the "
                      "server's page (servotwin web) reads any",
     "no_mystery_file": "servo file of a mystery servo: allowed: none: find out what it is",

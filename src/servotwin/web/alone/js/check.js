@@ -1,5 +1,7 @@
 // The rules of what may be said, and the words of what is refused.
 
+import { nearest } from "./near.js";
+
 export class Refused extends Error {}
 
 /** @typedef {Record<string, any>} Rule see `rules.py` of the package, which goes by the same tables */
@@ -21,6 +23,12 @@ export function shown(value) {
   return (small ? value.toExponential() : String(value)).replace(/e([+-])(\d)$/, "e$10$2");
 }
 
+/** @param {any} value @returns {string} the beginning of what is long */
+function brief(value) {
+  const text = shown(value);
+  return text.length > words.longest ? text.slice(0, words.longest - words.dots.length) + words.dots : text;
+}
+
 /**
  * Refuse in three parts: what was looked at, what was got, what is allowed.
  * @param {string} what
@@ -29,7 +37,7 @@ export function shown(value) {
  * @returns {never}
  */
 export function wrong(what, got, allowed) {
-  throw new Refused(`${what}${got === null || got === undefined ? ":" : `: got ${shown(got)},`} allowed: ${allowed}`);
+  throw new Refused(`${what}${got === null || got === undefined ? ":" : `: got ${brief(got)},`} allowed: ${allowed}`);
 }
 
 /**
@@ -37,9 +45,21 @@ export function wrong(what, got, allowed) {
  * @param {string} kind
  * @param {string} name
  * @param {string[]} known
+ * @param {string} [said] of what is allowed, instead of all that is known
  * @returns {never}
  */
-export function unknown(kind, name, known) { throw new Refused(`unknown ${kind} ${shown(name)}: allowed: ${words.known[kind] ?? known.join(", ")}`); }
+export function unknown(kind, name, known, said = words.known[kind]) {
+  const group = name.split(".", 1)[0];
+  const grouped = words.groups[kind]?.includes(group);
+  const of = (words.places[kind] ?? known).filter((/** @type {string} */ one) => !grouped || one.startsWith(`${group}.`));
+  const allowed = grouped ? undefined : said;
+  const usual = words.usual[kind]?.[name.slice(group.length + 1) || group];
+  const meant = usual && of.includes(usual) ? [usual] : [];
+  const near = [...meant, ...nearest(words.near, name, of).filter((one) => !meant.includes(one))].slice(0, allowed ? words.near.suggestions : 1).map(shown);
+  const last = near.pop();
+  const hint = last ? `; did you mean ${near.length ? `${near.join(", ")} or ${last}` : last}?` : "";
+  throw new Refused(`unknown ${kind} ${brief(name)}${hint}: allowed: ${allowed ?? (of.join(", ") || words.none)}`);
+}
 
 /**
  * Refuse with a message of the table.

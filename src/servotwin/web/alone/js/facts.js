@@ -110,7 +110,7 @@ export class Servo {
   unwritten(name) {
     const { label, names } = this.known.family;
     if (names.includes(name)) return refuse("only_with_server");
-    throw new Refused(filled(this.world.words.unknown_register, { label, name: shown(name), such: names[0] }));
+    return unknown(`register of ${label}`, name, names, filled(this.world.words.a_register, { such: names[0] }));
   }
 
   /** @returns {any} the spring that its loop is: of a servo whose registers were written its stiffness alone, of one with other numbers nothing is said */
