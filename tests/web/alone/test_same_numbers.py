@@ -54,7 +54,7 @@ def test_texts_are_refused_in_the_same_words(folder):
         'actions = [[0, "command", {shape = "recorded", unit = "us", time = [0, 1], value = [1]}]]',
         'lesson = {title = 3}', 'other = 3', 'load = 3', 'frame_rat = 50', 'load = {inerta = 1}',
         'actions = [[0, "comand", {}]]', 'actions = [[0, "command", {shape = "hld"}]]')]
-    texts += [f'format = 1\nservo = [{{id = "hitec-hs-755hb", model = "{name}"}}]\n' for name in ("pulse", "Bound", "D")]
+    texts += [f'format = 1\nservo = [{{id = "hitec-hs-755hb", model = "{name}"}}]\n' for name in ("pulse", "Bound")]
     texts += ['format = 2\nservo = [{id = "x"}]', 'format = 1', 'format = 1\nservo = [{}]',
               'format = 1\nservo = [{id = "a", mystery = 3}]', 'format = 1\nservo = [{id = "a", of = 3}]',
               'format = 1\nservo = [{id = "a", model = "Servo"}]', 'format = 1\nservo = [{id = 3}]']
