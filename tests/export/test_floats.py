@@ -92,6 +92,51 @@ int main(void) {
 
 
 @needs_compiler
+@pytest.mark.parametrize("period", [1e-3, 9e-4])  # a float that is longer, and one that is shorter
+def test_ticks_stay_where_they_are(tmp_path, period):
+    """Goals at ticks of a servo on a bus are heard by the same ticks as in doubles, half a minute later too."""
+    model = st.DigitalServo(model_of("on a bus", 0).servo.replace({"firmware.control_period": period}))
+    text = r"""
+#include <math.h>
+#include <stdio.h>
+#include "servo.h"
+int main(void) {
+    servo_state servo;
+    servo_signals now;
+    double before = 0.0;
+    servo_init(&servo, &servo_table, 0, 0);
+    for (int k = 1; k <= 30000; k++) {
+        const int turns = k / 777;
+        const REAL goal = (REAL)0.2 * (REAL)(turns % 2);
+        servo_advance(&servo, &servo_table, PERIOD * k, goal, 0, NULL);
+        servo_observe(&servo, &servo_table, goal, 0, &now);
+        if (fabs((double)now.goal_angle - before) > 0.1)
+            printf("%d ", k);
+        before = (double)now.goal_angle;
+    }
+#ifdef FLOATS
+    fprintf(stderr, "%.9g", remainder(servo.begun / PERIOD, 1.0));
+#endif
+    return 0;
+}
+"""
+    heard = {}
+    for dtype, real in (("float32", "float"), ("float64", "double")):
+        folder = tmp_path / dtype
+        export.c(model, name="servo", dtype=dtype).write(folder)
+        (folder / "ticks.c").write_text(text)
+        subprocess.run([COMPILER, f"-DREAL={real}", f"-DPERIOD={period}", "-O1", *["-DFLOATS"] * (real == "float"),
+                        "-I", str(folder), str(folder / "ticks.c"), str(folder / "servo.c"), "-lm",
+                        "-o", str(folder / "ticks")], check=True)
+        done = subprocess.run([str(folder / "ticks")], capture_output=True, text=True, check=True)
+        heard[dtype] = done.stdout.split()
+        if real == "float":
+            assert abs(float(done.stderr)) < 1e-6  # of a tick
+    assert len(heard["float64"]) > 30
+    assert heard["float32"] == heard["float64"]
+
+
+@needs_compiler
 def test_what_is_no_number_changes_nothing(tmp_path):
     export.c(model_of("on a bus", 0), name="servo", dtype="float32").write(tmp_path)
     (tmp_path / "odd.c").write_text(r"""
