@@ -1,6 +1,6 @@
 // The servos of a bench: what is given of them, what the panels show of them, and between what commands may be.
 
-import { Refused, filled, refuse, shown, tidy, unknown, within, wrong } from "./check.js";
+import { Refused, filled, refuse, tidy, unknown, within, wrong } from "./check.js";
 import { readServo } from "./servo_file.js";
 
 /** @typedef {{time: number, kind: string, value: any, servo: number|null}} Action */
