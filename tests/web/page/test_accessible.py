@@ -94,6 +94,7 @@ def test_tab_reaches_every_control_there_and_back_and_shows_where_it_is(page):
     page.get_by_role("button", name="Pause").click()
     page.get_by_role("button", name="Run").wait_for()
     page.evaluate(OPEN_ALL)
+    page.locator(".pick select").first.wait_for()  # the catalog comes later than the bench
     wanted = page.evaluate(f"""() => {{ window.order = []; document.addEventListener('focusin', (event) => {{
             const style = getComputedStyle(event.target);
             window.order.push([event.target, event.target.matches(':focus-visible') && style.outlineStyle === 'solid'
