@@ -48,11 +48,21 @@ def test_programs_in_c(page, tmp_path):
 SERVES = ("$ servotwin web", "$ servotwin wire")  # until they are interrupted: tests/web and tests/wire run them
 
 
+def consoles():
+    """The commands of each block."""
+    return [[line[2:] for line in re.sub(r"\\\n\s*", "", block.code).splitlines()
+             if line.startswith("$ servotwin ") and not line.startswith(SERVES)]
+            for page in PAGES for block in blocks(page, "console")]
+
+
 def commands():
-    return list(dict.fromkeys(
-        line[2:] for page in PAGES for block in blocks(page, "console")
-        for line in re.sub(r"\\\n\s*", "", block.code).splitlines()
-        if line.startswith("$ servotwin ") and not line.startswith(SERVES)))
+    return list(dict.fromkeys(line for lines in consoles() for line in lines))
+
+
+def makers(line):
+    """The commands above one, in its block, that write a file which it reads."""
+    above = next(lines[:lines.index(line)] for lines in consoles() if line in lines)
+    return [one for one in above if "--out " in one and one.split("--out ")[1].split()[0] in line.split()]
 
 
 @pytest.fixture(scope="module")
@@ -71,9 +81,10 @@ def folder(tmp_path_factory):
 @pytest.mark.slow
 @pytest.mark.parametrize("line", commands())
 def test_command_line(line, folder):
-    words = [sys.executable, "-m", *shlex.split(line), *(["--force"] if "--plot" in line or "--out" in line else [])]
-    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    for one in (*makers(line), line):
+        words = [sys.executable, "-m", *shlex.split(one), *(["--force"] if "--plot" in one or "--out" in one else [])]
+        done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
 
 
 def test_the_pages_are_found():
