@@ -1,4 +1,4 @@
-"""An exported servo in floats: it moves as in doubles, by the same events, and no number in it is a double."""
+"""An exported servo in floats: it moves as in doubles, and nothing but times is a double."""
 
 import shutil
 import subprocess
