@@ -83,7 +83,7 @@ BOTH = {  # what server and page refuse
 SERVER_ONLY = (GOOD.replace(",", ";"), "# by hand\n" + GOOD, GOOD.replace("output_angle_deg", "pos [deg]"),
                GOOD.replace("90", '"90"'))
 DOUBTFUL = (GOOD.replace("0,1500", "0,0", 1), HEAD + "".join(f"{k},1500,9{k}\n" for k in range(9)) + "9,15,99\n",
-            HEAD + "0,1500,980\n1,1500,1.020\n2,1500,1.400\n")  # no pulse, a torn row, thousands: mended, or asked about
+            HEAD + "0,1500,980\n1,1500,1.020\n2,1500,1.400\n")  # no pulse, a torn row, thousands: to be asked about
 
 
 def test_what_is_no_plain_log_is_refused_in_a_line(folder, tmp_path):
