@@ -9,10 +9,10 @@ from servotwin.models.engine.dynamics.coefficients import (
     linear_coefficients,
     speed_coefficients,
 )
-from servotwin.models.engine.dynamics.rates import jacobian
 from servotwin.models.engine.events.guards import creeping
 from servotwin.models.engine.motions import (
     dormand_prince,
+    kinks,
     rodas,
     stribeck,
     two_mass_series,
@@ -39,6 +39,7 @@ from servotwin.models.engine.motions.motion import (
     WITH_CURRENT,
     Motion,
     closed,
+    jacobian_at,
     moved,
     output_apart,
     period,
@@ -77,7 +78,7 @@ from servotwin.models.terms.dependence import (
 )
 from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.elementary import power
-from servotwin.physics.pieces import Piece, piece_rate, piece_value
+from servotwin.physics.pieces import Piece, piece_value
 
 _WITH_HEAT = ON_HEAT | ON_I | BY_SHARE | TWO_BODIES | FADING  # what may be asked of a step beside the straight law
 _TOLERANCE = 0.3  # error of one implicit step, relative to 1 + |state|: a part of the accuracy asked for
@@ -158,7 +159,7 @@ def may_depend(numbers: Numbers, u: Piece) -> int:
 
 def _integrated(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
                 limit: float, accuracy: float) -> Motion:
-    jac = jacobian(numbers, mode, piece_value(u, t0), piece_rate(u, t0), piece_rate(tau, t0), y.q, y.w)
+    jac = jacobian_at(numbers, mode, u, tau, t0, y)
     h = min(step, limit)
     h = min(h, period(u, tau, t0, t0 + h) / 6.0)
     for _ in range(60):
@@ -190,8 +191,11 @@ def _long_step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y:
         if not size < 1e12:
             size = 1e12
         factor = min(6.0, max(0.15, 0.9 * power(size, -0.125))) if size > 0.0 else 6.0
-        part = stribeck.part_before(numbers, mode, y, y1) if size <= 1.0 else factor
-        if part == 1.0:
+        part = factor if size > 1.0 else min(
+            stribeck.part_before(numbers, mode, y, y1),
+            kinks.part_before(numbers, mode, (piece_value(u, t0), piece_value(u, t0 + h)),
+                              (piece_value(tau, t0), piece_value(tau, t0 + h)), y, y1))
+        if size <= 1.0 and (part == 1.0 or t0 + h * part == t0):
             following = max(step, h * factor) if h == most else h * factor  # a step that was cut short tells little
             return Motion(LONG_STEP, numbers, mode, u, tau, t0, y, h, NO_COEFFICIENTS, (0.0, 0.0), y1, following,
                           -1, False, NO_STAGES, NO_DENSE, NO_LONG_DENSE)

@@ -12,7 +12,7 @@ from servotwin.models.engine.dynamics.coefficients import (
     apart_coefficients,
     current_of,
 )
-from servotwin.models.engine.dynamics.rates import rates_of
+from servotwin.models.engine.dynamics.rates import jacobian, rates_of
 from servotwin.models.engine.motions import (
     dormand_prince,
     first_order,
@@ -35,7 +35,7 @@ from servotwin.models.state.modes import (
 from servotwin.models.terms import elastic, play
 from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.elementary import expm1
-from servotwin.physics.pieces import Piece, piece_value
+from servotwin.physics.pieces import Piece, piece_rate, piece_value
 
 # Kinds of motion. IMPOSSIBLE: no step is short enough for the tolerance.
 (REST, FIRST_ORDER, SECOND_ORDER, WITH_CURRENT, HELD, SERIES, STEP, LONG_STEP, CREEP, APART, PAIR,
@@ -194,11 +194,21 @@ def state(motion: Motion, s: float) -> Vector:
 
 def ended(motion: Motion, s: float) -> Vector:
     """Return the state at s after the anchor where a motion ends: what is only interpolated there is followed anew."""
+    if motion.kind == LONG_STEP and 0.0 < s < motion.length:
+        return dormand_prince.step(motion.numbers, motion.mode, motion.u, motion.tau, motion.t0, motion.start, s)[0]
+    if motion.kind == STEP and 0.0 < s < motion.length:
+        numbers, mode, u, tau, t0, y = motion.numbers, motion.mode, motion.u, motion.tau, motion.t0, motion.start
+        return rodas.step(numbers, mode, u, tau, jacobian_at(numbers, mode, u, tau, t0, y), t0, y, s)[0]
     if motion.kind != WARMING or not s > 0.0:
         return state(motion, s)
     found = _warm_step(motion, s)
     return warm_linear.state(motion.numbers, motion.mode, motion.start, (motion.against[0], motion.against[1]),
                              found.dense, s, s)
+
+
+def jacobian_at(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t: float, y: Vector) -> tuple[float, ...]:
+    """Return how the rates of a state change with it and with time."""
+    return jacobian(numbers, mode, piece_value(u, t), piece_rate(u, t), piece_rate(tau, t), y.q, y.w)
 
 
 def moved(motion: Motion, q: float, w: float, i: float) -> Vector:
