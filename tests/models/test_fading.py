@@ -40,8 +40,10 @@ def test_a_step_in_time_sees_friction_fade(servo, case):
         model, commands, duration=1.0, load=load if spring is None else load + spring, parameters=parameters,
         output_times=np.linspace(0.05, 1.0, 20), accuracy=accuracy)["output_angle"] for accuracy in (1e-9, 1e-12)]
     errors = np.abs(angles[0] - angles[1]).max(axis=1)
-    assert np.max(errors) < 1e-8
+    assert np.max(errors) < 1e-8  # what play's impacts make of it
     assert np.sum(errors > 1e-9) <= 0.02 * LANES
+    if spring is not None:  # a torque through the gear that changed its sign within a step made it 1.1e-9 rad
+        assert np.max(errors) < 1e-10
 
 
 @pytest.mark.slow
