@@ -154,7 +154,9 @@ class CommandWords:
             "prbs": ("LOW", "HIGH", "BIT_SECONDS"),
         }
         shape = self.shape
-        return numbers(f"--{shape}", getattr(self, shape), forms[shape]) if shape in forms else []
+        if shape not in forms:
+            return []
+        return numbers(f"--{shape}", getattr(self, shape), forms[shape], alone="numbers, in the unit of --unit")
 
 
 def _pulses(path: Path) -> Signal:

@@ -9,7 +9,8 @@ from servotwin.errors import InputError
 from servotwin.tables import read_table
 
 
-def numbers(what: str, text: str, names: tuple[str, ...], *, required: int | None = None) -> list[float]:
+def numbers(what: str, text: str, names: tuple[str, ...], *, required: int | None = None,
+            alone: str = "numbers alone") -> list[float]:
     """Return the numbers of a text such as ``"0:180"``.
 
     Parameters
@@ -22,6 +23,8 @@ def numbers(what: str, text: str, names: tuple[str, ...], *, required: int | Non
         What each number is.
     required : int, optional
         How many must be there; all unless given.
+    alone : str
+        What is allowed where several are asked for: where their unit is said.
 
     Raises
     ------
@@ -41,7 +44,7 @@ def numbers(what: str, text: str, names: tuple[str, ...], *, required: int | Non
     except ValueError:
         values = []
     if not least <= len(values) <= len(names):
-        raise InputError(what, got=text, allowed=f"{form}, with numbers" if len(names) > 1 else "a number")
+        raise InputError(what, got=text, allowed=f"{form}, {alone}" if len(names) > 1 else "a number alone")
     return values
 
 
