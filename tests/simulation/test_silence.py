@@ -62,7 +62,7 @@ def test_before_the_first_pulse(off, silence):
 def test_each_stretch_is_that_of_a_servo_with_that_off_state(off, silence, feature):
     """A run in pieces: with the bridge of one word where pulses come, of the other where they stay away."""
     model, load = servo(off, silence, feature), st.loads.Pendulum(mass=0.3, length=0.05)
-    sim = st.Simulator(model, load=load)
+    sim = st.Simulator(model, load=load, accuracy=1e-11)
     whole = state = sim.initial(TRAIN, {"output_angle": 0.5, "output_speed": 4.0})
     cuts = [0.0, *(t for stretch in SILENCE for t in stretch if t > 0.0)]
     for start, end in pairwise(cuts):

@@ -36,7 +36,7 @@ def test_momentum_is_kept_where_the_flanks_meet(terms):
             assert (before[6] - before[1]) * (before[5] - before[0]) >= 0.0  # closing
             assert after[1] == after[6]
             assert P.J * after[1] == pytest.approx(P.J_L * before[1] + P.J_m * before[6], rel=1e-11, abs=1e-13)
-            assert after[2:5] == pytest.approx(before[2:5], rel=1e-13, abs=1e-15)  # current and temperatures go on
+            assert after[2:5] == pytest.approx(before[2:5], rel=1e-12, abs=1e-15)  # current and temperatures go on
             assert P.J * after[1] ** 2 <= P.J_L * before[1] ** 2 + P.J_m * before[6] ** 2 + 1e-15
     assert impacts > 15
 

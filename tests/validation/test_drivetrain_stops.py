@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from servotwin.models.engine.motions.motion import prepared, state
+from servotwin.models.engine.motions.motion import ended, prepared, state
 from validation.test_drivetrain_armature import LOCKED, N, driven, undriven
 from validation.test_drivetrain_reference import simulate
 
@@ -26,7 +26,8 @@ def around(result, kind):
     pairs = {b.start: (a, b) for a, b in itertools.pairwise(segments) if b.anchor == b.start}
     count = Counter(event.time for event in result.events)
     times = [event.time for event in result.events if event.kind == kind and count[event.time] == 1]
-    return [tuple(state(prepared(s.motion), t - s.anchor) for s in pairs[t]) for t in times if t in pairs]
+    return [(ended(prepared(a.motion), b.start - a.anchor), state(b.motion, 0.0))
+            for a, b in (pairs[t] for t in times if t in pairs)]
 
 
 def kinetic(y):
