@@ -18,6 +18,8 @@ from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.physics.load_friction import torque_on_gear
 
 _CLOSE = 1e-6  # of a step: a kink that close to one of its ends is at that end
+_NOTHING = 1e-12  # of the torques: less than that has no sign
+IN_FLOATS = {"_CLOSE": 1e-3, "_NOTHING": 1e-5}
 
 
 def part_before(numbers: Numbers, mode: Mode, u: tuple[float, float], tau: tuple[float, float], before: Vector,
@@ -31,11 +33,12 @@ def part_before(numbers: Numbers, mode: Mode, u: tuple[float, float], tau: tuple
     own = numbers.friction
     m_0, e_0 = _through_gear(numbers, mode, u[0], tau[0], before)
     m_1, e_1 = _through_gear(numbers, mode, u[1], tau[1], after)
-    part = _part(share(own, m_0, e_0), share(own, m_1, e_1))
+    none = _NOTHING * (abs(m_0) + abs(e_0) + abs(m_1) + abs(e_1))
+    part = _part(share(own, m_0, e_0), share(own, m_1, e_1), none)
     if creeping(numbers, mode, before) or creeping(numbers, mode, after):
-        part = min(part, _part(static_share(own, m_0, e_0), static_share(own, m_1, e_1)))
+        part = min(part, _part(static_share(own, m_0, e_0), static_share(own, m_1, e_1), none))
         if _is_quadratic(own):
-            part = min(part, _part(e_0, e_1), _part(m_0 + e_0, m_1 + e_1))
+            part = min(part, _part(e_0, e_1, none), _part(m_0 + e_0, m_1 + e_1, none))
     return part
 
 
@@ -43,9 +46,9 @@ def _is_quadratic(friction: Friction) -> bool:
     return friction.K_mq > 0.0 or friction.K_eq > 0.0
 
 
-def _part(begin: float, end: float) -> float:
+def _part(begin: float, end: float, none: float) -> float:
     """Return the part of a step after which a torque changes its sign that goes from one value to another."""
-    if not (begin < 0.0 < end or end < 0.0 < begin):
+    if not ((begin < -none and end > none) or (end < -none and begin > none)):
         return 1.0
     part = begin / (begin - end)
     return part if _CLOSE < part < 1.0 - _CLOSE else 1.0
