@@ -94,5 +94,7 @@ def _kinetic(plant: Numbers, trajectory: Trajectory) -> tuple[float, float]:
 
     for k in range(1, len(segments)):
         if segments[k].anchor == segments[k].start:
-            lost += stored(k - 1, segments[k - 1].end) - stored(k, segments[k].start)
+            before = segments[k - 1]
+            met = motion.ended(motion.prepared(before.motion), before.end - before.anchor)
+            lost += stored_energy(plant, met) - stored(k, segments[k].start)
     return stored(len(segments) - 1, segments[-1].end) - stored(0, segments[0].start), lost
