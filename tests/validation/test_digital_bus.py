@@ -36,7 +36,7 @@ QUICK = {
 LONG = {
     **{f"{n} of {kind}, {R_b} Ohm{', warm' * hot}": (
         fleet(10 * n + k, n, R_b, names=(kind,), changes=changes, unlike=bool(k % 2), duration=duration, hot=hot), call)
-       for n, duration in ((2, 0.5), (6, 0.2), (14, 0.1))
+       for n, duration in ((2, 0.3), (6, 0.12), (14, 0.06))
        for k, (kind, R_b, changes, call, hot) in enumerate([
            ("12 V", 0.05, {}, 2e-2, False), ("12 V", 0.5, FREE, 2e-3, False), ("12 V, LeRobot", 0.2, {}, 1e-3, False),
            ("12 V, LeRobot", 0.5, FREE, 2e-2, False), ("12 V", 0.3, FREE, 2e-2, True), ("12 V", 0.5, {}, 2e-3, True)])},

@@ -20,7 +20,7 @@ from validation.test_drivetrain_reference import COARSE, on_a_knife_edge, simula
 ALL = {"inductance", "heat", "m6", "stribeck", "backlash", "limit", "coast", "wiper"}
 LAWS = ({"heat"}, {"inductance", "heat"}, {"inductance", "m5"}, {"inductance", "heat", "m5", "coast"}, ALL)
 ACCURACIES = (1e-7, 1e-9, 1e-11)
-FEW, MANY = 5, 20
+FEW, MANY = 5, 12
 SHORT, LONG = 0.05, 0.2  # s
 FLOOR = 3e-11  # where a servo that sticks and creeps again and again is led by rounding, at any accuracy
 

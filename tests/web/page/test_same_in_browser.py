@@ -18,13 +18,13 @@ IN_PAGE = """async ([text, jobs]) => {
 }"""
 
 
-def test_two_hundred_benches_in_the_browser(opened, bench_file):
+def test_sixty_benches_in_the_browser(opened, bench_file):
     page = opened(bench_file)
     page.evaluate("bench.ask({run: false})")
 
     def benches(jobs):
         return json.loads(page.evaluate(IN_PAGE, [PLAY.read_text(), jobs]))
 
-    refused, moved = compare(benches, range(2000, 2200))
-    assert refused > 100
-    assert moved > 150
+    refused, moved = compare(benches, range(2000, 2060))
+    assert refused > 30
+    assert moved > 45
