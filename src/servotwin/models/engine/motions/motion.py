@@ -103,7 +103,7 @@ def by_series(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: 
 
 def by_step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, length: float,
             dense: tuple[Vector, ...], end: Vector) -> Motion:
-    """Return a motion whose dense output is given."""
+    """Return a motion whose dense output is given: all that is known of it, with no step to follow."""
     return Motion(LONG_STEP, numbers, mode, u, tau, t0, y, length, NO_COEFFICIENTS, (0.0, 0.0), end, 0.0, -1, True,
                   NO_STAGES, NO_DENSE, dense)
 
@@ -194,7 +194,7 @@ def state(motion: Motion, s: float) -> Vector:
 
 def ended(motion: Motion, s: float) -> Vector:
     """Return the state at s after the anchor where a motion ends: what is only interpolated there is followed anew."""
-    if motion.kind == LONG_STEP and 0.0 < s < motion.length:
+    if motion.kind == LONG_STEP and 0.0 < s < motion.length and motion.next_step > 0.0:  # else what is given is all
         return dormand_prince.step(motion.numbers, motion.mode, motion.u, motion.tau, motion.t0, motion.start, s)[0]
     if motion.kind == STEP and 0.0 < s < motion.length:
         numbers, mode, u, tau, t0, y = motion.numbers, motion.mode, motion.u, motion.tau, motion.t0, motion.start
