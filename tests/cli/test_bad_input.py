@@ -62,7 +62,7 @@ def test_servos(cli, tmp_path, words, said):
     (["--step", "0:nan"], "step(after): got nan"),
     (["--step", "inf:0"], "step(before): got inf"),
     (["--step", "0"], "--step: got '0', allowed: BEFORE:AFTER"),
-    (["--step", "0us:90us"], "numbers, in the unit of --unit"),
+    (["--step", "0us:90us"], "numbers alone; --unit says the unit"),
     (["--step", "0:1:2"], "--step: got '0:1:2'"),
     (["--step", "a:b"], "--step: got 'a:b'"),
     (["--step", ""], "--step: got ''"),

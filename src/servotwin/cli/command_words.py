@@ -156,7 +156,7 @@ class CommandWords:
         shape = self.shape
         if shape not in forms:
             return []
-        return numbers(f"--{shape}", getattr(self, shape), forms[shape], alone="numbers, in the unit of --unit")
+        return numbers(f"--{shape}", getattr(self, shape), forms[shape], alone="numbers alone; --unit says the unit")
 
 
 def _pulses(path: Path) -> Signal:

@@ -24,7 +24,7 @@ def numbers(what: str, text: str, names: tuple[str, ...], *, required: int | Non
     required : int, optional
         How many must be there; all unless given.
     alone : str
-        What is allowed where several are asked for: where their unit is said.
+        What is allowed where several numbers are asked for, such as where their unit is said.
 
     Raises
     ------
