@@ -6,6 +6,7 @@ A message is one line made of three parts: what was looked at, what was got, and
 from __future__ import annotations
 
 import difflib
+import re
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -18,6 +19,20 @@ LONGEST_NAME = 200
 LONGEST_SHOWN = 120  # letters of a value in a message
 FEWEST_LETTERS = 3  # that say something where another name holds them
 BEGINS, HOLDS = 3.0, 2.0  # how near such a name is at least
+HIDDEN = re.compile(r"[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u206f\ud800-\udfff\ufff9-\ufffb"
+                    r"\ufffe\uffff]")
+"""What no reader sees of a text: control and bidirectional characters, line ends, halves of characters, none."""
+
+
+def one_line(text: str) -> str:
+    r"""Return a text as one line that shows all of it: control and bidirectional characters as Python writes them.
+
+    Examples
+    --------
+    >>> one_line("two\nlines")
+    'two\\nlines'
+    """
+    return HIDDEN.sub(lambda found: repr(found[0])[1:-1], text)
 
 
 class ServotwinError(Exception):
@@ -58,8 +73,7 @@ class InputError(ServotwinError, ValueError):
             text += f": got {_shown(self.got)}"
         if self.allowed is not None:
             text += f"{',' if self.got is not None else ':'} allowed: {self.allowed}"
-        # What a person named may hold a line end or an escape sequence: a file, a servo, a table.
-        return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+        return one_line(text)  # what a person named may hold a line end or an escape sequence
 
 
 class UnitError(InputError):
@@ -194,7 +208,7 @@ class BenchError(ServotwinError, OSError):
 
     def __str__(self) -> str:
         """Return one line."""
-        return "".join(c if c.isprintable() else repr(c)[1:-1] for c in f"{self.what}: {self.problem}")
+        return one_line(f"{self.what}: {self.problem}")
 
 
 class PlausibilityWarning(UserWarning):

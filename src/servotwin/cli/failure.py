@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
+from servotwin import errors
 from servotwin.cli.interrupts import CODE
 from servotwin.errors import ServotwinError
 
@@ -82,7 +83,7 @@ def one_line(text: str) -> str:
     >>> one_line("two\nlines and a \x00")
     'two lines and a \\x00'
     """
-    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in " ".join(text.split()))
+    line = errors.one_line(" ".join(text.split()))
     half = _LONGEST // 2
     return line if len(line) <= _LONGEST else f"{line[:half]} ... {line[-half:]}"
 

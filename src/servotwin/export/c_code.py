@@ -19,6 +19,7 @@ from servotwin.models import (
 from servotwin.models.engine.memory import ACCURACY
 from servotwin.models.terms import elastic
 from servotwin.simulation.start import accuracy_of
+from servotwin.text import LONGEST_STEM, identifier, is_taken
 
 if TYPE_CHECKING:
 
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 from servotwin.export.c_text import CCode
 from servotwin.export.c_writing import Writing
 
-_NAME = re.compile(r"[a-z][a-z0-9_]*")
+_NAME = re.compile(rf"[a-z][a-z0-9_]{{0,{LONGEST_STEM - 1}}}")
 _KNOWN = (AveragedServo, AveragedServoInductive, BoundedServo, PulseServo, PulseServoInductive, DigitalServo)
 _IN_FLOATS, _FINEST_IN_FLOATS = 1e-5, 1e-6  # rad: accuracy unless another is asked for, and what rounding allows
 
@@ -80,9 +81,10 @@ def c(model: Model, load: Load | Part | None = None, *, name: str | None = None,
     if hung.recorded:
         raise InputError("export c", got="a recorded torque", allowed="loads without one: torque is told at each call")
     floats = _checked_floats(dtype, model, hung, accuracy=accuracy, parameters=parameters)
-    name = re.sub(r"\W", "_", model.servo.name.lower()) if name is None else name
-    if not isinstance(name, str) or not _NAME.fullmatch(name):
-        raise InputError("export c: name", got=name, allowed="small letters, digits and _, a letter first")
+    name = identifier(model.servo.name) if name is None else name
+    if not isinstance(name, str) or not _NAME.fullmatch(name) or is_taken(name):
+        raise InputError("export c: name", got=name, allowed="small letters, digits and _, a letter first, at most "
+                         f"{LONGEST_STEM}, and not the name of a header such as math")
     accuracy = accuracy_of((_IN_FLOATS if floats else ACCURACY) if accuracy is None else accuracy)
     return Writing(model, hung, name, accuracy, makes=parameters, floats=floats).code()
 

@@ -38,6 +38,7 @@ from servotwin.physics.pieces import Piece
 from servotwin.simulation.compile.kinds import FLOAT64, INT64, Array, Kind, Record, Tuple
 from servotwin.simulation.compile.signatures import named
 from servotwin.simulation.compile.standalone import Standalone
+from servotwin.text import c_comment
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -80,9 +81,10 @@ class Writing:
         recipe = replace(recipe_of(flags), in_floats=self._floats)
         names = text.add(recipe, _signatures())
         made = making(text, recipe, self._model, self._load, self._alone, name=self._name) if self._makes else ""
+        servo = c_comment(self._model.servo.name)
         shared = {
-            "name": self._name, "guard": self._name.upper(), "version": __version__, "id": self._model.servo.name,
-            "title": f"{self._name}: {self._model.servo.name} as a {type(self._model).__name__}.",
+            "name": self._name, "guard": self._name.upper(), "version": __version__, "id": servo,
+            "title": f"{self._name}: {servo} as a {type(self._model).__name__}.",
             "real": text.typed("double"), "zero": "state->begun + " if self._floats else "",
             "begun": "state->seed = seed, state->begun = 0.0;" if self._floats else "state->seed = seed;",
             "digits": _NEARLY if self._floats else _SAME}

@@ -29,6 +29,7 @@ from servotwin.export.fmu_xml import build_description, description
 from servotwin.loads import as_load
 from servotwin.models.engine.memory import ACCURACY
 from servotwin.parameters.output_file import write_file
+from servotwin.text import shown
 
 if TYPE_CHECKING:
     from servotwin.loads import Load, Part
@@ -121,7 +122,7 @@ def fmu(model: Model, load: Load | Part | None = None, *, fmi: str = "2.0", name
              "model.h": model_header(code.name, token, variables, frames=_frames(model)),
              **{each: _text(each) for each in ("component.h", "component.c", *_TEXTS[fmi])}}
     compiled = [each for each in texts if each.endswith(".c")]
-    title = f"{model.servo.name} as a {type(model).__name__}"
+    title = f"{shown(model.servo.name)} as a {type(model).__name__}"
     contents = {"modelDescription.xml": description(fmi, name=code.name, title=title, token=token, variables=variables,
                                                     sources=compiled, step=_STEP)}
     contents |= {f"sources/{each}": text.encode() for each, text in texts.items()}

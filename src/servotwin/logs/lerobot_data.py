@@ -12,6 +12,7 @@ huggingface/lerobot). Values of that range are cut off at 100, so positions beyo
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, MissingExtraError
 from servotwin.logs.json_file import read_json
+from servotwin.text import checked_name
 
 ACTION, STATE = "action", "observation.state"
 _INFO = Path("meta") / "info.json"
@@ -161,7 +163,7 @@ def _joints(folder: Path, info: object) -> list[Joint]:
     if not isinstance(features, Mapping) or ACTION not in features or STATE not in features:
         raise InputError(f"{folder / _INFO}: features", allowed=f"among them {ACTION} and {STATE}",
                          got=", ".join(map(str, features)) if isinstance(features, Mapping) else "none")
-    action, state = (_names(features[key]) for key in (ACTION, STATE))
+    action, state = (_names(folder, features[key]) for key in (ACTION, STATE))
     if not action or not state:
         sizes = [_size(features[key]) for key in (ACTION, STATE)]
         if not sizes[0] or sizes[0] != sizes[1]:
@@ -176,11 +178,12 @@ def _joints(folder: Path, info: object) -> list[Joint]:
     return found
 
 
-def _names(feature: object) -> list[str]:
+def _names(folder: Path, feature: object) -> list[str]:
     names = feature.get("names") if isinstance(feature, Mapping) else None
     if isinstance(names, Mapping):  # {"motors": [...]}
         names = next((value for value in names.values() if isinstance(value, list)), None)
-    return [str(name) for name in names] if isinstance(names, list) else []
+    what = f"{folder / _INFO}: name of a joint"
+    return [checked_name(what, str(name), math.inf) for name in names] if isinstance(names, list) else []
 
 
 def _size(feature: object) -> int:

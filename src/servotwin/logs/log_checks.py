@@ -13,6 +13,7 @@ from servotwin.logs.columns import UNITS
 from servotwin.parameters import GROUPS
 from servotwin.parameters.group import AT_LEAST_ONE, FRACTION, NOT_NEGATIVE, POSITIVE
 from servotwin.parameters.servo import check_name, unit_of
+from servotwin.text import LONGEST_FILE_NAME, checked_name
 from servotwin.units import is_finite, is_masked
 
 FEWEST = 3  # samples
@@ -38,6 +39,8 @@ def texts(name: object, motion: object, source: object) -> str:
     for key, value in (("motion", motion), ("source", source)):
         if not isinstance(value, str):
             raise InputError(f"log {name!r}: {key}", got=value, allowed="a text")
+    checked_name("name of a log", name, LONGEST_FILE_NAME)
+    checked_name(f"log {name!r}: motion", str(motion))
     return f"log {name!r}"
 
 

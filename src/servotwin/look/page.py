@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from servotwin.look.words import escape
+from servotwin.text import escape
 
 STYLE = """
 :root{color-scheme:light;--ink:#1b1f24;--soft:#57606a;--line:#d0d7de;--wash:#f6f8fa;--blue:#0072b2}

@@ -8,6 +8,8 @@ import math
 import re
 from collections.abc import Sequence
 
+from servotwin.text import escape
+
 MINUS, TIMES = "−", "×"
 _SMALL, _LARGE = 1e-3, 1e5
 
@@ -71,7 +73,7 @@ def picture(svg: bytes | str, words: str, *, style: str = "", kind: str = "") ->
     """Return an SVG picture inside the page itself: one file, and no names that could collide."""
     data = base64.b64encode(svg.encode() if isinstance(svg, str) else svg).decode("ascii")
     attributes = (f' class="{kind}"' if kind else "") + (f' style="{style}"' if style else "")
-    return f'<img{attributes} alt="{html.escape(plain(words))}" src="data:image/svg+xml;base64,{data}">'
+    return f'<img{attributes} alt="{escape(plain(words))}" src="data:image/svg+xml;base64,{data}">'
 
 
 def plain(text: str) -> str:
@@ -83,8 +85,3 @@ def plain(text: str) -> str:
     'Vi < 2'
     """
     return html.unescape(re.sub(r"<[^>]*>", "", text))
-
-
-def escape(text: str) -> str:
-    """Return words as HTML."""
-    return html.escape(text)

@@ -25,6 +25,7 @@ from servotwin.parameters.groups import (
 )
 from servotwin.parameters.plausible import warn_of
 from servotwin.parameters.quantity import SET_BY_USER, Quantity
+from servotwin.text import fault_of
 from servotwin.units import si_unit
 
 Value = float | tuple[float, ...] | str
@@ -46,7 +47,8 @@ class Servo:
     Parameters
     ----------
     name : str
-        Short id, such as ``"hitec-hs-755hb"``; not empty.
+        Short id, such as ``"hitec-hs-755hb"``; not empty, and like the title without control or bidirectional
+        characters, of at most 200 characters.
     title : str
         For people.
     kind : {"analog", "digital", "bus"}
@@ -62,7 +64,8 @@ class Servo:
     Raises
     ------
     ParameterError
-        If the name is empty or no text, or the kind is none of the three; if a servo that turns without end has stops.
+        If the name is empty or no text, name or title hold what no reader sees or are too long, the kind is none of the
+        three, or a servo that turns without end has stops.
 
     Examples
     --------
@@ -93,6 +96,9 @@ class Servo:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise ParameterError("name of a servo", got=self.name, allowed='a short id, such as "my-servo"')
+        for what, text in (("name", self.name), ("title", self.title)):
+            if fault := fault_of(text):
+                raise ParameterError(f"{what} of a servo", got=text, allowed=fault)
         if self.kind not in KINDS:
             raise ParameterError(f"kind of {self.name!r}", got=self.kind, allowed=", ".join(KINDS))
         self._check_endless()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -17,6 +16,7 @@ from servotwin.parameters.output_file import write_file
 from servotwin.parameters.plausible import warn_of
 from servotwin.parameters.quantity import ORIGINS, Quantity
 from servotwin.parameters.servo import KINDS, Servo, unit_of
+from servotwin.text import fault_of, load_toml
 
 if TYPE_CHECKING:
     import tomlkit
@@ -73,6 +73,9 @@ def _servo_of(content: dict[str, Any], label: str) -> Servo:
     for key in ("name", "title", "kind", "notes"):
         if not isinstance(content.get(key, ""), str):
             raise ServoFileError(label, "not a text", key=key, got=content[key], allowed="a text")
+    for key in ("name", "title"):
+        if fault := fault_of(content.get(key, "")):
+            raise ServoFileError(label, "not possible", key=key, got=content[key], allowed=fault)
     if not content.get("name"):
         raise ServoFileError(label, "missing", key="name", allowed='a short id, such as name = "my-servo"')
     if (kind_of_servo := content.get("kind", KINDS[0])) not in KINDS:
@@ -102,7 +105,7 @@ def _unit_in(content: Mapping[str, Any], name: str) -> str | None:
 
 def _read_toml(read: Callable[[], str], label: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(read())
+        return load_toml(read())
     except FileNotFoundError:
         raise ServoFileError(label, "no such file") from None
     except IsADirectoryError:
@@ -111,9 +114,7 @@ def _read_toml(read: Callable[[], str], label: str) -> dict[str, Any]:
         raise ServoFileError(label, "is not UTF-8 text") from None
     except OSError as error:
         raise ServoFileError(label, f"cannot be read ({error.strerror})") from None
-    except RecursionError:
-        raise ServoFileError(label, "is not valid TOML: nested too deeply") from None
-    except ValueError as error:  # TOMLDecodeError, an integer of thousands of digits, a path with a NUL
+    except ValueError as error:  # no TOML, one nested too deeply, an integer of thousands of digits, a path with a NUL
         raise ServoFileError(label, f"is not valid TOML: {error}") from None
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -12,6 +13,7 @@ from servotwin.errors import InputError, UnknownNameError
 from servotwin.robots.mobile_robot import mobile_robot
 from servotwin.robots.places import load_mujoco
 from servotwin.robots.so101 import so101
+from servotwin.text import checked_name
 
 BUILT_IN: Mapping[str, Callable[[], str]] = MappingProxyType({"so101": so101, "mobile": mobile_robot})
 """MJCF of robots that come with the package, by name."""
@@ -70,9 +72,12 @@ def _read(mujoco: Any, path: Path) -> Any:
         if not spec.lights:
             light = spec.visual.headlight
             light.ambient, light.diffuse = _LIGHT
-        return spec.compile()
+        model = spec.compile()
     except Exception as error:  # MuJoCo raises ValueError, its own FatalError and what its plugins raise
         raise InputError(f"{path} is no model that MuJoCo reads ({' '.join(str(error).split())})") from None
+    for name in bytes(model.names).decode("utf-8", "surrogateescape").split("\0"):  # of the robot, its joints and all else
+        checked_name(f"{path}: name", name, math.inf)
+    return model
 
 
 def joint_names(model: Any) -> dict[str, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Iterable, Mapping
 from itertools import zip_longest
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, MissingExtraError
+from servotwin.text import checked_name
 
 Column = NDArray[Any]
 
@@ -102,6 +104,8 @@ def read_columns(path: str | Path) -> dict[str, Column]:
         raise InputError(f"{path} cannot be read ({reason})") from None
     if not found or not len(next(iter(found.values()))):
         raise InputError(str(path), got="no rows", allowed="a header and at least one row")
+    for k, name in enumerate(found, 1):
+        checked_name(f"{path}: name of column {k}", name, math.inf)
     return found
 
 

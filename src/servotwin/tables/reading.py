@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -25,6 +26,7 @@ from servotwin.tables.dialect import (
 from servotwin.tables.serial import ARRIVAL, labelled_rows, without_times
 from servotwin.tables.text import Text, read_text
 from servotwin.tables.thousands import BLANKS, check_thousands, without_blanks
+from servotwin.text import checked_name
 from servotwin.units.words import is_unit
 
 _MARKS = frozenset(comment[0] for comment in COMMENTS)
@@ -273,6 +275,8 @@ def _table(path: Path, text: Text, found: list[Row], separator: str, known: Call
            remarks: list[str]) -> TextTable:
     header = _header(found, separator, known)
     names = [] if header is None else _names(text, found[header], separator, known, _width(found, separator))
+    for k, name in enumerate(names, 1):
+        checked_name(f"{path}: line {found[header or 0].line}, name of column {k}", name, math.inf)
     below = found if header is None else found[header + 1:]
     also = {}
     if header is not None and names[0] != found[header].cells[0]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.parameters import Servo, load_servo
 from servotwin.parameters.groups import Supply
+from servotwin.text import checked_name, load_toml
 from servotwin.wire.bus import Bus
 from servotwin.wire.faults import Faults
 
@@ -117,8 +117,8 @@ def _arm(name: str | None) -> _Arm:
 def _read(path: Path) -> _Arm:
     """Read an arm file: `supply`, `body` and a table `[[servo]]` for each servo."""
     try:
-        found = tomllib.loads(path.read_text("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        found = load_toml(path.read_text("utf-8"))
+    except ValueError as error:
         raise InputError(f"{path}", got=str(error), allowed="an arm file in TOML") from None
     _known(f"{path}: key", found, _KEYS)
     tables = found.get("servo")
@@ -133,7 +133,8 @@ def _read(path: Path) -> _Arm:
             raise InputError(f"{path}: [[servo]]", got=one, allowed='id = 1 and servo = "feetech-sts3215-12v"')
         if id in servos:
             raise InputError(f"{path}: id of a servo", got=f"{id} twice", allowed="each ID once")
-        servos[id], joints[id] = one["servo"], str(one.get("joint", ""))
+        servos[id] = one["servo"]
+        joints[id] = checked_name(f"{path}: joint of servo {id}", str(one.get("joint", "")))
         angles[id] = _degrees(path, one.get("angle_deg", 0.0))
         words = one.get("registers", [])
         registers[id] = (words,) if isinstance(words, str) else tuple(str(word) for word in words)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from servotwin.errors import InputError, UnknownNameError
+from servotwin.text import load_toml
 
 if TYPE_CHECKING:
     from servotwin.wire.bus import Bus
@@ -171,11 +172,9 @@ def read_faults(path: str | Path, seed: int = 0) -> Faults:
     InputError
         Or one of its kinds, if there is something in it that is no fault.
     """
-    import tomllib
-
     try:
-        found = tomllib.loads(Path(path).read_text("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        found = load_toml(Path(path).read_text("utf-8"))
+    except ValueError as error:
         raise InputError(f"{path}", got=str(error), allowed="a TOML file of [[fault]] tables") from None
     made, names = list[Fault](), tuple(Fault.__dataclass_fields__)
     tables = found.get("fault", [])

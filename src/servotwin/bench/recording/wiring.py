@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 from servotwin.bench.wire.protocol import protocol
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.parameters import Quantity, write_file
+from servotwin.text import load_toml
 
 FULL = 1024  # counts of the converter
 _REFERENCE = {"external": 2.5, "supply": 5.0, "internal": 1.1}  # V; LM336Z-2.5, USB, ATmega328P's sheet
@@ -165,8 +165,8 @@ def load_wiring(path: str | Path) -> Wiring:
     """
     path = Path(path)
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        content = load_toml(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
     made: dict[str, Any] = {}
     for key, value in content.items():

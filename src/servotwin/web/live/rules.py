@@ -5,7 +5,7 @@ A rule is a table. Its `is` says what the value has to be:
 number, whole
     From `low` to `high`, both included unless `open`; those that are absent do not bind.
 number or text, truth, text
-    A text has at most `most` characters.
+    A text has at most `most` characters, and nothing that the pattern `without` matches.
 word
     One of `of`.
 table
@@ -117,7 +117,9 @@ def _truth(rule: Rule, value: Any, name: str, table: Mapping[str, Any]) -> bool 
 
 
 def _text(rule: Rule, value: Any, name: str, table: Mapping[str, Any]) -> str | None:
-    return value if isinstance(value, str) and len(value) <= rule.get("most", len(value)) else None
+    if not isinstance(value, str) or len(value) > rule.get("most", len(value)):
+        return None
+    return None if "without" in rule and re.search(rule["without"], value) else value
 
 
 def _word(rule: Rule, value: Any, name: str, table: Mapping[str, Any]) -> str | None:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from servotwin.errors import HIDDEN
 from servotwin.models.engine.live.posts import UNITS
 from servotwin.models.engine.live.shapes import FIELDS
+from servotwin.text import LONGEST_NAME
 from servotwin.web.live.rules import Rule, number
 
 RATES = (1.0, 2000.0)
@@ -22,7 +24,6 @@ CONTROL_FIELDS = ("command_share", "reference_share", "sampling_delay")
 _MOST_PUSH = 1e3  # N m: beyond any servo
 _MOST_STEPS = 1000  # of a staircase, one way
 _SEEDS = 2**53 - 1
-_MOST_NAME = 200  # characters
 _POSITIVE = ("dwell", "frequency", "start_frequency", "end_frequency", "duration")
 
 
@@ -108,8 +109,9 @@ SERVO: Rule = {
         "registers": {"is": "table", "what": _OF_SERVO, "allowed": "a table of names and values", "usual": {},
                       "each": {"is": "whole", "what": "registers: {name}", "allowed": "a whole number"}}}}
 SCENE: dict[str, Rule] = {
-    "name": {"is": "text", "most": _MOST_NAME, "what": "name of a scene",
-             "allowed": f"a text of at most {_MOST_NAME} characters", "usual": ""},
+    "name": {"is": "text", "most": LONGEST_NAME, "what": "name of a scene",
+             "without": HIDDEN.pattern, "usual": "",
+             "allowed": f"a text of at most {LONGEST_NAME} characters, none of them a control or bidirectional one"},
     "seed": {"is": "whole", "low": 0, "high": _SEEDS, "what": "seed of a scene",
              "allowed": "a whole number of at least 0", "usual": 0},
     "frame_rate": _span("frame_rate of a scene", *RATES, usual=FRAME_RATE),

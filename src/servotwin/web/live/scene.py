@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import binascii
-import tomllib
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,6 +11,7 @@ from itertools import pairwise
 from typing import Any
 
 from servotwin.errors import InputError, UnknownNameError
+from servotwin.text import load_toml
 from servotwin.web.live.actions import Action, action_of
 from servotwin.web.live.rules import checked
 from servotwin.web.live.said import SCENE, VIEW
@@ -169,9 +169,7 @@ def checked_view(view: Any) -> dict[str, Any]:
 
 def _content(text: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(text.removeprefix("\ufeff"))
-    except RecursionError:
-        raise InputError("scene", got="tables nested too deeply", allowed="the text of a bench, in TOML") from None
+        return load_toml(text.removeprefix("\ufeff"))
     except ValueError as error:
         raise InputError(f"scene: not valid TOML: {error}") from None
 

@@ -107,7 +107,10 @@ const KINDS = {
   "number or text": (_, value) => (typeof value === "string" || Number.isFinite(value) ? value : undefined),
   plain: (_, value) => (typeof value === "string" || typeof value === "boolean" || Number.isFinite(value) ? value : undefined),
   truth: (_, value) => (typeof value === "boolean" ? value : undefined),
-  text: (rule, value) => (typeof value === "string" && value.length <= (rule.most ?? Infinity) ? value : undefined),
+  text: (rule, value) => {
+    if (typeof value !== "string" || value.length > (rule.most ?? Infinity)) return undefined;
+    return rule.without && new RegExp(rule.without, "u").test(value) ? undefined : value;
+  },
   word: (rule, value) => {
     if (rule.of.includes(value)) return value;
     return rule.unknown && typeof value === "string" ? unknown(rule.unknown, value, rule.of) : undefined;
