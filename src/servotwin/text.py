@@ -25,8 +25,8 @@ _HEADERS = re.compile("assert|complex|component|ctype|errno|fenv|float|fmi.*|int
                       "setjmp|signal|std.*|string|tgmath|time|wchar|wctype")
 _KEPT = "\n\t"
 # Strings and comments of TOML; one that does not end goes to the end of its line, or of the text
-_QUOTED = re.compile(r'"""(?:\\.|[^\\])*?(?:"""|\Z)|\'\'\'.*?(?:\'\'\'|\Z)|"(?:\\.|[^"\\\n])*+"?|\'[^\'\n]*+\'?|#[^\n]*+',
-                     re.DOTALL)
+_QUOTED = re.compile(r'''"""(?:\\.|[^\\])*?(?:"""|\Z)|"(?:\\.|[^"\\\n])*+"?|#[^\n]*+'''
+                     r"""|'{3}.*?(?:'{3}|\Z)|'[^'\n]*+'?""", re.DOTALL)
 _DEEP = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST}}}")
 
 

@@ -32,7 +32,7 @@ def facts() -> dict[str, Any]:
     ('0.1.0', True, True)
     """
     from servotwin import __version__
-    from servotwin.simulation.compile import backend, compilers, finding, storage
+    from servotwin.simulation.compile import backend, compilers, finding
 
     found = [compiler.command for compiler in compilers.compilers()]
     shipped = [*finding.shipped_folder().glob("*")]
@@ -42,7 +42,7 @@ def facts() -> dict[str, Any]:
         "processors": os.cpu_count(), "level": compilers.level(),
         "packages": {name: _version(name) for name in ("numpy", "scipy", "matplotlib", "control")},
         "backend": "plain" if plain else "c", "compilers": [" ".join(command) for command in found],
-        "shipped_kernels": len(shipped), "cache": _cache(storage.cache_folder()), "extras": _extras(),
+        "shipped_kernels": len(shipped), "cache": _cache(), "extras": _extras(),
     }
 
 
@@ -53,12 +53,14 @@ def _version(name: str) -> str | None:
         return None
 
 
-def _cache(folder: Any) -> dict[str, Any] | None:
-    """Return where compiled kernels are kept, how many, and how large they are [bytes]."""
-    if folder is None:
-        return None
+def _cache() -> dict[str, Any]:
+    """Return where compiled kernels are kept, why they are not loaded from there, how many, and their size [bytes]."""
+    from servotwin.simulation.compile import storage
+
+    folder = storage.cache_folder()
     files = [path for path in folder.glob("*") if path.is_file()] if folder.is_dir() else []
-    return {"folder": str(folder), "files": len(files), "bytes": sum(path.stat().st_size for path in files)}
+    return {"folder": str(folder), "distrust": storage.distrust(folder), "files": len(files),
+            "bytes": sum(path.stat().st_size for path in files)}
 
 
 def _extras() -> dict[str, list[str]]:
@@ -85,8 +87,8 @@ def parts(found: dict[str, Any]) -> list[RenderableType]:
         ("processor", f"{found['processors']} cores, {found['level']}"),
         ("kernels", _kernels(found)),
         ("compiler", found["compilers"][0] if found["compilers"] else "none"),
-        ("cache", "no folder can be written" if cache is None else
-         f"{cache['folder']}, {cache['files']} files, {cache['bytes'] / 1e6:.1f} MB"),
+        ("cache", f"{cache['folder']}, {cache['files']} files, {cache['bytes'] / 1e6:.1f} MB"
+         + (f"; not used, for {cache['distrust']}" if cache["distrust"] else "")),
     ]
     extras = [(name, "yes" if not lacking else "no", _FOR.get(name, ""),
                f'pip install "servotwin[{name}]"' if lacking else "") for name, lacking in found["extras"].items()]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from servotwin.cli.terminal import patience, show, table
+from servotwin.errors import one_line
 from servotwin.logs.formats import FORMATS, LOG_FORMATS
 from servotwin.logs.mend_names import MENDS
 from servotwin.logs.reading import read_alike
@@ -82,7 +83,7 @@ def read(paths: Sequence[Path], file_format: str, columns: Sequence[str] | None,
     if (parts or lines) and not quiet:
         show(*parts, *lines, "")
     for line in lines if quiet else ():
-        typer.echo(line, err=True)
+        typer.echo(one_line(line), err=True)
     return of_no_robot(found.logs) if registers else list(found.logs)
 
 

@@ -14,6 +14,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from servotwin.cli.layout import pair_lines, table_lines, text_lines
+from servotwin.text import shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -27,7 +28,7 @@ _PIPE_WIDTH = 120  # characters of a line where no terminal says how wide it is
 
 
 def emit(text: str) -> None:
-    """Write a text and a line end to standard output.
+    """Write a text and a line end to standard output; what a terminal would obey stands in it as Python writes it.
 
     Raises
     ------
@@ -39,6 +40,10 @@ def emit(text: str) -> None:
     >>> emit("hello")
     hello
     """
+    _write(shown(text))
+
+
+def _write(text: str) -> None:
     if sys.stdout is None:
         return
     try:
@@ -77,7 +82,7 @@ def json_text(data: Any) -> str:
     >>> json_text({"a": float("nan")}).split()
     ['{', '"a":', 'null', '}']
     """
-    return json.dumps(_finite(data), indent=2, allow_nan=False)
+    return json.dumps(_finite(data), indent=2, allow_nan=False).replace("\x7f", "\\u007f")
 
 
 def show(*parts: RenderableType) -> None:
@@ -90,7 +95,8 @@ def show(*parts: RenderableType) -> None:
     two
     """
     terminal = sys.stdout is not None and sys.stdout.isatty()
-    emit(drawn(parts, None if terminal or os.environ.get("COLUMNS", "").isdigit() else _PIPE_WIDTH, terminal=terminal))
+    width = None if terminal or os.environ.get("COLUMNS", "").isdigit() else _PIPE_WIDTH
+    _write(drawn(parts, width, terminal=terminal))
 
 
 def drawn(parts: Sequence[RenderableType], width: int | None, *, terminal: bool = False) -> str:
@@ -106,7 +112,7 @@ def drawn(parts: Sequence[RenderableType], width: int | None, *, terminal: bool 
     page = io.StringIO()
     console = Console(file=page, force_terminal=terminal, width=width, markup=False, highlight=False, emoji=False)
     for part in parts:
-        console.print(_Drawn(partial(text_lines, part)) if isinstance(part, str) else part, crop=False)
+        console.print(_Drawn(partial(text_lines, shown(part))) if isinstance(part, str) else part, crop=False)
     return "\n".join(line.rstrip() for line in page.getvalue().rstrip("\n").split("\n"))
 
 
@@ -192,7 +198,7 @@ def pairs(rows: Sequence[tuple[str, str]]) -> RenderableType:
       final angle  180.00 deg
       energy       1 J
     """
-    return _Drawn(partial(pair_lines, rows))
+    return _Drawn(partial(pair_lines, [(shown(label), shown(text)) for label, text in rows]))
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> RenderableType:
@@ -204,4 +210,4 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> RenderableTyp
     id  torque
     a   1 N m
     """
-    return _Drawn(partial(table_lines, header, rows))
+    return _Drawn(partial(table_lines, header, [[shown(cell) for cell in row] for row in rows]))

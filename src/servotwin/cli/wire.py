@@ -9,6 +9,7 @@ import typer
 
 from servotwin.cli import shared_options as shared
 from servotwin.cli.terminal import emit, emit_json
+from servotwin.errors import one_line
 
 if TYPE_CHECKING:
     from servotwin.wire import Bus
@@ -82,7 +83,7 @@ def _serve(bus: Bus, names: dict[int, str], *, tcp: tuple[str, int] | None, link
     from servotwin.wire.service import Service
 
     def say(line: str) -> None:
-        sys.stderr.write(f"servotwin: {line}\n")
+        sys.stderr.write(f"servotwin: {one_line(line)}\n")
         sys.stderr.flush()
 
     service = Service(bus, tcp=tcp, link=link, keep=keep, say=say, each=each)

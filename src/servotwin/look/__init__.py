@@ -6,7 +6,7 @@ What plotting, reports and the command line share. matplotlib is loaded when a p
 from servotwin.look.files import FORMATS, to_bytes
 from servotwin.look.numbers import figure_in, label_of, readable, unit_for
 from servotwin.look.page import document
-from servotwin.look.style import COLOURS, LINES, WIDTH, axes_grid, context, finished, new_figure
+from servotwin.look.style import COLOURS, LINES, WIDTH, axes_grid, context, finished, new_figure, plain_decades
 from servotwin.look.words import MINUS, TIMES, fixed, number, picture, plain, table, with_error
 from servotwin.text import escape
 
@@ -29,6 +29,7 @@ __all__ = [
     "number",
     "picture",
     "plain",
+    "plain_decades",
     "readable",
     "table",
     "to_bytes",

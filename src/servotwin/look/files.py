@@ -5,8 +5,9 @@ from __future__ import annotations
 import io
 from typing import TYPE_CHECKING, Any
 
-from servotwin.errors import OutputError
+from servotwin.errors import HIDDEN, OutputError
 from servotwin.look.style import context
+from servotwin.text import shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,6 +44,11 @@ def to_bytes(figure: Figure, file_format: str, dpi: float = _DPI) -> bytes:
     """
     if file_format not in FORMATS:
         raise OutputError("format of a picture", got=file_format, allowed=", ".join(FORMATS))
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):
+        if HIDDEN.search(text.get_text()):
+            text.set_text(shown(text.get_text()))
     with context(), io.BytesIO() as stream:
         figure.savefig(stream, format=file_format, dpi=dpi, metadata=_METADATA[file_format])
         return stream.getvalue()

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 COLOURS: Mapping[str, str] = MappingProxyType({
@@ -31,6 +32,7 @@ _RC = {
     "axes.axisbelow": True, "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False,
     "figure.facecolor": "white", "savefig.facecolor": "white", "figure.dpi": 100.0, "path.simplify": True,
     "svg.hashsalt": "servotwin", "svg.fonttype": "path", "pdf.fonttype": 42, "axes.unicode_minus": True,
+    "text.parse_math": False,  # a $ is a letter but where a label of our own has formulas: parse_math=True
 }
 
 WIDTH = 5.2  # inch: a column of text, or the width of a phone held upright
@@ -78,6 +80,18 @@ def axes_grid(rows: int = 1, *, width: float = WIDTH, height: float = 3.0,
                                    top=1.0 - top / height, hspace=gap / panel)
         grid = figure.subplots(rows, 1, sharex=share, squeeze=False, height_ratios=ratios)
         return figure, [grid[k, 0] for k in range(rows)]
+
+
+def plain_decades(axis: Axis) -> None:
+    """Put plain numbers at a logarithmic axis in place of formulas."""
+    from matplotlib.ticker import LogFormatter
+
+    class Plain(LogFormatter):
+        def __call__(self, x: float, pos: int | None = None) -> str:
+            return f"{x:g}" if super().__call__(x, pos) else ""
+
+    axis.set_major_formatter(Plain())
+    axis.set_minor_formatter(Plain())
 
 
 def new_figure(width: float, height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:

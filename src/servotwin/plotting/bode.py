@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from servotwin.errors import InputError
-from servotwin.look import COLOURS, LINES, axes_grid, context, finished
+from servotwin.look import COLOURS, LINES, axes_grid, context, finished, plain_decades
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -80,6 +80,7 @@ def bode(drawn: Sequence[Response], *, title: str = "", height: float = 4.2) -> 
         axes[0].axhline(-3.0, color=COLOURS["grey"], linestyle=(0, (2, 2)), linewidth=1.0)
         axes[1].set_xlabel("frequency (Hz)")
         axes[1].set_xscale("log")
+        plain_decades(axes[1].xaxis)
         axes[1].yaxis.set_major_locator(MultipleLocator(_TICK))
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, handlelength=3.2)
         if title:

@@ -117,4 +117,4 @@ class Diagram:
     def text(self, x: float, y: float, text: str, *, size: float = 10.0, align: str = "center") -> None:
         """Write a text around (x, y), "left" or "right" of it if said so."""
         with context():
-            self._axes.text(x, y, text, ha=align, va="center", fontsize=size, color=_INK, zorder=4)
+            self._axes.text(x, y, text, ha=align, va="center", fontsize=size, color=_INK, zorder=4, parse_math=True)

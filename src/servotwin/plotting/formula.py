@@ -60,7 +60,7 @@ def formula_svg(source: str, size: float = 10.0) -> Formula:
         figure = Figure(figsize=(width / 72.0, height / 72.0))
         figure.patch.set_visible(False)
         FigureCanvasSVG(figure)
-        figure.text(margin / width, (depth + margin) / height, source, fontproperties=prop)
+        figure.text(margin / width, (depth + margin) / height, source, fontproperties=prop, parse_math=True)
         with io.StringIO() as stream:
             figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)
             text = stream.getvalue()

@@ -60,7 +60,7 @@ def curves(drawn: Sequence[Curve], *, x_label: str, y_label: str, limits: Sequen
     drawn : sequence of Curve
         At least one, at most five of each kind; points that come later lie in front.
     x_label, y_label : str
-        With the unit in brackets.
+        With the unit in brackets; formulas stand between $.
     limits : sequence of Limit
         Bounds to mark.
     below, below_label : sequence of Curve, str
@@ -94,7 +94,7 @@ def curves(drawn: Sequence[Curve], *, x_label: str, y_label: str, limits: Sequen
         if below:
             axes[1].axhline(0.0, color=COLOURS["grey"], linewidth=1.0)
             _panel(axes[1], below, below_label)
-        axes[-1].set_xlabel(x_label)
+        axes[-1].set_xlabel(x_label, parse_math=True)
         figure.align_ylabels(axes)
     return finished(figure)
 
@@ -103,7 +103,7 @@ def _panel(ax: Axes, drawn: Sequence[Curve], label: str) -> None:
     for place, curve in enumerate(drawn):
         _draw(ax, curve, place if curve.style is None else curve.style, place)
     ax.margins(y=0.09)
-    ax.set_ylabel(label)
+    ax.set_ylabel(label, parse_math=True)
 
 
 def _draw(ax: Axes, curve: Curve, style: int, place: int) -> None:
@@ -217,4 +217,4 @@ def _span(ax: Axes, left: float, right: float, y: float, text: str) -> None:
     ax.annotate("", xy=(left, y), xytext=(right, y), arrowprops={
         "arrowstyle": "<|-|>,head_width=0.15,head_length=0.3", "color": COLOURS["black"], "linewidth": 0.9,
         "shrinkA": 0.0, "shrinkB": 0.0})
-    ax.text(0.5 * (left + right), y + 0.07, text, ha="center", va="bottom", fontsize=8.5)
+    ax.text(0.5 * (left + right), y + 0.07, text, ha="center", va="bottom", fontsize=8.5, parse_math=True)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from servotwin.errors import InputError
-from servotwin.look import LINES, axes_grid, context, finished
+from servotwin.look import LINES, axes_grid, context, finished, plain_decades
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,6 +48,7 @@ def ranking(names: Sequence[str], values: Mapping[str, Sequence[float]], *, x_la
             ax.plot(found, range(len(names)), linestyle="none", marker=marker, markersize=6.0, color=colour,
                     markerfacecolor="white" if marker != "o" else colour, label=condition)
         ax.set_xscale("log")
+        plain_decades(ax.xaxis)
         ax.set_yticks(range(len(names)), list(names))
         ax.set_ylim(len(names) - 0.5, -0.5)
         ax.set_xlabel(x_label)

@@ -75,7 +75,8 @@ def _read(mujoco: Any, path: Path) -> Any:
         model = spec.compile()
     except Exception as error:  # MuJoCo raises ValueError, its own FatalError and what its plugins raise
         raise InputError(f"{path} is no model that MuJoCo reads ({' '.join(str(error).split())})") from None
-    for name in bytes(model.names).decode("utf-8", "surrogateescape").split("\0"):  # of the robot, its joints and all else
+    names = bytes(model.names).decode("utf-8", "surrogateescape")  # of the robot, its joints and all else
+    for name in names.split("\0"):
         checked_name(f"{path}: name", name, math.inf)
     return model
 

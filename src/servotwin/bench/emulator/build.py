@@ -10,7 +10,7 @@ from importlib.resources import as_file, files
 from pathlib import Path
 
 from servotwin.errors import BenchError
-from servotwin.simulation.compile.storage import cache_folder, key_of
+from servotwin.simulation.compile.storage import is_there, kept_folder, key_of, writable_folder
 
 _SOURCES = ("harness.c", "pipes.h", "foresight.h")
 LIBRARIES = ("-lsimavr", "-lelf")
@@ -29,26 +29,20 @@ def harness() -> Path:
     with as_file(files("servotwin.bench.emulator")) as folder:
         texts = [(folder / name).read_text(encoding="utf-8") for name in _SOURCES]
         name = f"harness-{key_of(*texts, *LIBRARIES)}"
-        try:
-            return _kept(cache_folder(), name, folder / _SOURCES[0])
-        except BenchError:
-            raise
-        except OSError:
-            return _kept(Path(tempfile.mkdtemp(prefix="servotwin-")), name, folder / _SOURCES[0])
+        kept = kept_folder() / name
+        return kept if is_there(kept) else _made(writable_folder() / name, folder / _SOURCES[0])
 
 
-def _kept(folder: Path, name: str, source: Path) -> Path:
-    path = folder / name
-    if path.exists():
-        return path
-    folder.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(prefix=name, dir=folder)
+def _made(path: Path, source: Path) -> Path:
+    handle, aside = tempfile.mkstemp(prefix=path.name, dir=path.parent)
     os.close(handle)
+    made = Path(aside)
     try:
-        _compile(source, temporary)
-        Path(temporary).replace(path)  # two processes that compile at once make the same
+        _compile(source, aside)
+        made.chmod(0o700)  # a wide umask would let others write it
+        made.replace(path)  # two processes that compile at once make the same
     finally:
-        Path(temporary).unlink(missing_ok=True)
+        made.unlink(missing_ok=True)
     return path
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import atexit
 import contextlib
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -21,7 +19,7 @@ from servotwin.simulation.compile.derive import derive
 from servotwin.simulation.compile.finding import SUFFIX, Built, functions_of, index_name, library_name, problems
 from servotwin.simulation.compile.recipe import Recipe
 from servotwin.simulation.compile.signatures import signatures
-from servotwin.simulation.compile.storage import cache_folder, key_of, write
+from servotwin.simulation.compile.storage import is_there, key_of, writable_folder, write
 from servotwin.simulation.compile.translate import Translation, translated
 
 _LONGEST = 600.0  # s that a compiler may take
@@ -33,40 +31,15 @@ def made(recipe: Recipe, useless: set[Path]) -> Iterator[Built]:
         named = os.environ.get("SERVOTWIN_CC")
         problems.append(f"SERVOTWIN_CC names no program ({named})" if named else "no C compiler")
         return
-    for folder in _folders():
-        found = _made(recipe, folder, useless)
-        if found is not None:
-            yield found
-            return
+    found = _made(recipe, writable_folder(), useless)
+    if found is not None:
+        yield found
 
 
 def index(translation: Translation) -> dict[str, Any]:
     """Return what this file says."""
     functions = [[entry.symbol, entry.result] for entry in translation.entries]
     return {"text": key_of(translation.text), "functions": functions}
-
-
-def _folders() -> Iterator[Path]:
-    """Return where libraries may be written: the cache, else a folder for this process."""
-    folder = cache_folder()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if os.access(folder, os.W_OK):
-            yield folder
-            return
-        reason = "Permission denied"
-    except OSError as error:
-        reason = error.strerror or str(error)
-    sys.stderr.write(f"servotwin: the kernels cannot be kept in {folder} ({reason}); set SERVOTWIN_CACHE_DIR to a "
-                     "folder that can be written\n")
-    yield _temporary()
-
-
-@cache
-def _temporary() -> Path:
-    folder = tempfile.mkdtemp(prefix="servotwin-")
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return Path(folder)
 
 
 def _made(recipe: Recipe, folder: Path, useless: set[Path]) -> Built | None:
@@ -77,7 +50,7 @@ def _made(recipe: Recipe, folder: Path, useless: set[Path]) -> Built | None:
         path = folder / library_name(recipe, text, compiler)
         try:
             with _alone(path):
-                there = path.exists() and path not in useless
+                there = path not in useless and is_there(path)
                 problem = None if there else _compiled(recipe, translation.text, compiler, path)
             if problem is None:
                 write(folder / index_name(recipe), json.dumps(said))
@@ -109,6 +82,7 @@ def _compiled(recipe: Recipe, text: str, compiler: Compiler, path: Path) -> str 
             all_lines = said.read_text(encoding="utf-8", errors="replace").splitlines()
             lines = [line for line in all_lines if "error" in line] or [line for line in all_lines if line.strip()]
             return lines[0].strip() if lines else f"it ended with {ended}" if ended else "it made no library"
+        library.chmod(0o700)  # a wide umask would let others write it
         with contextlib.suppress(PermissionError):  # Windows: another process has made it, and loaded it already
             os.replace(library, path)
     return None
@@ -141,8 +115,9 @@ def _tell() -> None:
 @contextlib.contextmanager
 def _alone(path: Path) -> Iterator[None]:
     """Hold a lock, which the operating system takes away from a process that ends; without locks, go on without."""
+    flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
     try:
-        file = path.with_suffix(".lock").open("w")
+        file = os.fdopen(os.open(path.with_suffix(".lock"), flags, 0o600), "r+")
     except OSError:
         yield
         return

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from servotwin.simulation.compile.storage import distrust, temporary_folder
+
 _GENERAL = ("-std=c99", "-shared", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math",
             "-fwrapv", "-fno-strict-aliasing", "-fopenmp-simd", "-w")
 _X86 = {  # what the levels of the x86-64 psABI have beyond the lower ones; gcc knows their names from version 11 on
@@ -40,7 +42,9 @@ class Compiler:
 
     def environment(self, folder: Path) -> dict[str, str]:
         """Return the environment variables that it gets: zig keeps what it makes in a folder, beside our libraries."""
-        own = {f"ZIG_{kind}_CACHE_DIR": str(folder / "zig") for kind in ("LOCAL", "GLOBAL")}
+        kept = folder / "zig"
+        kept = kept if distrust(kept) is None else temporary_folder()
+        own = {f"ZIG_{kind}_CACHE_DIR": str(kept) for kind in ("LOCAL", "GLOBAL")}
         return own | os.environ
 
     def library_command(self, source: Path, library: Path, vector: bool, level: str) -> list[str]:

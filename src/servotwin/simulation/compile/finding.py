@@ -21,7 +21,7 @@ from servotwin import physics
 from servotwin.models import engine, state, terms
 from servotwin.simulation.compile.compilers import Compiler, compilers, flags, level, levels, system
 from servotwin.simulation.compile.recipe import Recipe
-from servotwin.simulation.compile.storage import cache_folder, key_of
+from servotwin.simulation.compile.storage import is_there, kept_folder, key_of
 
 problems: list[str] = []  # why there is no library, as far as this process has found out
 WAY_OUT = ("install a C compiler (gcc or clang) or the package ziglang (pip install 'servotwin[compile]'); "
@@ -114,13 +114,15 @@ def _shipped(recipe: Recipe) -> list[Built]:
 
 def _known(recipe: Recipe) -> list[Built]:
     """Return the library in the cache; that of a compiler that is gone only where there is none at all."""
-    said = _read(cache_folder() / index_name(recipe))
+    folder = kept_folder()
+    index = folder / index_name(recipe)
+    said = _read(index) if is_there(index) else None
     if said is None:
         return []
-    paths = [cache_folder() / library_name(recipe, said["text"], compiler) for compiler in compilers()]
+    paths = [folder / library_name(recipe, said["text"], compiler) for compiler in compilers()]
     if not paths:
-        paths = sorted(cache_folder().glob(f"{_stem(recipe, said['text'])}-*{SUFFIX}"))
-    return [Built(path, functions_of(said)) for path in paths if path.exists()][:1]
+        paths = sorted(folder.glob(f"{_stem(recipe, said['text'])}-*{SUFFIX}"))
+    return [Built(path, functions_of(said)) for path in paths if is_there(path)][:1]
 
 
 def _stem(recipe: Recipe, text: str) -> str:

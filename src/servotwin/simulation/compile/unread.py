@@ -9,7 +9,7 @@ from functools import cache
 
 from servotwin.simulation.compile.finding import shipped_folder, source_key
 from servotwin.simulation.compile.recipe import Recipe
-from servotwin.simulation.compile.storage import cache_folder, key_of, write
+from servotwin.simulation.compile.storage import is_there, kept_folder, key_of, writable_folder, write
 
 
 @cache
@@ -25,13 +25,13 @@ def unread(recipe: Recipe, of: tuple[str, ...] = ()) -> tuple[str, ...]:
     With `of`, "module:function", it is asked of what these call alone. The answer is kept beside the kernels.
     """
     name = f"{recipe.name}-unread-{key_of(source_key(), repr((recipe, of)))}.json"
-    for folder in (shipped_folder(), cache_folder()):
+    kept = kept_folder() / name
+    for path in (shipped_folder() / name, *([kept] if is_there(kept) else [])):
         with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
-            return tuple(map(str, json.loads((folder / name).read_text(encoding="utf-8"))["unread"]))
+            return tuple(map(str, json.loads(path.read_text(encoding="utf-8"))["unread"]))
     from servotwin.simulation.compile.reading import unread_numbers  # which translates
 
     found = tuple(unread_numbers(recipe, of))
     with contextlib.suppress(OSError):  # to find it again costs its time alone
-        cache_folder().mkdir(parents=True, exist_ok=True)
-        write(cache_folder() / name, json.dumps({"unread": found}))
+        write(writable_folder() / name, json.dumps({"unread": found}))
     return found
