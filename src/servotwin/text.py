@@ -111,6 +111,18 @@ def shown(text: str) -> str:
     return HIDDEN.sub(lambda found: found[0] if found[0] in _KEPT else one_line(found[0]), text)
 
 
+def shortened(name: str, longest: int = 40) -> str:
+    """Return a name for an axis: its beginning and its end, where it is longer.
+
+    Examples
+    --------
+    >>> shortened("left_arm/shoulder_pan", 12)
+    'left_…er_pan'
+    """
+    half = longest // 2
+    return name if len(name) <= longest else f"{name[:half - 1]}…{name[-half:]}"
+
+
 def escape(text: str) -> str:
     """Return words as HTML.
 
@@ -142,7 +154,7 @@ def identifier(name: str) -> str:
     >>> identifier("Hitec HS-755HB"), identifier("../../x"), identifier("math"), identifier("21")
     ('hitec_hs_755hb', 'x', 'servo_math', 'servo_21')
     """
-    made = re.sub(r"[^a-z0-9_]", "_", name.lower()).strip("_")[:LONGEST_STEM].rstrip("_")
+    made = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")[:LONGEST_STEM].rstrip("_")
     return made if made[:1].isalpha() and not is_taken(made) else f"servo_{made}".rstrip("_")
 
 
@@ -157,20 +169,30 @@ def is_taken(name: str) -> bool:
     return (_HEADERS.fullmatch(name) or _DEVICES.fullmatch(name)) is not None
 
 
+def file_stem(name: str) -> str:
+    """Return what a file of this name is called, without its ending.
+
+    Examples
+    --------
+    >>> file_stem("elbow"), file_stem("../../x"), file_stem("con")
+    ('elbow', 'x', 'con_')
+    """
+    stem = re.sub(r"[^\w.+-]+", "_", name)[:LONGEST_STEM].strip("._") or "unnamed"
+    return f"{stem}_" if _DEVICES.fullmatch(stem) else stem
+
+
 def file_stems(names: Iterable[str]) -> dict[str, str]:
     """Return what files of these names are called, without their ending: one for each, in one folder.
 
     Examples
     --------
-    >>> file_stems(["elbow", "left/hip", "left hip", "../../x", "con"])
-    {'elbow': 'elbow', 'left/hip': 'left_hip', 'left hip': 'left_hip_2', '../../x': 'x', 'con': 'con_'}
+    >>> file_stems(["elbow", "left/hip", "left hip"])
+    {'elbow': 'elbow', 'left/hip': 'left_hip', 'left hip': 'left_hip_2'}
     """
     made: dict[str, str] = {}
     taken: set[str] = set()
     for name in names:
-        stem = re.sub(r"[^\w.+-]+", "_", name)[:LONGEST_STEM].strip("._") or "unnamed"
-        stem = f"{stem}_" if _DEVICES.fullmatch(stem) else stem
-        again = 1
+        stem, again = file_stem(name), 1
         while (own := stem if again == 1 else f"{stem}_{again}").casefold() in taken:
             again += 1
         made[name] = own

@@ -3,6 +3,8 @@
 import pytest
 
 import servotwin as st
+from servotwin.wire import keeping
+from servotwin.wire.keeping import Keep, read_kept
 from wire_talk import COUNT, STS, Client, feetech, word
 
 
@@ -160,6 +162,27 @@ def test_what_was_stored_goes_into_another_bus(client, bus):
     assert not other.to_keep
     assert other.registers(1)["Homing_Offset"] == -100
     assert Client(other).read(1, 31, 2) == bytes([0x64, 0x08])
+
+
+def test_a_file_that_cannot_be_written_is_said_once_and_tried_again(client, bus, tmp_path, monkeypatch):
+    folder, said = tmp_path / "gone", []
+    folder.mkdir()
+    keep = Keep(folder / "kept.json", bus, said.append)
+    monkeypatch.setattr(keeping, "_AGAIN", 0.0)
+    client.write(1, 55, 0)
+    folder.rmdir()
+    for offset in (-100, -200):  # the bus answers all the while
+        client.write(1, 31, *word(offset, 11))
+        keep.save(always=False)
+    assert said == [f"registers cannot be kept in {folder / 'kept.json'} (No such file or directory): tried again "
+                    "every second"]
+    keep.save(always=True)
+    assert said[1].endswith("what is stored is lost")
+    folder.mkdir()
+    keep.save()
+    assert said[2:] == [f"registers are kept in {folder / 'kept.json'} again"]
+    assert read_kept(folder / "kept.json", bus)["1"]["Homing_Offset"] == -200
+    assert [path.name for path in folder.iterdir()] == ["kept.json"]
 
 
 # --- counts -------------------------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from servotwin.cli import robot_options as options
 from servotwin.cli import shared_options as shared
 from servotwin.cli.robot_validate import DatasetArgument, ForceOption, OutOption
 from servotwin.cli.terminal import emit_json, json_text, pairs, show, table
+from servotwin.text import file_stems
 
 if TYPE_CHECKING:
     from servotwin.cli.outputs import Target
@@ -72,7 +73,7 @@ def fit(
             _show(found, told)
         return found, told
 
-    servos = [f"{joint}.toml" for joint in asked.mounts]
+    servos = [f"{stem}.toml" for stem in file_stems(asked.mounts).values()]
     if out is None:
         found, told = done([])
     else:
@@ -107,8 +108,8 @@ def _write(found: ArmFit, told: dict[str, Any], targets: Sequence[Target], *, fo
     judged = found.holdout or found.training
     with staged(targets, force=force) as drafts:
         places: dict[str, Path] = {target.path.name: draft for target, draft in zip(targets, drafts, strict=True)}
-        for joint, servo in found.servos.items():
-            servo.save(places[f"{joint}.toml"], overwrite=True)
+        for joint, stem in file_stems(found.servos).items():
+            found.servos[joint].save(places[f"{stem}.toml"], overwrite=True)
         places[SUMMARY].write_bytes((json_text(told) + "\n").encode())
         plotting.save(errors_picture(judged), places[ERRORS])
         plotting.save(windows_picture(judged), places[WINDOWS])

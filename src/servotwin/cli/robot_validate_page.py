@@ -12,6 +12,7 @@ from servotwin.cli.robot_page import STYLE, figure
 from servotwin.cli.robot_validate import ERRORS, WINDOWS, degrees, head, rows
 from servotwin.look import document, escape, table
 from servotwin.robots.replay import ALL, SERVOS
+from servotwin.text import shortened
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,7 +38,7 @@ def windows_picture(found: RobotValidation) -> Figure:
         goal = one.run.motion.angles.get(window.joint, np.full(len(one.time), math.nan))
         best = min((name for name in found.errors if name != SERVOS), key=found.rms)
         traces.append(plotting.ReplayTrace(
-            f"{window.joint.replace('_', ' ')}: {degrees(window.rms)}° rms, {window.kind}", one.time[inside],
+            f"{shortened(window.joint.replace('_', ' '))}: {degrees(window.rms)}° rms, {window.kind}", one.time[inside],
             goal[inside], one.measured[window.joint][inside],
             {name: one.simulated[name][window.joint][inside] for name in (SERVOS, best)}))
     return plotting.replay_windows(traces)

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from functools import partial
 from pathlib import Path
@@ -25,7 +26,7 @@ _TIMES = {"time": "s", "time_s": "s", "time_ms": "ms", "t": "s", "timestamp": "s
 _EPISODES = ("episode_index", "episode")
 _UNIT = re.compile(r"(?:_|\s*[\[(])(deg|rad)[\])]?$", re.IGNORECASE)
 _FEWEST = 2  # joints: a table of one is a log
-_HEAD = 8192  # bytes
+_HEAD = 1 << 20  # bytes
 _BETWEEN = "._/: "
 
 
@@ -91,11 +92,11 @@ def _header(path: Path) -> list[str]:
         return []
     try:
         with path.open("rb") as stream:
-            line = stream.read(_HEAD).decode("utf-8", "replace").lstrip("\ufeff").split("\n", 1)[0]
-    except (OSError, ValueError):  # reading says what is wrong with it
+            line = stream.readline(_HEAD).decode("utf-8", "replace").lstrip("\ufeff").rstrip("\r\n")
+        separator = max(",;\t", key=line.count)
+        return [name.strip() for name in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
+    except (OSError, ValueError, csv.Error):  # reading says what is wrong with it
         return []
-    separator = max(",;\t", key=line.count)
-    return [name.strip().strip('"') for name in line.split(separator)]
 
 
 def _joints_of(header: list[str]) -> dict[str, dict[str, tuple[str, str]]]:

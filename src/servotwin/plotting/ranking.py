@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from servotwin.errors import InputError
 from servotwin.look import LINES, axes_grid, context, finished, plain_decades
+from servotwin.text import shortened
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -49,7 +50,7 @@ def ranking(names: Sequence[str], values: Mapping[str, Sequence[float]], *, x_la
                     markerfacecolor="white" if marker != "o" else colour, label=condition)
         ax.set_xscale("log")
         plain_decades(ax.xaxis)
-        ax.set_yticks(range(len(names)), list(names))
+        ax.set_yticks(range(len(names)), [shortened(name) for name in names])
         ax.set_ylim(len(names) - 0.5, -0.5)
         ax.set_xlabel(x_label)
         figure.legend(loc="outside upper center", ncols=len(values), handletextpad=0.3)

@@ -11,6 +11,7 @@ import numpy as np
 from servotwin import units
 from servotwin.errors import InputError
 from servotwin.look import COLOURS, LINES, context, finished, new_figure
+from servotwin.text import shortened
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -181,7 +182,7 @@ def servo_electrics(servos: Sequence[ServoTrace]) -> Figure:
         for row, servo in zip(grid, servos, strict=True):
             for ax, kind in zip(row, kinds, strict=True):
                 _DRAWN[kind](ax, servo)
-            row[0].set_ylabel(servo.label.replace("_", " "), fontsize=8.5, fontweight="bold")
+            row[0].set_ylabel(shortened(servo.label.replace("_", " "), 24), fontsize=8.5, fontweight="bold")
             row[0].set_xlim(float(servo.time[0]), float(servo.time[-1]))
         for ax, kind in zip(grid[0], kinds, strict=True):
             ax.set_title(_TITLES[kind])
@@ -248,7 +249,7 @@ def _followed(ax: Axes, joint: JointTrace) -> None:
     if joint.measured is not None:
         ax.plot(time, _shown(_thin(joint.measured, _LINE_POINTS), joint.slides), label="measured",
                 color=COLOURS["vermilion"], linewidth=1.1, linestyle=(0, (5, 1.5)))
-    ax.set_title(joint.label.replace("_", " "), fontweight="bold")
+    ax.set_title(shortened(joint.label.replace("_", " ")), fontweight="bold")
     ax.set_ylabel("place (mm)" if joint.slides else "angle (°)")
 
 
@@ -321,7 +322,7 @@ def _torques(ax: Axes, joint: ShaftTrace) -> None:
     fastest = max(float(joint.curves[0][1].speed[-1]), float(joint.needed.speed.max()))
     ax.set_ylim(0.0, 1.08 * highest)
     ax.set_xlim(0.0, 1.05 * math.degrees(fastest))
-    ax.set_title(joint.label.replace("_", " "), fontweight="bold", loc="left")
+    ax.set_title(shortened(joint.label.replace("_", " ")), fontweight="bold", loc="left")
     ax.set_title(joint.words, loc="right", fontsize=8.0)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from servotwin.errors import InputError
 from servotwin.look import COLOURS, LINES, context, finished, new_figure
+from servotwin.text import shortened
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -125,7 +126,7 @@ def joint_use(joints: Sequence[str], uses: Sequence[JointUse]) -> Figure:
         figure = new_figure(_WIDTH, 0.8 * _HEIGHT)
         left, right = figure.subplots(1, 2)
         for ax in (left, right):
-            ax.set_xticks(range(len(joints)), [joint.replace("_", " ") for joint in joints])
+            ax.set_xticks(range(len(joints)), [shortened(joint.replace("_", " ")) for joint in joints])
         width = 0.8 / len(uses)
         for k, use in enumerate(uses):
             at = np.arange(len(joints)) + (k - 0.5 * (len(uses) - 1)) * width

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from servotwin import units
 from servotwin.errors import OutputError
 from servotwin.parameters import write_file
+from servotwin.tables.columns import csv_text
 
 # SI unit -> (suffix of the column, unit in the file, dimension)
 _COLUMNS = {
@@ -49,8 +50,9 @@ def write_csv(out: Path | TextIO, signals: Mapping[str, NDArray[np.float64]], si
     ['output_angle_deg', '180']
     """
     shown = shown_columns(signals, si_units)
-    np.savetxt(out, np.column_stack(list(shown.values())), fmt="%.12g", delimiter=",", header=",".join(shown),
-               comments="", encoding="utf-8")
+    head = csv_text({name: () for name in shown}).rstrip("\n")
+    np.savetxt(out, np.column_stack(list(shown.values())), fmt="%.12g", delimiter=",", header=head, comments="",
+               encoding="utf-8")
 
 
 def shown_columns(signals: Mapping[str, NDArray[Any]], si_units: Mapping[str, str]) -> dict[str, NDArray[Any]]:

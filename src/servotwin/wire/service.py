@@ -79,7 +79,7 @@ class Service:
                  each: Callable[[Bus], None] | None = None) -> None:
         self.bus, self.timing = bus, Timing()
         self._say, self._each = say or (lambda line: None), each
-        self._keep = Keep(keep, bus) if keep is not None else None
+        self._keep = Keep(keep, bus, self._say) if keep is not None else None
         self._link = Link(link) if link is not None else None
         if self._link is not None:
             self._link.check()

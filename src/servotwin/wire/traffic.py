@@ -47,6 +47,7 @@ class Traffic:
             raise InputError("--record", got=str(taken), allowed="a folder without logs of these servos")
         self._files: list[TextIO] = []
         self._last: dict[int, float] = {}
+        self._fault = ""
         try:
             (place / "truth").mkdir(parents=True, exist_ok=True)
             self._told = {id: self._writer(place / f"{id}.csv", _TOLD) for id in bus.ids}
@@ -71,12 +72,18 @@ class Traffic:
         path.write_text(json.dumps(facts, indent=1) + "\n", "utf-8")
 
     def heard(self, packet: Packet) -> None:
-        """Write a row of each servo whose position a packet asks for."""
+        """Write a row of each servo whose position a packet asks for; where that fails it is said, once."""
         for device in self._asked(packet):
             id = self._bus.ids[device.lane]
             if self._bus.time > self._last.get(id, -1.0):
                 self._last[id] = self._bus.time
-                self._row(id, device)
+                try:
+                    self._row(id, device)
+                except OSError as error:
+                    fault = error.strerror or str(error)
+                    if fault != self._fault:
+                        self._bus.counts.said.append(f"logs cannot be written ({fault}): rows are lost")
+                    self._fault = fault
 
     def _asked(self, packet: Packet) -> list[Any]:
         data, frames = packet.data, feetech_frames if self._bus.protocol == "feetech" else dynamixel_frames

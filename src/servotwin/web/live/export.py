@@ -10,6 +10,7 @@ import numpy as np
 from servotwin.errors import InputError
 from servotwin.parameters.servo_file import servo_text
 from servotwin.simulation.files import write_csv
+from servotwin.text import file_stem
 from servotwin.web.live.replay import replay
 
 if TYPE_CHECKING:
@@ -89,7 +90,7 @@ def exported(kind: str, scene: Scene, models: tuple[Model, ...], servo: int = 0,
     if kind == "servo":
         if scene.servos[servo].mystery is not None:
             raise InputError("servo file of a mystery servo", allowed="none: find out what it is")
-        return File(f"{models[servo].servo.name}.toml", "application/toml", servo_text(models[servo].servo))
+        return File(f"{file_stem(models[servo].servo.name)}.toml", "application/toml", servo_text(models[servo].servo))
     if kind == "scene":
         return File("bench.toml", "application/toml", scene.text())
     if kind == "script":

@@ -14,6 +14,7 @@ from servotwin.identification import Fit, Log, identify
 from servotwin.identification.report.shown import error_shown, estimate_lines
 from servotwin.parameters.servo_file import servo_text
 from servotwin.simulation.workers import HERE
+from servotwin.text import file_stem
 from servotwin.web.lessons.mystery import guess_of
 from servotwin.web.live.overlay import of_the_bench, trace_facts
 from servotwin.web.live.scene_servo import model_named
@@ -67,7 +68,7 @@ def facts_of(fit: Fit, notes: list[str]) -> dict[str, Any]:
     verdict = fit.verdict
     said = [text for text in fit.warnings if verdict is None or text != verdict.sentence]
     return {
-        "file": servo_text(fit.servo), "name": f"{fit.servo.name}.toml", "model": type(fit.model).__name__,
+        "file": servo_text(fit.servo), "name": f"{file_stem(fit.servo.name)}.toml", "model": type(fit.model).__name__,
         "seconds": fit.seconds, "interrupted": fit.interrupted, "level": fit.level, "unit": unit,
         "rms": factor * table.total()[table.models[0]],
         "held_out": factor * fit.holdout.total()[fit.holdout.models[0]] if fit.holdout else None,
