@@ -74,7 +74,8 @@ def test_what_is_read_as_it_is(name):
 
 
 @pytest.mark.parametrize(("name", "file_format"), [
-    ("$\\frac{$", "png"), ("$a$ and $b$", "pdf"), ("\\$5", "svg"), ("a\x1b[0m\0b\u202e", "svg"), ("%s{0} & <b>--", "svg")])
+    ("$\\frac{$", "png"), ("$a$ and $b$", "pdf"), ("\\$5", "svg"), ("a\x1b[0m\0b\u202e", "svg"),
+    ("%s{0} & <b>--", "svg")])
 def test_a_figure_has_the_letters_of_a_name(name, file_format):
     figure, (ax,) = axes_grid(1)
     with context():

@@ -344,6 +344,21 @@ def test_the_harness_is_compiled_once(tmp_path, monkeypatch):
     assert (first.stat().st_mtime_ns, len(list(tmp_path.iterdir()))) == (made, 1)
 
 
+def test_a_harness_that_others_may_write_is_not_run(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("SERVOTWIN_CACHE_DIR", str(tmp_path / "cache"))
+    made = build.harness()
+    assert made.stat().st_mode & 0o777 == 0o700
+    planted = b"#!/bin/sh\nexit 1\n"
+    made.write_bytes(planted)
+    made.chmod(0o777)
+    assert build.harness() == made
+    assert made.read_bytes() != planted
+    assert made.stat().st_mode & 0o777 == 0o700
+    assert capsys.readouterr().err == f"servotwin: {made} is made anew, for others may write it, until chmod go-w\n"
+    made.parent.chmod(0o777)
+    assert build.harness().parent not in (made.parent, *made.parents)
+
+
 @pytest.mark.parametrize("model", [
     lambda: st.BoundedServo(st.load_servo("hitec-hs-755hb")),
     lambda: st.DigitalServo(st.load_servo("feetech-sts3215-12v")),

@@ -1,5 +1,6 @@
 """A servo as an FMU, as fmpy sets, steps and reads it: the same as `simulate`."""
 
+import dataclasses
 import os
 import shutil
 import subprocess
@@ -109,6 +110,19 @@ def beside(kind, **changes):
 @pytest.mark.parametrize("kind", SERVOS)
 def test_it_has_nothing_that_a_tool_complains_about(made, kind, version):
     assert validate_fmu(made(kind, version)) == []
+
+
+def test_a_name_is_no_code(tmp_path, monkeypatch):
+    """A name that ended its comment ran code where a tool loaded the FMU; one of a header hid it from the compiler."""
+    monkeypatch.chdir(tmp_path)
+    name = '*/ __attribute__((constructor)) void planted(void) { fclose(fopen("planted", "w")); } /* ??/ \\'
+    servo = dataclasses.replace(st.load_servo("hitec-hs-755hb"), name=name)
+    tool = Tool(str(fmu(st.BoundedServo(servo)).write(tmp_path / "one.fmu")), tmp_path)
+    assert tool.step(1e-3) is False
+    assert not (tmp_path / "planted").exists()
+    for taken in ("model", "component", "math", "fmi2"):
+        with pytest.raises(InputError, match="not the name of a header"):
+            fmu(st.BoundedServo(servo), name=taken)
 
 
 @pytest.mark.parametrize("version", VERSIONS)

@@ -11,7 +11,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from servotwin.errors import InputError, PlausibilityWarning
+from servotwin.errors import InputError
 from servotwin.export.c_code import c
 from servotwin.export.c_writing import features_of_model, signals_of_model, wiring_of
 from servotwin.export.fmu_binary import binaries
@@ -152,7 +152,7 @@ def _tunable(model: Any, load: Load) -> dict[str, float]:
         for other in (1.1 * value, 0.9 * value) if value else (1e-3, 1e-6):
             try:
                 with warnings.catch_warnings():
-                    warnings.simplefilter("ignore", PlausibilityWarning)
+                    warnings.simplefilter("ignore", UserWarning)  # what is only tried is nobody's word
                     asked = features_of_model(type(model)(model.servo.replace({name: other})), load)
             except InputError:
                 continue

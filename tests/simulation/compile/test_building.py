@@ -276,6 +276,132 @@ def test_a_disk_that_is_full(tmp_path, monkeypatch):
     assert all("No space left on device" in line for line in said)
 
 
+# --- caches that others may write -------------------------------------------------------------------------------------
+
+OTHER = 65534  # nobody
+
+
+def plant(path, mark):
+    """Put a library in the place of another that leaves a mark where it is loaded."""
+    source = path.with_name("planted.c")
+    source.write_text("#include <stdio.h>\n__attribute__((constructor)) static void planted(void) {\n"
+                      f'    fclose(fopen("{mark}", "w"));\n}}\n')
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", str(path), str(source)], check=True)
+    source.unlink()
+
+
+FOLDER, FILE = "the kernels cannot be kept in", "{library} is made anew"
+OWNERS = {  # what is done to folder and library, and the beginning of what is said
+    "a folder that all may write": (lambda folder, library: folder.chmod(0o777), FOLDER),
+    "a folder that a group may write": (lambda folder, library: folder.chmod(0o770), FOLDER),
+    "a library that all may write": (lambda folder, library: library.chmod(0o666), FILE),
+    "a folder of another": (lambda folder, library: os.chown(folder, OTHER, -1), FOLDER),
+    "a library of another": (lambda folder, library: os.chown(library, OTHER, -1), FILE),
+    "a link to one of another": (lambda folder, library: linked(library), FILE),
+    "a link of another to a folder": (lambda folder, library: moved(folder), FOLDER),
+}
+
+
+def linked(library):
+    elsewhere = library.rename(library.parent.parent / library.name)
+    os.chown(elsewhere, OTHER, -1)
+    library.symlink_to(elsewhere)
+
+
+def moved(folder):
+    elsewhere = folder.rename(folder.with_name("elsewhere"))
+    folder.symlink_to(elsewhere)
+    os.chown(folder, OTHER, -1, follow_symlinks=False)
+
+
+@pytest.mark.parametrize("name", OWNERS)
+def test_nothing_is_loaded_that_others_may_have_put_there(name, here, tmp_path, capsys):
+    if "another" in name and os.geteuid() != 0:
+        pytest.skip("only root gives files away")
+    (harm, said), made, mark = OWNERS[name], only(here), tmp_path / "planted"
+    plant(made, mark)
+    harm(here, made)
+    found = library.loaded(RECIPE)
+    assert not mark.exists()
+    assert found.gaussian(3, 7) == pytest.approx(WANTED, rel=1e-14)
+    first, *more = capsys.readouterr().err.splitlines()
+    assert more in ([], ["servotwin: compiling kernels for this machine, once"])
+    assert first.startswith(f"servotwin: {said.format(library=made)}")
+    assert said == FILE or first.endswith("set SERVOTWIN_CACHE_DIR to a private folder")
+    assert library.loaded(RECIPE).gaussian(3, 7) == pytest.approx(WANTED, rel=1e-14)
+    assert capsys.readouterr().err == ""
+    assert said == FOLDER or only(here).stat().st_mode & 0o777 == 0o700
+
+
+def test_the_planted_library_is_one_that_would_be_loaded(here, tmp_path):
+    plant(only(here), tmp_path / "planted")
+    library.loaded(RECIPE)
+    assert (tmp_path / "planted").exists()
+
+
+def test_an_index_of_others_is_not_read(here, capsys):
+    index = only(here, "*.json")
+    index.chmod(0o666)
+    index.write_text(json.dumps({"text": "../planted", "functions": []}))
+    assert library.loaded(RECIPE).gaussian(3, 7) == pytest.approx(WANTED, rel=1e-14)
+    said = f"servotwin: {index} is made anew, for others may write it, until chmod go-w\n"
+    assert capsys.readouterr().err.startswith(said)
+    assert json.loads(index.read_text())["text"] != "../planted"
+    assert index.stat().st_mode & 0o777 == 0o600
+
+
+@pytest.mark.skipif(os.name == "nt" or os.geteuid() != 0 or shutil.which("setpriv") is None, reason="two users")
+def test_another_user_gets_nothing_of_a_folder_that_all_may_write(tmp_path, monkeypatch):
+    """Who comes first makes the folder, for itself alone; who comes second is told and makes its own kernels."""
+    shared = tmp_path / "shared"
+    shared.mkdir()
+    shared.chmod(0o1777)
+    for path in (tmp_path, *tmp_path.parents[:3]):
+        path.chmod(path.stat().st_mode | 0o055)
+    nobody = as_nobody(tmp_path / "python")
+    if subprocess.run([nobody, "-c", "import servotwin"], capture_output=True, check=False).returncode != 0:
+        pytest.skip("another user cannot read this package")
+    assert run(shared / "cache")[0] == "compiled"
+    assert (shared / "cache").stat().st_mode & 0o777 == 0o700
+    monkeypatch.setattr(sys, "executable", str(nobody))
+    way, errors = run(shared / "cache", HOME=str(tmp_path))
+    assert way == "compiled"
+    assert errors[0] == (f"servotwin: the kernels cannot be kept in {shared / 'cache'} (Permission denied); set "
+                         "SERVOTWIN_CACHE_DIR to a private folder")
+    (shared / "cache").rename(shared / "of root")
+    (shared / "cache").mkdir()
+    os.chown(shared / "cache", OTHER - 1, -1)
+    assert "it belongs to another user" in run(shared / "cache", HOME=str(tmp_path))[1][0]
+
+
+def as_nobody(path):
+    path.write_text(f'#!/bin/sh\nexec setpriv --reuid {OTHER} --regid {OTHER} --clear-groups {sys.executable} "$@"\n')
+    path.chmod(0o755)
+    return path
+
+
+def test_a_cache_is_made_for_its_user_alone(tmp_path):
+    old = os.umask(0o002)
+    try:
+        assert run(tmp_path / "new" / "cache") == ("compiled", ["servotwin: compiling kernels for this machine, once"])
+        assert run(tmp_path / "new" / "cache") == ("compiled", [])
+    finally:
+        os.umask(old)
+    made = tmp_path / "new" / "cache"
+    assert {path.stat().st_mode & 0o077 for path in (made, *made.iterdir())} == {0}
+
+
+def test_a_lock_is_no_way_into_another_file(here, tmp_path, monkeypatch):
+    precious = tmp_path / "precious"
+    precious.write_text("kept")
+    lock = only(here, "*.lock")
+    lock.unlink()
+    lock.symlink_to(precious)
+    only(here).unlink()
+    assert library.loaded(RECIPE).gaussian(3, 7) == pytest.approx(WANTED, rel=1e-14)
+    assert precious.read_text() == "kept"
+
+
 def test_a_library_for_another_processor_is_not_loaded(tmp_path, monkeypatch):
     monkeypatch.setenv("SERVOTWIN_CACHE_DIR", str(tmp_path))
     names = set()

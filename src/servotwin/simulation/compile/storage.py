@@ -67,7 +67,10 @@ def distrust(path: Path) -> str | None:
 
 def is_there(path: Path) -> bool:
     """Tell whether there is a file that may be loaded or run; of one that may not it is said once why."""
-    if not path.is_file():
+    try:
+        if not path.is_file():
+            return False
+    except OSError:  # in a folder that this user may not look into
         return False
     reason = distrust(path)
     if reason is not None:
