@@ -4,6 +4,7 @@ import dataclasses
 
 from hypothesis import strategies as st
 
+from servotwin.errors import HIDDEN
 from servotwin.parameters import GROUPS, ORIGINS, Quantity, Servo, unit_of
 
 _NUMBERS = {
@@ -62,6 +63,7 @@ def without_stops_if_endless(groups):
 plain_values = st.fixed_dictionaries(
     {}, optional={name: group_values(kind) for name, kind in GROUPS.items()}).map(without_stops_if_endless)
 texts = st.text(st.characters(codec="utf-8"), max_size=40)
+names = texts.map(lambda text: HIDDEN.sub("", text))  # others are refused
 toml_values = st.recursive(
     st.booleans() | st.integers(-2**60, 2**60) | st.floats(allow_nan=False, allow_infinity=False) | texts,
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(texts, inner, max_size=3), max_leaves=6)
@@ -87,5 +89,5 @@ def servos(draw):
             source = draw(texts.filter(bool)) if origin != "assumed" else draw(st.none() | texts)
             quantities[f"{name}.{f.name}"] = Quantity(
                 value=value, unit=unit_of(f"{name}.{f.name}"), origin=origin, source=source, **spread)
-    return Servo(name=draw(texts.filter(bool)), title=draw(texts), notes=draw(texts), quantities=quantities,
+    return Servo(name=draw(names.filter(bool)), title=draw(names), notes=draw(texts), quantities=quantities,
                  sheet=draw(tables), fit=draw(tables), **groups)
