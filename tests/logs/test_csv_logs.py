@@ -184,8 +184,9 @@ def test_what_is_written_is_read_back_bit_for_bit(tmp_path, data, kind, n):
     silent = some.nothing() if kind == "voltage" or hold == "linear" else some.just(math.nan)
     value = data.draw(some.floats(1e-9, 0.1))
     angle = [0.1, *column(finite | some.just(math.nan))[1:]]
+    name = data.draw(some.text(max_size=5).map(lambda text: HIDDEN.sub("", text) or "a"))
     log = Log(
-        name=data.draw(some.text(min_size=1, max_size=5).map(lambda text: HIDDEN.sub("", text) or "a")), time=np.cumsum(steps), command_kind=kind,
+        name=name, time=np.cumsum(steps), command_kind=kind,
         command=[value, *column((some.floats(1e-9, 0.1) if kind == "pulse_width" else finite) | silent)[1:]],
         measured={"output_angle": angle, "supply_current": column(finite)},
         torque_on=data.draw(some.none() | some.just(column(some.booleans()))),
