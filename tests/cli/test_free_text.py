@@ -84,7 +84,7 @@ ELSEWHERE = {
     ("robot compare", "--out"): "escapes as two-link; its runs take a minute", ("robot compare", "--json"): "as above",
     ("robot scara", "--out"): "the writer of two-link", ("robot scara", "--json"): "the writer of two-link",
     ("catalog list", "--json"): "the catalog's own names", ("catalog registers", "--json"): "the catalog's own names",
-    ("web", "--export"): "test_same_numbers: a scene travels packed", ("web", "--json"): "an address",
+    ("web", "--export"): "test_page_alone: a scene travels packed", ("web", "--json"): "an address",
     ("bench list", "--json"): "ports", ("bench check", "--json"): "a board's own words",
     ("bench calibrate", "--out"): "numbers of channels", ("bench calibrate", "--json"): "numbers of channels",
     ("bench record", "--out"): "the recorder of rehearse", ("bench record", "--json"): "the recorder of rehearse",

@@ -54,7 +54,9 @@ def test_what_cannot_be_written_is_said_in_a_line(tmp_path, monkeypatch):
 
 
 def test_a_bench_as_a_file_is_small_and_asks_for_nothing(tmp_path):
-    done = exported(tmp_path / "a.html")
+    name = "</script><script>document.title = 'planted'</script>"
+    (tmp_path / "scene.toml").write_text(f'format = 1\nname = "{name}"\n[[servo]]\nid = "hitec-hs-755hb"\n')
+    done = exported(tmp_path / "a.html", "--scene", tmp_path / "scene.toml")
     if isinstance(done.exception, kernel.NoCompilerError):
         pytest.skip(str(done.exception))
     assert done.exit_code == 0, done.exception
@@ -63,3 +65,4 @@ def test_a_bench_as_a_file_is_small_and_asks_for_nothing(tmp_path):
     head = re.sub(r'<script type="application/gzip".*?</script>', "", text, flags=re.S)
     assert not re.findall(r"""(?:src|href)=["'](?!data:|#)""", head)
     assert "default-src 'none'" in head
+    assert "planted" not in text  # what a scene calls itself travels packed
