@@ -34,8 +34,8 @@ def test_a_comment_of_c_ends_where_it_ends(flags, tmp_path):
         "int main(void) { return 0; }".split())
 
 
-@pytest.mark.parametrize("name", [*NAMES.values(), "../../x", "/etc/passwd", "CON", "nul.txt", "n" * 10_000, ".hidden",
-                                  "", "日本", "a b"])
+@pytest.mark.parametrize("name", [
+    *NAMES.values(), "../../x", "/etc/passwd", "CON", "nul.txt", "e\u0301", "n" * 10_000, ".hidden", "", "日本", "a b"])
 def test_names_of_files_and_functions(name, tmp_path):
     stem, own = text.file_stem(name), text.identifier(name)
     (tmp_path / f"{stem}.toml").write_text("")
@@ -43,6 +43,7 @@ def test_names_of_files_and_functions(name, tmp_path):
     assert own.isidentifier()
     assert own.isascii()
     assert not text.is_taken(own)
+    assert stem.partition(".")[0].lower() not in ("con", "nul")
     assert max(len(stem), len(own)) <= 90
 
 
@@ -94,21 +95,24 @@ LONG = ["a"] * 40_000
 
 @pytest.mark.parametrize("deep", [
     f"{'.'.join(LONG)} = 1", f"[{'.'.join(LONG)}]", f"x = {{{'.'.join(LONG)} = 1}}",
-    '"a" . ' * 40_000 + "a = 1", "'a'." * 40_000 + "a = 1", 'x = "\\""\n' + ".".join(LONG), "a.a.a.a.a.a.a.a.a = 1"])
+    '"a" . ' * 40_000 + "a = 1", "'a'." * 40_000 + "a = 1", 'x = "\\""\n' + ".".join(LONG), "a." * 16 + "a = 1",
+    'x = {a = """q"""", ' + ".".join(LONG) + " = 1}", "x = {a = '''q''''', " + ".".join(LONG) + " = 1}",
+    "x = " + "[" * 40_000, "x = " + "{a = " * 17 + "1" + "}" * 17])
 def test_keys_of_toml_that_are_too_deep_are_refused_before_they_are_read(deep):
     """They took 30 s of a core, which grows with the square of the parts."""
-    with pytest.raises(ValueError, match="a key of more than 8 parts"):
+    with pytest.raises(ValueError, match="nested too deeply, in more than 16 tables"):
         text.load_toml(deep)
 
 
-@pytest.mark.parametrize("wrong", ["[" * 40_000, "x = '''\n" * 20_001, 'x = """' + '\\"""' * 10_000, "x"])
+@pytest.mark.parametrize("wrong", ["x = '''\n" * 20_001, 'x = """' + '\\"""' * 10_000, "x"])
 def test_what_is_no_toml(wrong):
-    with pytest.raises(ValueError, match=r"nested too deeply|\(at (line|end)"):
+    with pytest.raises(ValueError, match=r"\(at (line|end)"):
         text.load_toml(wrong)
 
 
 @pytest.mark.parametrize(("written", "read"), [
-    ('a.b.c = 1.5', {"a": {"b": {"c": 1.5}}}), ('x = "a.b.c.d.e.f.g.h.i.j = 1"', {"x": "a.b.c.d.e.f.g.h.i.j = 1"}),
+    ("a.b.c = 1.5", {"a": {"b": {"c": 1.5}}}), ('x = """"q""""" # a', {"x": '"q""'}),
+    ('x = "a.b.c.d.e.f.g.h.i.j = 1"', {"x": "a.b.c.d.e.f.g.h.i.j = 1"}),
     ("x = 'a.b.c.d.e.f.g.h.i.j'", {"x": "a.b.c.d.e.f.g.h.i.j"}), ("# a.b.c.d.e.f.g.h.i.j\nx = 1", {"x": 1}),
     ('x = """\na.b.c.d.e.f.g.h.i.j\n"""', {"x": "a.b.c.d.e.f.g.h.i.j\n"}),
     ("x = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]", {"x": [k / 10 for k in range(1, 11)]}),

@@ -18,15 +18,16 @@ from servotwin.errors import HIDDEN, InputError, one_line
 LONGEST_NAME = 200  # characters
 LONGEST_FILE_NAME = 255  # bytes, which file systems allow
 LONGEST_STEM = 80  # of the name of a file or a function that is made of a name
-DEEPEST = 8  # parts of a key: what reads TOML takes a time that grows with their square
-_DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)  # which Windows keeps for itself
-# Of headers that C, FMI and an FMU's own sources include
-_HEADERS = re.compile("assert|complex|component|ctype|errno|fenv|float|fmi.*|inttypes|iso646|limits|locale|math|model|"
-                      "setjmp|signal|std.*|string|tgmath|time|wchar|wctype")
+DEEPEST = 16  # tables in tables: what reads keys of TOML takes a time that grows with the square of their parts
+_DEVICES = re.compile(r"(con|prn|aux|nul|(?:com|lpt)[\d¹²³])(?=\.|$)", re.IGNORECASE)  # which Windows keeps for itself
+# Of headers that C, its libraries, FMI and an FMU's own sources include
+_HEADERS = re.compile("alloca|assert|availability|complex|component|corecrt.*|crtdefs|ctype|endian|errno|features|fenv|"
+                      "float|fmi.*|inttypes|iso646|limits|locale|malloc|math|model|sal|setjmp|signal|std.*|string|"
+                      "tgmath|time|vadefs|vcruntime.*|wchar|wctype|xlocale")
 _KEPT = "\n\t"
 # Strings and comments of TOML; one that does not end goes to the end of its line, or of the text
-_QUOTED = re.compile(r'''"""(?:\\.|[^\\])*?(?:"""|\Z)|"(?:\\.|[^"\\\n])*+"?|#[^\n]*+'''
-                     r"""|'{3}.*?(?:'{3}|\Z)|'[^'\n]*+'?""", re.DOTALL)
+_QUOTED = re.compile(r'''"""(?:\\.|[^\\])*?(?:"{3,5}|\Z)|"(?:\\.|[^"\\\n])*+"?|#[^\n]*+'''
+                     r"""|'{3}.*?(?:'{3,5}|\Z)|'[^'\n]*+'?""", re.DOTALL)
 _DEEP = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST}}}")
 
 
@@ -81,7 +82,7 @@ def load_toml(text: str) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        If it is no TOML, or nested too deeply: a key has at most 8 parts.
+        If it is no TOML, or has more than 16 tables in each other.
 
     Examples
     --------
@@ -90,12 +91,22 @@ def load_toml(text: str) -> dict[str, Any]:
     """
     import tomllib
 
+    deep = f"nested too deeply, in more than {DEEPEST} tables"
     if _DEEP.search(_QUOTED.sub("_", text)):
-        raise ValueError(f"a key of more than {DEEPEST} parts")
+        raise ValueError(deep)
     try:
-        return tomllib.loads(text)
+        found = tomllib.loads(text)
     except RecursionError:
-        raise ValueError("nested too deeply") from None
+        raise ValueError(deep) from None
+    if _depth(found) > DEEPEST:  # what is written of it has keys that long
+        raise ValueError(deep)
+    return found
+
+
+def _depth(value: Any) -> int:
+    if isinstance(value, dict):
+        return 1 + max(map(_depth, value.values()), default=0)
+    return max(map(_depth, value), default=0) if isinstance(value, list) else 0
 
 
 def shown(text: str) -> str:
@@ -177,8 +188,9 @@ def file_stem(name: str) -> str:
     >>> file_stem("elbow"), file_stem("../../x"), file_stem("con")
     ('elbow', 'x', 'con_')
     """
-    stem = re.sub(r"[^\w.+-]+", "_", name)[:LONGEST_STEM].strip("._") or "unnamed"
-    return f"{stem}_" if _DEVICES.fullmatch(stem) else stem
+    plain = unicodedata.normalize("NFC", name)
+    stem = re.sub(r"[^\w.+-]+", "_", plain)[:LONGEST_STEM].strip("._") or "unnamed"
+    return _DEVICES.sub(r"\1_", stem, count=1) if _DEVICES.match(stem) else stem
 
 
 def file_stems(names: Iterable[str]) -> dict[str, str]:

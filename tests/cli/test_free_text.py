@@ -306,9 +306,9 @@ def of_columns(path, name):
     table(path, ["time_s", "command_angle_deg", "output_angle_deg", name], [[0.1 * k, 1, 1, 1] for k in range(5)])
 
 
-def of_a_sidecar(path, name):
+def of_a_sidecar(path, key, value):
     of_columns(path, "x")
-    path.with_suffix(".json").write_text(json.dumps({"format": "servotwin-log-1", "name": name}))
+    path.with_suffix(".json").write_text(json.dumps({"format": "servotwin-log-1", key: value}))
 
 
 HIDDEN_NAMES = [name for key, name in REFUSED.items() if key not in ("10 kB", "line end", "nul")]
@@ -318,8 +318,14 @@ HIDDEN_NAMES = [name for key, name in REFUSED.items() if key not in ("10 kB", "l
 def test_names_of_columns_logs_joints_robots_and_scenes_are_refused_with_their_place(name, here, tmp_path):
     of_columns(tmp_path / "run.csv", name)
     assert "run.csv: line 1, name of column 4: got " in here("log", "run.csv").error
-    of_a_sidecar(tmp_path / "run.csv", name)
-    assert "run.csv: name of a log: got " in here("log", "run.csv").error
+    for key, said in (("name", "name of a log"), ("motion", "motion")):
+        of_a_sidecar(tmp_path / "run.csv", key, name)
+        assert f"run.csv: {said}: got " in here("log", "run.csv").error
+    of_a_sidecar(tmp_path / "run.csv", "conditions", {"room": name})
+    assert "run.csv: conditions, room: got " in here("log", "run.csv").error
+    table(tmp_path / "sheet.csv", ["maker", "model", "V", "stall_torque_Nm", "speed_s_per_60deg"],
+          [["Acme", name, 6.0, 0.4, 0.19]])
+    assert "sheet.csv: line 2, maker and model: got " in here("catalog", "from-sheet", "--csv", "sheet.csv").error
     (tmp_path / "wire.toml").write_text(f'[[servo]]\nid = 1\nservo = "feetech-sts3215-12v"\njoint = {json.dumps(name)}')
     assert "wire.toml: joint of servo 1: got " in here("wire", "wire.toml", "--duration", "0.1").error
     with pytest.raises(st.errors.InputError, match="name of a scene: got"):
@@ -331,8 +337,21 @@ def test_a_robot_whose_names_no_reader_sees_is_refused(what, name, joint, here, 
     pytest.importorskip("mujoco", reason="the extra `robots` is not installed")
     (tmp_path / "arm.xml").write_text(robot(name, [joint]), encoding="utf-8")
     words = ("robot", "run", "arm.xml", "--servo", "*=pulse.toml", "--motion", "wave.csv", "--out", "new")
-    assert "arm.xml: name: got " in here(*words).error
+    assert re.search(r"arm\.xml: name of (the model|a joint): got ", here(*words).error)
     assert not (tmp_path / "new").exists()
+
+
+def test_a_header_of_two_lines_is_one_of_blanks(here, tmp_path):
+    (tmp_path / "run.csv").write_text('time_s,command_angle_deg,"output_angle\n_deg","the\tload\r\n(N m)"\n' + "".join(
+        f"{0.1 * k},{k},{k},0\n" for k in range(12)))
+    assert "the load (N m)" in here("log", "run.csv", "--columns", "output_angle=output_angle _deg:deg").out
+
+
+def test_a_text_that_is_no_unicode_is_said_in_a_line(here, tmp_path):
+    words = ("catalog", "from-sheet", "--name", "zz", "--torque", "1 N m @6", "--speed", "0.2 s/60deg @6", "--note",
+             "x\udcff", "--out", "new.toml")
+    assert "not valid Unicode" in here(*words).error
+    assert not (tmp_path / "new.toml").exists()
 
 
 # --- all writers ------------------------------------------------------------------------------------------------------

@@ -184,16 +184,16 @@ def test_what_is_written_is_read_back_bit_for_bit(tmp_path, data, kind, n):
     silent = some.nothing() if kind == "voltage" or hold == "linear" else some.just(math.nan)
     value = data.draw(some.floats(1e-9, 0.1))
     angle = [0.1, *column(finite | some.just(math.nan))[1:]]
-    name = data.draw(some.text(max_size=5).map(lambda text: HIDDEN.sub("", text) or "a"))
+    names = some.text(max_size=5).map(lambda text: HIDDEN.sub("", text))
     log = Log(
-        name=name, time=np.cumsum(steps), command_kind=kind,
+        name=data.draw(names) or "a", time=np.cumsum(steps), command_kind=kind,
         command=[value, *column((some.floats(1e-9, 0.1) if kind == "pulse_width" else finite) | silent)[1:]],
         measured={"output_angle": angle, "supply_current": column(finite)},
         torque_on=data.draw(some.none() | some.just(column(some.booleans()))),
         load=(st.loads.Recorded([0.0, 1.0], column(finite)[:2]) + st.loads.Constant(0.1 / 3.0)
               + st.loads.Pendulum(mass=0.1 / 3.0, length=0.12, inertia=1e-3)),
-        parameters={"supply.open_circuit_voltage": 6.1 / 3.0}, motion=data.draw(some.text(max_size=5)),
-        conditions=data.draw(some.dictionaries(some.text(max_size=3), some.text(max_size=3) | finite, max_size=2)),
+        parameters={"supply.open_circuit_voltage": 6.1 / 3.0}, motion=data.draw(names),
+        conditions=data.draw(some.dictionaries(names, names | finite, max_size=2)),
         command_hold=hold, left_out=[(-3.1, -1.0 / 3.0)],
         source="a bench")
     write_log(log, tmp_path / "run.csv", overwrite=True)

@@ -23,6 +23,12 @@ def files(folder):
     (folder / "twice.toml").write_text(f"[[servo]]\nid = 1\nservo = '{STS}'\n" * 2, "utf-8")
     (folder / "empty.toml").write_text("supply = '12V'\n", "utf-8")
     (folder / "hand.csv").write_text("time_s,knee_deg\n0,1\n", "utf-8")
+    (folder / "deep.json").write_text("[" * 100_000, "utf-8")
+    (folder / "version.toml").write_text("[[fault]]\nkind = 'firmware'\nid = 1\nversion = ['x']\n", "utf-8")
+    (folder / "text.toml").write_text("[[fault]]\nkind = 'absent'\nid = 'x'\n", "utf-8")
+    (folder / "kind.toml").write_text("[[fault]]\nkind = ['a']\n", "utf-8")
+    (folder / "five.toml").write_text(f"[[servo]]\nid = 1\nservo = '{STS}'\nregisters = 5\n", "utf-8")
+    (folder / "latin.csv").write_bytes(b"time_s,1_deg\n0,0\n1,\xff\n")
     (folder / "torn.csv").write_text("time_s,1_deg\n0,1\n1\n", "utf-8")
 
 
@@ -40,6 +46,12 @@ def files(folder):
     (["--servo", f"1={STS}", "--link", "no/such/folder"], "--link"),
     (["--servo", f"1={STS}", "--keep", "bad.json"], "no JSON"),
     (["--servo", f"1={STS}", "--keep", "other.json"], "IDs 9"),
+    (["--servo", f"1={STS}", "--keep", "deep.json"], "no JSON"),
+    (["--servo", f"1={STS}", "--faults", "version.toml"], "version of the fault"),
+    (["--servo", f"1={STS}", "--faults", "text.toml"], "id of the fault"),
+    (["--servo", f"1={STS}", "--faults", "kind.toml"], "unknown fault"),
+    (["--servo", f"1={STS}", "--hand", "latin.csv"], "row 3"),
+    (["five.toml"], "registers of servo 1"),
     (["--servo", f"1={STS}", "--keep", "name.json"], "X"),
     (["--servo", f"1={STS}", "--keep", "no/such/file"], "--keep"),
     (["--servo", f"1={STS}", "--faults", "bad.toml"], "gremlin"),

@@ -40,6 +40,7 @@ def texts(name: object, motion: object, source: object) -> str:
         if not isinstance(value, str):
             raise InputError(f"log {name!r}: {key}", got=value, allowed="a text")
     checked_name("name of a log", name, LONGEST_FILE_NAME)
+    checked_name(f"log {name!r}: motion", str(motion))
     return f"log {name!r}"
 
 
@@ -149,6 +150,9 @@ def conditions(where: str, values: object) -> dict[str, float | str]:
     for name, value in _mapping(f"{where}: conditions", values).items():
         if not isinstance(name, str) or not (isinstance(value, str) or is_finite(value)):
             raise InputError(f"{where}: conditions, {name}", got=value, allowed="a text or a finite number")
+        for text in (name, value):
+            if isinstance(text, str):
+                checked_name(f"{where}: conditions, {name}", text)
         made[name] = value if isinstance(value, str) else float(value)
     return made
 

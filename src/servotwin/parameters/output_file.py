@@ -39,14 +39,14 @@ def undo_all() -> None:
             undo()
 
 
-def write_file(path: str | Path, content: bytes | Callable[[Path], object], *, overwrite: bool = False) -> None:
+def write_file(path: str | Path, content: bytes | str | Callable[[Path], object], *, overwrite: bool = False) -> None:
     """Write a temporary file beside `path`, then move it into place; on failure nothing has changed.
 
     Parameters
     ----------
     path : str or Path
-    content : bytes or callable
-        A callable fills the temporary file, whose path it is given.
+    content : bytes, str or callable
+        A text is written as UTF-8; a callable fills the temporary file, whose path it is given.
     overwrite : bool
 
     Raises
@@ -54,7 +54,7 @@ def write_file(path: str | Path, content: bytes | Callable[[Path], object], *, o
     OutputExistsError
         If `path` exists and `overwrite` is false.
     OutputError
-        If it cannot be written.
+        If it cannot be written, or a text is not valid Unicode.
 
     Examples
     --------
@@ -67,6 +67,11 @@ def write_file(path: str | Path, content: bytes | Callable[[Path], object], *, o
     target = Path(path)
     if "\0" in str(target):
         raise OutputError(f"{str(target)!r} cannot be written (a path holds no NUL)")
+    if isinstance(content, str):
+        try:
+            content = content.encode()
+        except UnicodeEncodeError:
+            raise OutputError(f"{path} cannot be written (a text in it is not valid Unicode)") from None
     try:
         if target.exists() and not overwrite:
             raise OutputExistsError(target)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from servotwin import units
-from servotwin.errors import OutputError, ParameterError, ServoFileError, UnitError, UnknownNameError
+from servotwin.errors import ParameterError, ServoFileError, UnitError, UnknownNameError
 from servotwin.parameters.group import Group
 from servotwin.parameters.groups import GROUPS
 from servotwin.parameters.output_file import write_file
@@ -211,11 +211,7 @@ def servo_text(servo: Servo) -> str:
 
 def write_servo_file(servo: Servo, path: Path, *, overwrite: bool = False) -> None:
     """Write a servo file in SI; a failure leaves what was there untouched."""
-    try:
-        content = servo_text(servo).encode()
-    except UnicodeEncodeError:
-        raise OutputError(f"{path} cannot be written (a text of the servo is not valid Unicode)") from None
-    write_file(path, content, overwrite=overwrite)
+    write_file(path, servo_text(servo), overwrite=overwrite)
 
 
 def _document(servo: Servo) -> tomlkit.TOMLDocument:

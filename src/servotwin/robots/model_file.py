@@ -13,10 +13,11 @@ from servotwin.errors import InputError, UnknownNameError
 from servotwin.robots.mobile_robot import mobile_robot
 from servotwin.robots.places import load_mujoco
 from servotwin.robots.so101 import so101
-from servotwin.text import checked_name
+from servotwin.text import checked_name, fault_of
 
 BUILT_IN: Mapping[str, Callable[[], str]] = MappingProxyType({"so101": so101, "mobile": mobile_robot})
 """MJCF of robots that come with the package, by name."""
+_WORDS = {"jnt": "joint", "cam": "camera", "tex": "texture", "mat": "material"}
 _SKY = {"rgb1": (0.66, 0.75, 0.86), "rgb2": (0.93, 0.95, 0.97), "width": 64, "height": 384}
 _LIGHT = ((0.4, 0.4, 0.4), (0.6, 0.6, 0.6))  # ambient and diffuse, of a robot that has none
 
@@ -77,8 +78,17 @@ def _read(mujoco: Any, path: Path) -> Any:
         raise InputError(f"{path} is no model that MuJoCo reads ({' '.join(str(error).split())})") from None
     names = bytes(model.names).decode("utf-8", "surrogateescape")  # of the robot, its joints and all else
     for name in names.split("\0"):
-        checked_name(f"{path}: name", name, math.inf)
+        if fault_of(name, math.inf):
+            checked_name(f"{path}: name{_of_what(model, names, name)}", name, math.inf)
     return model
+
+
+def _of_what(model: Any, names: str, name: str) -> str:
+    """Return what of a model has a name, in MuJoCo's words."""
+    at = len(names[:names.index(name)].encode("utf-8", "surrogateescape"))
+    kinds = (kind for kind in dir(model) if kind.startswith("name_") and kind.endswith("adr"))
+    found = next((kind for kind in kinds if at in getattr(model, kind)), "")[len("name_"):-len("adr")]
+    return f" of a {_WORDS.get(found, found)}" if found else " of the model"
 
 
 def joint_names(model: Any) -> dict[str, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -275,6 +276,7 @@ def _table(path: Path, text: Text, found: list[Row], separator: str, known: Call
            remarks: list[str]) -> TextTable:
     header = _header(found, separator, known)
     names = [] if header is None else _names(text, found[header], separator, known, _width(found, separator))
+    names = [re.sub(r"\s*[\r\n\t]\s*", " ", name) for name in names]  # of two lines, as spreadsheets have them
     for k, name in enumerate(names, 1):
         checked_name(f"{path}: line {found[header or 0].line}, name of column {k}", name, math.inf)
     below = found if header is None else found[header + 1:]

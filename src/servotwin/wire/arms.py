@@ -117,7 +117,7 @@ def _arm(name: str | None) -> _Arm:
 def _read(path: Path) -> _Arm:
     """Read an arm file: `supply`, `body` and a table `[[servo]]` for each servo."""
     try:
-        found = load_toml(path.read_text("utf-8"))
+        found = load_toml(path.read_text("utf-8-sig"))
     except ValueError as error:
         raise InputError(f"{path}", got=str(error), allowed="an arm file in TOML") from None
     _known(f"{path}: key", found, _KEYS)
@@ -137,6 +137,8 @@ def _read(path: Path) -> _Arm:
         joints[id] = checked_name(f"{path}: joint of servo {id}", str(one.get("joint", "")))
         angles[id] = _degrees(path, one.get("angle_deg", 0.0))
         words = one.get("registers", [])
+        if not isinstance(words, str | list):
+            raise InputError(f"{path}: registers of servo {id}", got=words, allowed='such as ["P_Coefficient=16"]')
         registers[id] = (words,) if isinstance(words, str) else tuple(str(word) for word in words)
     for key in ("supply", "body"):
         if key in found and not isinstance(found[key], str):

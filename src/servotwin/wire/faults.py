@@ -57,8 +57,15 @@ class Fault:
     version: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise UnknownNameError("fault", self.kind, KINDS)
+        if not isinstance(self.kind, str) or self.kind not in KINDS:
+            raise UnknownNameError("fault", str(self.kind), KINDS)
+        for name in ("at", "until", "rate", "seconds"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                raise InputError(f"{name} of the fault {self.kind!r}", got=value, allowed="a number")
+        for name, given in (("id", self.id), ("to", self.to), *(("version", part) for part in self.version)):
+            if given is not None and type(given) is not int:
+                raise InputError(f"{name} of the fault {self.kind!r}", got=given, allowed="a whole number")
         for name, bad, allowed in (
                 ("rate", not 0.0 <= self.rate <= 1.0, "0 to 1"),
                 ("seconds", not 0.0 <= self.seconds <= 60.0, "0 to 60"),
@@ -173,7 +180,7 @@ def read_faults(path: str | Path, seed: int = 0) -> Faults:
         Or one of its kinds, if there is something in it that is no fault.
     """
     try:
-        found = load_toml(Path(path).read_text("utf-8"))
+        found = load_toml(Path(path).read_text("utf-8-sig"))
     except ValueError as error:
         raise InputError(f"{path}", got=str(error), allowed="a TOML file of [[fault]] tables") from None
     made, names = list[Fault](), tuple(Fault.__dataclass_fields__)
@@ -186,8 +193,8 @@ def read_faults(path: str | Path, seed: int = 0) -> Faults:
             raise UnknownNameError(f"{path}: key of a fault", unknown, names)
         if "kind" not in one:
             raise InputError(f"{path}: a fault", got=one, allowed="a kind")
-        try:
-            made.append(Fault(**{**one, "version": tuple(one.get("version", ()))}))
-        except TypeError as error:
-            raise InputError(f"{path}: fault {one['kind']!r}", got=str(error), allowed="numbers") from None
+        version = one.get("version", [])
+        if not isinstance(version, list):
+            raise InputError(f"{path}: version of the fault {one['kind']!r}", got=version, allowed="such as [3, 9]")
+        made.append(Fault(**{**one, "version": tuple(version)}))
     return Faults(made, seed)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from servotwin.errors import InputError
+from servotwin.tables.text import read_text
 from servotwin.wire.bus import Bus
 
 
@@ -43,7 +44,8 @@ def hand_of(path: str | Path, bus: Bus, names: Mapping[int, str]) -> Callable[[B
 
 
 def _table(path: Path) -> dict[str, np.ndarray]:
-    lines = [line.strip() for line in path.read_text("utf-8").splitlines() if line.strip() and line[:1] != "#"]
+    text = read_text(path)
+    lines = [line.strip() for line in (*text.lines, text.rest) if line.strip() and line[:1] != "#"]
     head = [word.strip() for word in lines[0].split(",")] if lines else []
     if "time_s" not in head or len(head) < 2 or len(set(head)) < len(head):
         raise InputError(f"{path}", got=", ".join(head) or "nothing",

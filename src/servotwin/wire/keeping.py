@@ -80,7 +80,7 @@ def read_kept(path: Path, bus: Bus) -> dict[str, dict[str, int]]:
     """
     try:
         found: Any = json.loads(path.read_text("utf-8"))
-    except (ValueError, UnicodeDecodeError):
+    except (ValueError, RecursionError):
         raise InputError(f"{path}", got="no JSON", allowed=_FORM) from None
     servos = found.get("servos") if isinstance(found, dict) and found.get("servotwin") == "wire" else None
     if not isinstance(servos, dict) or not all(

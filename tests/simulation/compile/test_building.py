@@ -243,7 +243,7 @@ def test_a_file_in_place_of_the_cache(tmp_path):
 
 def not_writable(monkeypatch):
     access = os.access
-    monkeypatch.setattr(os, "access", lambda path, mode, **more: mode != os.W_OK and access(path, mode, **more))
+    monkeypatch.setattr(os, "access", lambda path, mode, **more: not mode & os.W_OK and access(path, mode, **more))
 
 
 def test_a_cache_that_cannot_be_written(tmp_path, monkeypatch, capsys):
@@ -389,6 +389,19 @@ def test_a_cache_is_made_for_its_user_alone(tmp_path):
         os.umask(old)
     made = tmp_path / "new" / "cache"
     assert {path.stat().st_mode & 0o077 for path in (made, *made.iterdir())} == {0}
+
+
+def test_a_cache_that_is_named_from_here(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("SERVOTWIN_CACHE_DIR", "below/cache")
+    assert library.loaded(RECIPE).gaussian(3, 7) == pytest.approx(WANTED, rel=1e-14)
+    assert only(tmp_path / "below" / "cache")
+    monkeypatch.setenv("SERVOTWIN_CACHE_DIR", str(odd := tmp_path / "red\x1b[31m\n"))
+    odd.mkdir()
+    odd.chmod(0o777)
+    capsys.readouterr()
+    assert library.loaded(RECIPE).gaussian(3, 7) == pytest.approx(WANTED, rel=1e-14)
+    assert "red\\x1b[31m\\n (others may write it" in capsys.readouterr().err
 
 
 def test_a_lock_is_no_way_into_another_file(here, tmp_path, monkeypatch):

@@ -10,6 +10,7 @@ import numpy as np
 
 from servotwin.identification.report.shown import MODELS, error_rows, nominal_of
 from servotwin.look import COLOURS, WIDTH, context, finished, new_figure
+from servotwin.text import shortened
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -171,7 +172,7 @@ def errors(tables: Mapping[str, ErrorTable], label: str, factor: float, unit: st
         most = max((x for *_, by in rows for x in by.values() if math.isfinite(x)), default=1.0) * factor
         for place, (_, which, by) in enumerate(rows):
             _draw_errors(ax, place, by, models, factor, most, faint=which == "fitted" and len(tables) > 1)
-        ax.set_yticks(range(len(rows)), [f"{row.value}\n{row.which}".rstrip() for row in rows])
+        ax.set_yticks(range(len(rows)), [f"{shortened(row.value)}\n{row.which}".rstrip() for row in rows])
         ax.set_ylim(len(rows) - 0.45, -0.55)
         ax.set_xlim(0.0, 1.16 * most)
         ax.grid(visible=False, axis="y")

@@ -12,6 +12,7 @@ from typing import Any
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.identification.sheets.sheet import ENDLESS, Sheet, SheetPoint
 from servotwin.tables import read_table
+from servotwin.text import checked_name
 
 _DEG = math.pi / 180.0
 _POINT = {"V": ("supply_voltage", 1.0), "stall_torque_Nm": ("stall_torque", 1.0),
@@ -72,7 +73,7 @@ def read_sheets(path: str | Path) -> SheetList:
         models.setdefault((row.get("maker", ""), row["model"]), []).append((line, row))
     sheets, left_out, names = [], [], set[str]()
     for (maker, model), own in models.items():
-        title = f"{maker} {model}".strip()
+        title = checked_name(f"{path}: line {own[0][0]}, maker and model", f"{maker} {model}".strip())
         complete = [row for _, row in own if row["V"] and row["stall_torque_Nm"] and row["speed_s_per_60deg"]]
         if not complete:
             left_out.append(f"{title}: no torque and speed at one voltage")

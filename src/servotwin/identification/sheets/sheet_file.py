@@ -150,8 +150,7 @@ def write_servo_text(servo: Servo, path: str | Path, *, overwrite: bool = False)
     OutputExistsError, OutputError
         If the file exists and `overwrite` is false, or it cannot be written.
     """
-    content = servo_file_text(servo).encode()
-    write_file(path, content, overwrite=overwrite)
+    write_file(path, servo_file_text(servo), overwrite=overwrite)
 
 
 def _sheet_lines(table: Mapping[str, Any]) -> list[str]:

@@ -14,19 +14,21 @@ import sys
 from functools import cache
 from pathlib import Path
 
+from servotwin.errors import one_line
+
 
 def cache_folder() -> Path:
     """Return where compiled kernels are kept: SERVOTWIN_CACHE_DIR, or the platform's folder for such things."""
     named = os.environ.get("SERVOTWIN_CACHE_DIR")
     if named:
-        return Path(named)
+        return Path(named).absolute()  # compilers run elsewhere
     if sys.platform == "win32":
         base = os.environ.get("LOCALAPPDATA") or str(Path.home() / "AppData" / "Local")
     elif sys.platform == "darwin":
         base = str(Path.home() / "Library" / "Caches")
     else:
         base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    return Path(base) / "servotwin"
+    return Path(base).absolute() / "servotwin"
 
 
 def kept_folder() -> Path:
@@ -43,7 +45,7 @@ def writable_folder() -> Path:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with contextlib.suppress(FileExistsError):
             folder.mkdir(0o700)
-        reason = distrust(folder) or (None if os.access(folder, os.W_OK) else "Permission denied")
+        reason = distrust(folder) or (None if os.access(folder, os.W_OK | os.X_OK) else "Permission denied")
         reason = reason if folder.is_dir() else "Not a directory"
     except OSError as error:
         reason = error.strerror or str(error)
@@ -80,7 +82,7 @@ def is_there(path: Path) -> bool:
 
 @cache
 def _say(line: str) -> None:
-    sys.stderr.write(f"servotwin: {line}\n")
+    sys.stderr.write(f"servotwin: {one_line(line)}\n")
 
 
 @cache
