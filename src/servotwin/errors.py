@@ -25,14 +25,14 @@ HIDDEN = re.compile(r"[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\
 
 
 def one_line(text: str) -> str:
-    r"""Return a text as one line that shows all of it: control and bidirectional characters as Python writes them.
+    r"""Return a text as one line that shows all of it: what is not printable as Python writes it.
 
     Examples
     --------
     >>> one_line("two\nlines")
     'two\\nlines'
     """
-    return HIDDEN.sub(lambda found: repr(found[0])[1:-1], text)
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 class ServotwinError(Exception):

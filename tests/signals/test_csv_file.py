@@ -142,7 +142,7 @@ def test_what_python_writes_is_read_back_exactly(file, gaps, data):
     (b"PK\x03\x04\x14\0\x06\0\xd0\x9f\xe2", ("a zip archive or an Excel workbook",)),
     ('time_s,pulse_width_us\n0,"1500\n1,1600\n', ("line",)),  # a quote that never ends
     (b'time_s,pulse_width_us\n0,"' + b"9" * 200_000 + b'"\n', ("not readable as CSV", "field limit")),
-    ("\x1b[2Jtime_s,x\n0,1\n", ("a time column",)),
+    ("\x1b[2Jtime_s,x\n0,1\n", ("line 1, name of column 1",)),
 ])
 def test_what_is_wrong_is_said_in_one_line(file, content, words):
     refused(file(content), *words)

@@ -9,7 +9,7 @@ from functools import cache
 
 from servotwin.simulation.compile.finding import shipped_folder, source_key
 from servotwin.simulation.compile.recipe import Recipe
-from servotwin.simulation.compile.storage import is_there, kept_folder, key_of, writable_folder, write
+from servotwin.simulation.compile.storage import is_there, kept_folder, key_of, write
 
 
 @cache
@@ -33,5 +33,6 @@ def unread(recipe: Recipe, of: tuple[str, ...] = ()) -> tuple[str, ...]:
 
     found = tuple(unread_numbers(recipe, of))
     with contextlib.suppress(OSError):  # to find it again costs its time alone
-        write(writable_folder() / name, json.dumps({"unread": found}))
+        kept.parent.mkdir(0o700, parents=True, exist_ok=True)
+        write(kept, json.dumps({"unread": found}))
     return found
