@@ -20,7 +20,7 @@ def go_on(page, seconds: float) -> None:
 
 def until(page, time: float) -> None:
     """Wait until the bench has come to a time [s]."""
-    page.wait_for_function(f"bench.time >= {time}", timeout=40000)
+    page.wait_for_function(f"bench.time >= {time}", timeout=120000)  # two bus servos go at a fifth of it
 
 
 def pause(page) -> None:
