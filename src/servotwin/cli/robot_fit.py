@@ -67,13 +67,14 @@ def fit(
                                  within=limit, progress=progress)
         told = {"robot": model_file, "episodes": [one.source for one in asked.motions], **found.facts()}
         told["warnings"] = [*asked.said, *told["warnings"]]
-        _write(found, told, targets, force=force)
+        _write(found, told, targets, stems, force=force)
         told["files"] = [str(target.path) for target in targets]
         if not as_json:
             _show(found, told)
         return found, told
 
-    servos = [f"{stem}.toml" for stem in file_stems(asked.mounts).values()]
+    stems = file_stems(asked.mounts)
+    servos = [f"{stem}.toml" for stem in stems.values()]
     if out is None:
         found, told = done([])
     else:
@@ -96,7 +97,8 @@ def _show(found: ArmFit, told: dict[str, Any]) -> None:
                 *((("written", told["files"][-1]),) if told["files"] else ())]))
 
 
-def _write(found: ArmFit, told: dict[str, Any], targets: Sequence[Target], *, force: bool) -> None:
+def _write(found: ArmFit, told: dict[str, Any], targets: Sequence[Target], stems: dict[str, str], *,
+           force: bool) -> None:
     if not targets:
         return
     from servotwin import plotting
@@ -108,8 +110,8 @@ def _write(found: ArmFit, told: dict[str, Any], targets: Sequence[Target], *, fo
     judged = found.holdout or found.training
     with staged(targets, force=force) as drafts:
         places: dict[str, Path] = {target.path.name: draft for target, draft in zip(targets, drafts, strict=True)}
-        for joint, stem in file_stems(found.servos).items():
-            found.servos[joint].save(places[f"{stem}.toml"], overwrite=True)
+        for joint, servo in found.servos.items():
+            servo.save(places[f"{stems[joint]}.toml"], overwrite=True)
         places[SUMMARY].write_bytes((json_text(told) + "\n").encode())
         plotting.save(errors_picture(judged), places[ERRORS])
         plotting.save(windows_picture(judged), places[WINDOWS])
