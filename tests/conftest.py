@@ -5,12 +5,21 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+import costs
 import servotwin as st
 from servotwin.models import MODELS
 
 # A machine that does something else at the same time is no reason to fail
 settings.register_profile("shared machine", suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("shared machine")
+
+
+def pytest_addoption(parser):
+    costs.add_options(parser)
+
+
+def pytest_configure(config):
+    costs.begin(config)
 
 
 @pytest.fixture(scope="session")
