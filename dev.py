@@ -10,6 +10,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 import venv
 from pathlib import Path
 
@@ -20,9 +21,11 @@ STAMP = ENVIRONMENT / "installed"
 
 TASKS = {
     "setup": "make .venv and install servotwin with all tools",
-    "paper": "set up, then write the report of the paper to paper-report/ (main job)",
-    "test": "set up, then run the tests (12 minutes, three more on a machine that has compiled nothing yet)",
+    "paper": "set up what it needs, then write the report of the paper to paper-report/ (main job)",
+    "kernels": "set up, then compile the kernels that are named, or all, before somebody waits for them",
+    "test": "set up, then run the quick tests (4 minutes, two more in a fresh clone); --long: the longer ones as well",
     "validation": "set up, then run the slow tests: validation and coverage, browser (20 minutes more)",
+    "explore": "set up, then run the random tests from another seed on, which is printed or given",
     "sanitize": "set up, then run kernels with what gcc checks of memory and arithmetic (or the tests that are named)",
     "check": "set up, then lint, types, import rules",
     "examples": "set up, then run every script of examples/",
@@ -41,11 +44,15 @@ def run(*command: str) -> None:
         sys.exit(done.returncode)
 
 
-def setup() -> None:
-    """Make the environment and install, unless that was done for these very requirements."""
+def setup(extra: str = "dev") -> None:
+    """Make the environment and install an extra of the package, unless that was done for these very requirements.
+
+    Byte code is written when a module is first imported: of most that is installed no test imports anything.
+    """
     wanted = hashlib.sha256(b"".join((ROOT / name).read_bytes() for name in ("pyproject.toml", "constraints.txt")))
     wanted.update(f"{sys.version_info[:2]} {ROOT}".encode())
-    if STAMP.exists() and STAMP.read_text() == wanted.hexdigest():
+    stamps = [f"{wanted.hexdigest()} {name}" for name in dict.fromkeys((extra, "dev"))]  # the latter has all
+    if STAMP.exists() and STAMP.read_text() in stamps:
         return
     print("Setting up .venv (about a minute, once) ...", flush=True)
     if not (BIN / ("python.exe" if os.name == "nt" else "python")).exists():
@@ -53,27 +60,48 @@ def setup() -> None:
             venv.create(ENVIRONMENT, with_pip=True)
         except (subprocess.CalledProcessError, OSError, ImportError):
             sys.exit("dev.py: this Python cannot make virtual environments (on Debian: apt install python3-venv)")
-    install("dev")
+    install(extra)
     if not any(map(shutil.which, ("clang", "gcc", "cc"))):
         install("compile")
-    STAMP.write_text(wanted.hexdigest())
+    STAMP.write_text(stamps[0])
 
 
 def install(extra: str) -> None:
     """Install the package with one of its extras, in pinned versions."""
-    run("python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check",
+    run("python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-compile",
         "--constraint", "constraints.txt", "--editable", f".[{extra}]")
 
 
-def test(arguments: list[str]) -> None:
-    """Run the tests on two processes; the slow ones only where they are asked for by `-m` or by name."""
-    chosen = any(a == "-m" or not a.startswith("-") for a in arguments)
-    run("python", "-m", "pytest", "-n", "2", "--dist", "worksteal", *([] if chosen else ["-m", "not slow"]), *arguments)
+def kernels(arguments: list[str]) -> None:
+    """Compile kernels, two at a time, largest first."""
+    run("python", "tests/kernels.py", *arguments)
+
+
+def test(arguments: list[str], marks: str = "not slow and not long", budgets: str = "quick") -> None:
+    """Run tests on two processes: the quick ones, with `--long` those that are longer too, or what is named."""
+    if "--long" in arguments:
+        arguments, marks, budgets = [a for a in arguments if a != "--long"], "not slow", "long"
+    if any(a == "-m" or not a.startswith("-") for a in arguments):
+        run("python", "-m", "pytest", "-n", "2", "--dist", "worksteal", *arguments)
+        return
+    kernels(["--for", budgets])
+    run("python", "-m", "pytest", "-n", "2", "--dist", "worksteal", "-m", marks, "--budgets", budgets, *arguments)
 
 
 def validation(arguments: list[str]) -> None:
-    """Run the slow tests on two processes."""
-    test(["-m", "slow", *arguments])
+    """Run the slow tests on two processes; with `--long` those that `test` leaves to itself with that, too."""
+    longer = "--long" in arguments
+    rest = [a for a in arguments if a != "--long"]
+    test(rest, "slow or long", "rest") if longer else test(rest, "slow", "slow")
+
+
+def explore(arguments: list[str]) -> None:
+    """Run the tests that draw at random from another seed on; one that fails is to become a fixed one."""
+    seed, *rest = arguments or [str(time.time_ns() % 1_000_000)]
+    if not seed.isdecimal():
+        sys.exit(f"dev.py: got {seed}, allowed: explore [SEED], a whole number")
+    print(f"seed {seed}", flush=True)
+    run("python", "-m", "pytest", "-n", "2", "--dist", "worksteal", "-m", "", "--seed", seed, *rest)
 
 
 def sanitize(arguments: list[str]) -> None:
@@ -128,7 +156,8 @@ def main(arguments: list[str]) -> None:
     if task not in TASKS:
         print("usage: python3 dev.py TASK\n\n" + "\n".join(f"  {name:11} {what}" for name, what in TASKS.items()))
         sys.exit(0 if task in ("-h", "--help") else 2)
-    setup()
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # else each process compiles some hundred modules anew
+    setup("robots" if task == "paper" else "dev")
     rest = arguments[1:]
     if task == "paper":
         run("servotwin", "paper", *(rest or ["--out", "paper-report", "--force"]))
@@ -140,8 +169,8 @@ def main(arguments: list[str]) -> None:
         for script in sorted((ROOT / "benchmarks").glob("*/run.py")):
             run("python", str(script), *rest)
     elif task != "setup":
-        {"test": test, "validation": validation, "sanitize": sanitize, "check": check, "examples": examples,
-         "page": page, "wheel": wheel}[task](rest)
+        {"kernels": kernels, "test": test, "validation": validation, "explore": explore, "sanitize": sanitize,
+         "check": check, "examples": examples, "page": page, "wheel": wheel}[task](rest)
 
 
 if __name__ == "__main__":

@@ -9,17 +9,45 @@ import costs
 import servotwin as st
 from servotwin.models import MODELS
 
-# A machine that does something else at the same time is no reason to fail
-settings.register_profile("shared machine", suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile("shared machine")
+# A machine that does something else at the same time is no reason to fail, and each run draws the same examples
+settings.register_profile("fixed", suppress_health_check=[HealthCheck.too_slow], derandomize=True, deadline=None)
+settings.register_profile("explore", settings.get_profile("fixed"), derandomize=False)
+settings.load_profile("fixed")
 
 
 def pytest_addoption(parser):
     costs.add_options(parser)
+    parser.addoption("--seed", type=int, help="run the tests that draw at random alone, from this seed on")
 
 
 def pytest_configure(config):
     costs.begin(config)
+    if config.getoption("--seed") is not None:
+        settings.load_profile("explore")
+        config.option.hypothesisseed = config.getoption("--seed")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config, items):
+    """Take representatives of long families for quick; with `--seed` go on to other seeds, and leave out the rest."""
+    for item in items:
+        mark = item.get_closest_marker("long")
+        if mark is not None and mark.kwargs.get("but") == getattr(getattr(item, "callspec", None), "id", ""):
+            item.own_markers = [own for own in item.own_markers if own.name != "long"]
+    seed = config.getoption("--seed")
+    if seed is not None:
+        drawing = [item for item in items if _shifted(item, 1000 * seed)]
+        config.hook.pytest_deselected(items=[item for item in items if item not in set(drawing)])
+        items[:] = drawing
+
+
+def _shifted(item, by):
+    """Tell whether a test draws at random: by hypothesis, or from a seed, which becomes another one."""
+    parameters = item.callspec.params if hasattr(item, "callspec") else {}
+    if isinstance(parameters.get("seed"), int):
+        parameters["seed"] += by
+        return True
+    return getattr(getattr(item, "obj", None), "is_hypothesis_test", False)
 
 
 @pytest.fixture(scope="session")

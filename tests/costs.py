@@ -75,7 +75,10 @@ class Booking:
         building._made, library.Kernels.__init__, library.Kernels.__getattribute__ = timed, begun, got
 
     @pytest.hookimpl(wrapper=True, tryfirst=True)
-    def pytest_runtest_protocol(self) -> Iterator[None]:
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
+        limit = self.config.getoption("--cpu-limit")
+        if limit is not None and sum(spent()) > limit:
+            item.session.shouldstop = f"{limit:g} s of processor time are used up"
         if time.process_time() - self.calibrated > _EVERY:
             self.loop = calibration()
             self.calibrated = time.process_time()
@@ -188,6 +191,7 @@ def _folder(name: str) -> str:
 def add_options(parser: pytest.Parser) -> None:
     group = parser.getgroup("costs")
     group.addoption("--costs", metavar="FILE", help="write the cost of each item to a file (JSON)")
+    group.addoption("--cpu-limit", type=float, metavar="SECONDS", help="stop when a process has used up so much time")
     group.addoption("--budgets", metavar="NAME", help="hold folders against these budgets of tests/budgets.toml")
 
 

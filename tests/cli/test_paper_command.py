@@ -12,8 +12,8 @@ from servotwin.errors import OutputExistsError
 def asked(monkeypatch):
     calls = []
 
-    def write(out, *, force, progress, moving):
-        calls.append((out, force))
+    def write(out, *, force, formats, progress, moving):
+        calls.append((out, force, formats))
         progress("drawing", 0.5)
         progress("drawing", 0.6)
         progress("done", 1.0)
@@ -29,15 +29,15 @@ def asked(monkeypatch):
 def test_paths_and_headline_numbers(cli, asked):
     ended = cli("paper")
     assert ended.code == 0
-    assert asked == [(Path("paper-report"), False)]
+    assert asked == [(Path("paper-report"), False, ["png"])]
     assert "paper-report/report.html" in ended.out
     assert "worst_angle_deg  0.98765" in ended.out
     assert ended.err == " 50 % drawing\n100 % done\n"
 
 
 def test_json(cli, asked):
-    found = cli("paper", "--out", "here", "--force", "--json").data
-    assert asked == [(Path("here"), True)]
+    found = cli("paper", "--out", "here", "--force", "--formats", "svg,pdf", "--json").data
+    assert asked == [(Path("here"), True, ["svg", "pdf"])]
     assert found == {"folder": "here", "report": "here/report.html", "figures": ["here/figures/a.png"], "data": [],
                      "numbers": {"worst_angle_deg": 0.98765432}, "left_out": ""}
 
@@ -47,6 +47,11 @@ def test_a_report_that_is_there(cli, tmp_path):
     ended = cli("paper", "--out", tmp_path)
     assert ended.code == 2
     assert ended.err.splitlines()[-1].startswith(f"servotwin: error: {tmp_path} exists already")
+
+
+def test_a_format_that_is_none(cli, tmp_path):
+    assert "png, svg, pdf" in cli("paper", "--out", tmp_path / "new", "--formats", "png,bmp").error
+    assert not (tmp_path / "new").exists()
 
 
 def test_a_place_that_cannot_be(cli, tmp_path):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -80,9 +80,9 @@ def standing(result: Result, start: float, end: float | None = None, *, least: f
     if least is not None and not (math.isfinite(least) and least > 0.0):
         raise InputError("least swing", got=least, allowed="a positive angle [rad]")
     times = np.linspace(start, last, math.ceil((last - start) / _LOOK) + 1)
-    angle = result.at("output_angle", times)
-    current = result.at("armature_current", times)
-    bus = result.at("bus_voltage", times) if "bus_voltage" in result.names else np.array([math.nan])
+    looked = replace(result, time=times)  # one state for all signals
+    angle, current = looked["output_angle"], looked["armature_current"]
+    bus = looked["bus_voltage"] if "bus_voltage" in result.names else np.array([math.nan])
     if least is None:
         least = max(_PART * _largest(angle), _LEAST)
     return Standing(mean=float(angle.mean()), swing=float(np.ptp(angle)), lowest_bus=float(bus.min()),

@@ -6,6 +6,7 @@ import contextlib
 import os
 import sys
 import warnings
+from functools import cache
 
 from servotwin.cli import interrupts
 
@@ -13,6 +14,8 @@ TYPE_CHECKING = False  # as in interrupts: Ctrl-C is watched as soon as can be
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from typing import TextIO
+
+    from typer.core import TyperGroup
 
 TRACEBACK = "SERVOTWIN_TRACEBACK"
 
@@ -65,13 +68,20 @@ def _ran(words: Sequence[str]) -> int:
         return _failed(error, words)
 
 
-def _run(words: Sequence[str]) -> int:
-    import typer
+@cache
+def _command() -> TyperGroup:
+    """Return all commands with their options, which takes as long as to import them."""
     from typer.main import get_command
 
     from servotwin.cli.app import app
 
-    command = get_command(app)
+    return get_command(app)  # type: ignore[return-value]
+
+
+def _run(words: Sequence[str]) -> int:
+    import typer
+
+    command = _command()
     try:
         # Not command(...): that would print errors in its own way, and treat a broken pipe as one of ours.
         with command.make_context("servotwin", list(words)) as context:

@@ -18,6 +18,7 @@ from servotwin.errors import OutputError
 def paper(
     out: Annotated[str, typer.Option(metavar="FOLDER", help="Folder for the report.")] = "paper-report",
     force: Annotated[bool, typer.Option("--force", help="Replace an existing report.")] = False,
+    formats: Annotated[str, typer.Option(metavar="NAMES", help="Formats of the pictures: png,svg,pdf.")] = "png",
     as_json: Annotated[bool, typer.Option("--json", help="Print paths and headline numbers as JSON.")] = False,
 ) -> None:
     """Reproduce the paper's figures and tables in a report."""
@@ -27,7 +28,8 @@ def paper(
     if not out.strip():
         raise OutputError("--out", got=out, allowed="the name of a folder")
     with _progress() as progress:
-        report = write_paper_report(Path(out), force=force, progress=progress, moving=held)
+        report = write_paper_report(Path(out), force=force, formats=[name.strip() for name in formats.split(",")],
+                                    progress=progress, moving=held)
     if as_json:
         emit_json({
             "folder": str(report.folder), "report": str(report.page),

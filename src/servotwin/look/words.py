@@ -69,11 +69,11 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], *, caption: str = 
             f"<tbody>\n{body}</tbody></table></div>\n")
 
 
-def picture(svg: bytes | str, words: str, *, style: str = "", kind: str = "") -> str:
-    """Return an SVG picture inside the page itself: one file, and no names that could collide."""
-    data = base64.b64encode(svg.encode() if isinstance(svg, str) else svg).decode("ascii")
+def picture(image: bytes | str, words: str, *, style: str = "", kind: str = "", media: str = "image/svg+xml") -> str:
+    """Return a picture inside the page itself: one file, and no names that could collide."""
+    data = base64.b64encode(image.encode() if isinstance(image, str) else image).decode("ascii")
     attributes = (f' class="{kind}"' if kind else "") + (f' style="{style}"' if style else "")
-    return f'<img{attributes} alt="{escape(plain(words))}" src="data:image/svg+xml;base64,{data}">'
+    return f'<img{attributes} alt="{escape(plain(words))}" src="data:{media};base64,{data}">'
 
 
 def plain(text: str) -> str:

@@ -42,6 +42,24 @@ class Picture:
     figure: Figure
     columns: Mapping[str, Column] = field(default_factory=dict)
 
+    def drawn(self, formats: Sequence[str]) -> Drawing:
+        """Return it as the contents of files."""
+        return Drawing(name=self.name, title=self.title, caption=self.caption, columns=self.columns,
+                       width=float(self.figure.get_size_inches()[0]),
+                       files={name: plotting.to_bytes(self.figure, name) for name in formats})
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Drawing:
+    """A picture that is drawn: the same, with its width [in] and the contents of its files by format."""
+
+    name: str
+    title: str
+    caption: str
+    columns: Mapping[str, Column]
+    width: float
+    files: Mapping[str, bytes]
+
 
 _LAST = (0.65, 1.1)  # s: where the step of the two servos with a supply ends
 _SAMPLED = "Drawn once a millisecond, so a shorter pulse of the pulse servo may be missing."

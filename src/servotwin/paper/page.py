@@ -13,8 +13,10 @@ from servotwin.paper.findings import corrections, disagreements
 from servotwin.paper.study import LABELS, LOAD_INERTIA, SERVO, BenchStudy, PaperStudy
 
 if TYPE_CHECKING:
-    from servotwin.paper.figures import Picture
-    from servotwin.paper.robots_page import Robots
+    from servotwin.paper.figures import Drawing
+    from servotwin.paper.robots_page import RobotsPart
+
+    Images = Mapping[str, Drawing]
 
 _SECTIONS = (
     ("summary", "Summary"), ("values", "What the paper does not give"), ("step", "The step from 0 to 180°"),
@@ -27,17 +29,18 @@ _SECTIONS = (
 )
 
 
-def page(study: PaperStudy, robots: Robots | str, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
-    """Return the whole report; `svg` holds the pictures by name."""
+def page(study: PaperStudy, robots: RobotsPart, drawings: Sequence[Drawing]) -> str:
+    """Return the whole report."""
+    images = {drawn.name: drawn for drawn in drawings}
     parts = {
-        "summary": _summary(study), "values": _values(study), "step": _step(study, pictures, svg),
-        "bench": _bench(study, pictures, svg), "measured": _measured(study, pictures, svg),
-        "fits": _fits(study), "vibration": vibration_page.section(study, lambda names: _figures(names, pictures, svg)),
-        "robots": robots_page.section(robots, lambda names: _figures(names, pictures, svg)),
-        "models": _models(study, pictures, svg),
+        "summary": _summary(study), "values": _values(study), "step": _step(study, images),
+        "bench": _bench(study, images), "measured": _measured(study, images),
+        "fits": _fits(study), "vibration": vibration_page.section(study, lambda names: _figures(names, images)),
+        "robots": robots.words.replace(robots_page.FIGURES, _figures([drawn.name for drawn in robots.drawings], images)),
+        "models": _models(study, images),
         "corrections": tables.findings_table(corrections(study), "What the equations need"),
         "disagreements": tables.findings_table(disagreements(study), "What the data say"),
-        "parameters": _parameters(study), "files": _files(pictures),
+        "parameters": _parameters(study), "files": _files(drawings),
     }
     contents = "".join(f'<li><a href="#{key}">{title}</a></li>' for key, title in _SECTIONS)
     body = "".join(f'<section id="{key}"><h2>{title}</h2>\n{parts[key]}</section>\n' for key, title in _SECTIONS)
@@ -117,7 +120,7 @@ most have a range, and they have to be identified for a real unit. <a href="#par
 """
 
 
-def _step(study: PaperStudy, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
+def _step(study: PaperStudy, images: Images) -> str:
     names = ("figure-13", "figure-14", "figure-15", "figure-16", "figure-armature-voltage", "figure-last-degrees",
              "figure-17")
     return f"""<p>The command goes from 0 to 180° at 0.1 s. The load is an inertia of {number(LOAD_INERTIA)} kg m²
@@ -125,11 +128,11 @@ def _step(study: PaperStudy, pictures: Sequence[Picture], svg: Mapping[str, byte
 servo is the paper's model, (35) to (41) with the two offsets that the measured servo needs. The bounded servo has in
 addition a supply that ends, a deadband, friction that holds, and end stops. The pulse servo does not average: in every
 frame its bridge gives the full voltage for as long as the error asks, and brakes for the rest.</p>
-<div class="figures">{_figures(names, pictures, svg)}</div>
+<div class="figures">{_figures(names, images)}</div>
 {tables.step_table(study)}"""
 
 
-def _bench(study: PaperStudy, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
+def _bench(study: PaperStudy, images: Images) -> str:
     apparatus = study.on_bench["bounded"].bench
     low, high = study.offsets
     servo = apparatus.model.servo
@@ -151,17 +154,17 @@ come.</li>
 travel ends), with a wait until the shaft stands or for 5 s; a row is the mean, and half the difference is its
 standing band. The smoothed friction (41) never quite stands, and the pulses move the shaft by ever smaller
 steps: the averaged and the pulse servo are read while they still creep.</li></ul>
-<div class="figures">{_figures(("figure-22", "figure-23", "figure-24"), pictures, svg)}</div>
+<div class="figures">{_figures(("figure-22", "figure-23", "figure-24"), images)}</div>
 {tables.ranges_table(study)}"""
 
 
-def _measured(study: PaperStudy, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
+def _measured(study: PaperStudy, images: Images) -> str:
     shares = "".join(tables.model_shares_table(study, name) for name in study.on_bench)
-    return f"""<div class="figures">{_figures(("figure-25", "figure-26", "figure-27"), pictures, svg)}</div>
+    return f"""<div class="figures">{_figures(("figure-25", "figure-26", "figure-27"), images)}</div>
 {tables.comparison_table(study)}
 {tables.difference_table(study)}
 <h3>How far from its target a servo may stand</h3>
-<div class="figures">{_figures(("figure-standing",), pictures, svg)}</div>
+<div class="figures">{_figures(("figure-standing",), images)}</div>
 {tables.band_table(study)}
 {_band_words(study)}
 <h3>What the differences are made of</h3>
@@ -214,18 +217,18 @@ parabola. p is the probability of such an F or a larger one if the truth were st
 """
 
 
-def _models(study: PaperStudy, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
+def _models(study: PaperStudy, images: Images) -> str:
     parts = ["<p>The paper's diagrams, redrawn, with their transfer functions. The numbers are those of the servo "
              "file; dry friction has no transfer function and is left out.</p>"]
     for which, formulas in linear.FORMULAS.items():
-        made = next(p for p in pictures if p.name == f"figure-{which:02d}")
         lines = [f"<p>{linear.formula(text)}<span>{equation}</span></p>" for equation, text in formulas]
         numeric = linear.numeric(study, which)
         if numeric is not None:
             poles = ", ".join(_pole(p) for p in numeric.poles if p.imag >= 0.0)
             shown = linear.formula(numeric.text)
             lines.append(f"<p>{shown}<span>{numeric.words}; poles (1/s): {poles}</span></p>")
-        parts.append(_figure(made, svg[made.name], after=f'<div class="formulas">{"".join(lines)}</div>', wide=True))
+        after = f'<div class="formulas">{"".join(lines)}</div>'
+        parts.append(_figure(images[f"figure-{which:02d}"], after=after, wide=True))
     return "\n".join(parts)
 
 
@@ -241,23 +244,22 @@ standard error to a fitted one.</p>
 {tables.parameter_table(study)}"""
 
 
-def _files(pictures: Sequence[Picture]) -> str:
-    return f"""<p>Beside this page lie {len(pictures)} pictures as PNG and SVG in <code>figures/</code>, and the numbers
+def _files(drawings: Sequence[Drawing]) -> str:
+    formats = " and ".join(name.upper() for name in drawings[0].files)
+    return f"""<p>Beside this page lie {len(drawings)} pictures as {formats} in <code>figures/</code>, and the numbers
 behind each plot in <code>data/</code>, with the unit in every column's name: one CSV file per plot,
 <code>table-2.csv</code> (measured and simulated), <code>fits.csv</code> and <code>parameters.csv</code>.</p>
 <p>Made by <code>servotwin paper</code>.</p>
 """
 
 
-def _figures(names: Sequence[str], pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
-    by_name = {p.name: p for p in pictures}
-    return "\n".join(_figure(by_name[name], svg[name]) for name in names)
+def _figures(names: Sequence[str], images: Images) -> str:
+    return "\n".join(_figure(images[name]) for name in names)
 
 
-def _figure(made: Picture, svg: bytes, *, after: str = "", wide: bool = False) -> str:
-    width = made.figure.get_size_inches()[0] * 96.0
-    image = picture(svg, f"{made.title}. {plain(made.caption)}", kind="drawing",
-                    style=f"--w:{width:.0f}px" if wide else "")
+def _figure(made: Drawing, *, after: str = "", wide: bool = False) -> str:
+    image = picture(made.files["png"], f"{made.title}. {plain(made.caption)}", kind="drawing", media="image/png",
+                    style=f"--w:{96.0 * made.width:.0f}px" if wide else "")
     kind = ' class="wide"' if wide else ""
     return (f'<figure{kind} id="{made.name}"><div>{image}</div>\n{after}<figcaption><b>{made.title}.</b> '
             f"{made.caption}</figcaption></figure>")

@@ -5,19 +5,29 @@ from __future__ import annotations
 import contextlib
 import math
 import os
+import pickle
 import secrets
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from servotwin.errors import OutputError, OutputExistsError
+from servotwin.look import FORMATS
 from servotwin.paper.study import PaperStudy, headline_numbers, run_study
 from servotwin.parameters.output_file import undone
 from servotwin.tables import csv_text
 
+if TYPE_CHECKING:
+    from servotwin.paper.robots_page import RobotsPart
+
 _PAGE = "report.html"
+_ROBOTS = ("import pickle, sys; from servotwin.paper.robots_page import robots_part; "
+           "pickle.dump(robots_part(sys.argv[1:]), sys.stdout.buffer)")
 _TABLES = ("table-2.csv", "fits.csv", "parameters.csv")
 
 
@@ -31,7 +41,7 @@ class PaperReport:
     page : Path
         The report itself, one HTML file that needs no other.
     figures, data : tuple of Path
-        Pictures (PNG and SVG), and CSV files.
+        Pictures, and CSV files.
     numbers : mapping
         Headline numbers, the unit in each name.
     left_out : str
@@ -46,7 +56,7 @@ class PaperReport:
     left_out: str = ""
 
 
-def write_paper_report(out: Path, *, force: bool,
+def write_paper_report(out: Path, *, force: bool, formats: Sequence[str] = ("png",),
                        progress: Callable[[str, float], None] | None = None,
                        moving: Callable[[], AbstractContextManager[None]] = contextlib.nullcontext) -> PaperReport:
     """Compute and write the report of the paper into a folder.
@@ -60,6 +70,8 @@ def write_paper_report(out: Path, *, force: bool,
         The folder; made if missing.
     force : bool
         Whether a report that is there already may be replaced.
+    formats : sequence of str
+        Of the files with pictures: "svg" and "pdf" beside "png", which the page itself shows.
     progress : callable, optional
         Called with words and the fraction that is done, 0 to 1.
     moving : callable
@@ -70,9 +82,12 @@ def write_paper_report(out: Path, *, force: bool,
     OutputExistsError
         If there is a report already and `force` is false; nothing is computed then.
     OutputError
-        If the folder cannot be made or written.
+        If the folder cannot be made or written, or a format is unknown.
     """
     tell = progress or _silent
+    for name in formats:
+        if name not in FORMATS:
+            raise OutputError("format of a picture", got=name, allowed=", ".join(FORMATS))
     out = Path(out)
     _check_free(out, force)
     made = [path for path in (out, *out.parents) if not path.exists()]
@@ -81,7 +96,7 @@ def write_paper_report(out: Path, *, force: bool,
         _make(out)
         try:
             partial.mkdir(0o700)
-            numbers, left_out = _write_all(partial, tell)
+            numbers, left_out = _write_all(partial, tuple(dict.fromkeys(("png", *formats))), tell)
             with moving():
                 names = _move(partial, out)
         except OSError as error:
@@ -125,42 +140,77 @@ def _remove_empty(folders: Sequence[Path]) -> None:
             return
 
 
-def _write_all(folder: Path, tell: Callable[[str, float], None]) -> tuple[dict[str, float], str]:
+def _write_all(folder: Path, formats: Sequence[str],
+               tell: Callable[[str, float], None]) -> tuple[dict[str, float], str]:
     """Write everything; return headline numbers, and what is left out."""
-    from servotwin import plotting
-    from servotwin.paper import figures, robots_page, vibration_page
+    from servotwin.paper import figures, vibration_page
     from servotwin.paper.page import page
 
-    study = run_study(tell)
-    tell("letting robots do short tasks", 0.22)
-    robots = robots_page.run_robots(study.servo)
-    pictures = (*figures.pictures(study, lambda done: tell("drawing", 0.35 + 0.2 * done)),
-                *vibration_page.pictures(study), *robots_page.pictures(robots))
+    with _robots_aside(formats) as robots_part:
+        study = run_study(tell)
+        pictures = (*figures.pictures(study, lambda done: tell("drawing", 0.35 + 0.2 * done)),
+                    *vibration_page.pictures(study))
+        drawings = []
+        for k, picture in enumerate(pictures):
+            tell(f"writing {picture.name}", 0.55 + 0.3 * k / len(pictures))
+            drawings.append(picture.drawn(formats))
+        tell("waiting for robots that do short tasks", 0.88)
+        robots = robots_part()
+    drawings += robots.drawings
     (folder / "figures").mkdir()
     (folder / "data").mkdir()
-    svg: dict[str, bytes] = {}
-    for k, picture in enumerate(pictures):
-        tell(f"writing {picture.name}", 0.55 + 0.35 * k / len(pictures))
-        svg[picture.name] = plotting.to_bytes(picture.figure, "svg")
-        (folder / "figures" / f"{picture.name}.svg").write_bytes(svg[picture.name])
-        (folder / "figures" / f"{picture.name}.png").write_bytes(plotting.to_bytes(picture.figure, "png"))
-        if picture.columns:
-            _write_csv(folder / "data" / f"{picture.name}.csv", picture.columns)
+    for drawn in drawings:
+        for name, content in drawn.files.items():
+            (folder / "figures" / f"{drawn.name}.{name}").write_bytes(content)
+        if drawn.columns:
+            _write_csv(folder / "data" / f"{drawn.name}.csv", drawn.columns)
     _write_tables(folder / "data", study)
     tell("writing the page", 0.92)
-    (folder / _PAGE).write_text(page(study, robots, pictures, svg), encoding="utf-8", newline="\n")
-    left_out = f"figures 28 to 30 are left out: {robots}" if isinstance(robots, str) else ""
-    return headline_numbers(study) | robots_page.headline(robots), left_out
+    (folder / _PAGE).write_text(page(study, robots, drawings), encoding="utf-8", newline="\n")
+    left_out = f"figures 28 to 30 are left out: {robots.left_out}" if robots.left_out else ""
+    return headline_numbers(study) | dict(robots.headline), left_out
+
+
+@contextlib.contextmanager
+def _robots_aside(formats: Sequence[str]) -> Iterator[Callable[[], RobotsPart]]:
+    """Let the robots do their tasks in a process of their own; what is given waits for it.
+
+    Where there can be no such process, or it does not come to its end, they do them here.
+    """
+    command, process = [sys.executable, "-c", _ROBOTS, *formats], None
+    with contextlib.suppress(OSError):
+        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                   stderr=subprocess.DEVNULL, start_new_session=True)
+    try:
+        yield lambda: _robots_of(process, formats)
+    finally:
+        if process is not None:
+            with process:  # which waits for its end
+                process.kill()
+
+
+def _robots_of(process: subprocess.Popen[bytes] | None, formats: Sequence[str]) -> RobotsPart:
+    if process is not None:
+        content, _ = process.communicate()
+        if process.returncode == 0:
+            part: RobotsPart = pickle.loads(content)
+            return part
+    from servotwin.paper.robots_page import robots_part
+
+    return robots_part(formats)
 
 
 def _move(partial: Path, out: Path) -> list[Path]:
-    """Move every file into place, the page last, and return their names."""
+    """Move every file into place, the page last, and return their names; pictures of an older report go."""
     names = sorted(path.relative_to(partial) for path in partial.rglob("*") if path.is_file())
     names.sort(key=lambda name: name == Path(_PAGE))
     for folder in ("figures", "data"):
         (out / folder).mkdir(exist_ok=True)
     for name in names:
         os.replace(partial / name, out / name)
+    for path in out.glob("figures/figure-*"):
+        if path.suffix[1:] in FORMATS and path.relative_to(out) not in names:
+            path.unlink()
     return names
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,12 +13,15 @@ from servotwin import plotting
 from servotwin.errors import MissingExtraError
 from servotwin.look import fixed, number, table
 from servotwin.models import PulseServo
-from servotwin.paper.figures import Picture
+from servotwin.paper.figures import Drawing, Picture
+from servotwin.paper.study import SERVO
+from servotwin.parameters import load_servo
 
 if TYPE_CHECKING:
     from servotwin.parameters import Servo
     from servotwin.robots import TaskRun, WaypointRun
 
+FIGURES = "<!-- figures -->"
 _SIZE, _SPEED = 0.04, 0.12  # m and m/s: a small circle, so that it is short
 _ROUTE = ((0.0, 0.0), (0.35, 0.0), (0.35, 0.35))  # m
 _COUNTS = 512  # of an encoder on a wheel
@@ -43,6 +46,24 @@ class Robots:
     arms: Mapping[str, Mapping[str, TaskRun]]
     torques: Mapping[str, float]
     drives: Mapping[str, WaypointRun]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotsPart:
+    """What the report has of the robots: pictures, tables and words, headline numbers, and why they are left out."""
+
+    drawings: tuple[Drawing, ...]
+    words: str  # HTML; FIGURES where the pictures belong
+    headline: Mapping[str, float]
+    left_out: str
+
+
+def robots_part(formats: Sequence[str]) -> RobotsPart:
+    """Let the robots do their tasks, and draw what they did."""
+    robots = run_robots(load_servo(SERVO))
+    return RobotsPart(drawings=tuple(picture.drawn(formats) for picture in pictures(robots)),
+                      words=section(robots), headline=headline(robots),
+                      left_out=robots if isinstance(robots, str) else "")
 
 
 def run_robots(servo: Servo) -> Robots | str:
@@ -119,15 +140,15 @@ def _arm(name: str, title: str, runs: Mapping[str, TaskRun]) -> Picture:
                    "and its distance from the circle.")
 
 
-def section(robots: Robots | str, figures: Callable[[Sequence[str]], str]) -> str:
-    """Return the words, tables and pictures; `figures` makes HTML of names."""
+def section(robots: Robots | str) -> str:
+    """Return the words and tables, and FIGURES where the pictures belong."""
     if isinstance(robots, str):
         return f'<div class="note"><p>The robots are left out. {robots}</p></div>\n'
     least, most = robots.torques["torque"], robots.torques["none"]
     return f"""<p>The model is to serve “the development of control techniques for SCARA type robots with and without
 link redundancy, … mobile robots, etc.” (§VII). The paper shows three of them and no dimensions: those here are assumed,
 made for the servo <code>hitec-hs-755hb</code> and simulated with its pulses at every joint.</p>
-<div class="figures">{figures((*_ARMS, "figure-30"))}</div>
+<div class="figures">{FIGURES}</div>
 {_arms(robots)}
 <p>With the third link the arm may choose its posture. The one in which the circle takes the least torque needs
 {number(least, 2)} N m at most of its vertical axes; without a criterion it is {number(most, 2)} N m.</p>

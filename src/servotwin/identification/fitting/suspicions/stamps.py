@@ -9,8 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
-from scipy.stats import binom
 
 from servotwin.identification.fitting.suspicions.beat import Beat, beat_of
 from servotwin.identification.fitting.suspicions.look import Finding, Look, Mask, said_times
@@ -31,7 +29,11 @@ def wrong_stamps(looks: Sequence[Look]) -> list[Finding]:
     beats = [(one, beat) for one in looks if (beat := beat_of(one.log.time)) is not None and _single(beat.off)]
     votes = [_votes(one, beat) for one, beat in beats]
     tell = sum(vote.tell for vote in votes)
-    if not tell or binom.sf(sum(vote.beat for vote in votes) - 1, tell, _WRONG_VOTES) > _CHANCE:
+    if not tell:
+        return []
+    from scipy.stats import binom  # slow to load
+
+    if binom.sf(sum(vote.beat for vote in votes) - 1, tell, _WRONG_VOTES) > _CHANCE:
         return []
     return [_restamped(one, beat) for (one, beat), vote in zip(beats, votes, strict=True) if 2 * vote.beat >= vote.tell]
 
@@ -62,6 +64,8 @@ def _votes(one: Look, beat: Beat) -> _Votes:
     rows = np.flatnonzero(one.counts & beat.off)
     if on.sum() < _FEWEST:
         return _Votes(0, 0)
+    from scipy.interpolate import PchipInterpolator  # slow to load
+
     curve = PchipInterpolator(one.log.time[on], one.angle[on], extrapolate=False)
     by_stamp, by_beat = (np.abs(one.angle[rows] - curve(at[rows])) for at in (one.log.time, beat.place))
     tell = np.abs(by_stamp - by_beat) > _TELLS * one.noise  # nan, outside, is no

@@ -33,6 +33,7 @@ from servotwin.physics.backlash import play
 from servotwin.physics.load_friction import torque_on_gear
 
 _NEAR = 4e-16  # relative, of a current that releases the shaft
+CALLED = ("onward",)  # one lane: with copies it takes twice as long to compile
 
 
 class Leg(NamedTuple):

@@ -27,6 +27,7 @@ from servotwin.models.terms.friction import fades
 from servotwin.models.terms.numbers import Numbers
 
 _SHORTEST = 1e-15  # s: time that is none any more
+CALLED = ("alone", "_alone_by_legs")  # one lane: with copies its strides take twice as long to compile
 
 
 def phase(size: int, slack: bool, tile: Any, plan: Any) -> None:

@@ -37,7 +37,8 @@ from servotwin.physics.pieces import Piece
 if TYPE_CHECKING:
     from servotwin.models.engine.batch.tiles import Floats
 
-CALLED = ("gone_on", "show")  # seldom; with copies, or what goes by its address here would go through memory everywhere
+# Seldom: with copies, or what goes by its address here would go through memory everywhere
+CALLED = ("gone_on", "show", "with_laws")
 LEGS, STEPS = 0, 1  # from tick to tick: in this loop, or from event to event
 _NO_LAWS = Apart(0.0, 0.0, 0.0, 0.0)
 _GIVEN = Piece()  # what a servo follows that a program drives
