@@ -30,7 +30,10 @@ def pytest_configure(config):
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
     """Take representatives of long families for quick; with `--seed` go on to other seeds, and leave out the rest."""
+    examples = set(costs.BUDGETS["long_examples"])
     for item in items:
+        if item.nodeid.partition("::")[2] in examples:
+            item.add_marker("long")
         mark = item.get_closest_marker("long")
         if mark is not None and mark.kwargs.get("but") == getattr(getattr(item, "callspec", None), "id", ""):
             item.own_markers = [own for own in item.own_markers if own.name != "long"]

@@ -19,8 +19,10 @@ from typing import Any
 import pytest
 
 from servotwin.simulation.compile import building, library
+from servotwin.simulation.recipes import all_recipes
 
 BUDGETS = tomllib.loads(Path(__file__).with_name("budgets.toml").read_text(encoding="utf-8"))
+RECIPES = {recipe.name for recipe in all_recipes()}
 _LOOP = 200_000  # turns, about 30 ms
 _EVERY = 10.0  # s of processor time between two calibrations
 
@@ -168,16 +170,20 @@ class Table:
             write(f"{name:32} {count:6.0f} {took:8.1f} {children:9.1f} {said}".rstrip())
         made = sorted(((took * self.scale, kernel) for item in self.items.values() for kernel, took in item["made"]),
                       reverse=True)
-        used = {kernel for item in self.items.values() for kernel in item["used"]}
-        write(f"all {sum(row[1] for row in self.folders.values()):.0f} s; beside them collecting "
-              f"{sum(self.collecting) * self.scale:.0f} s, {len(made)} kernels made {sum(took for took, _ in made):.0f} "
-              f"s; {len(used)} kernels used; a second here is {1 / self.scale:.2f} s of this machine")
+        total, making = sum(row[1] for row in self.folders.values()), sum(took for took, _ in made)
+        write(f"all {total:.0f} s; beside them collecting {sum(self.collecting) * self.scale:.0f} s, "
+              f"{len(made)} kernels made {making:.0f} s; a second here is {1 / self.scale:.2f} s of this machine")
         longest = sorted(((item["own"] + item["children"] - sum(took for _, took in item["made"])) * self.scale, name)
                          for name, item in self.items.items())[:-11:-1]
         for took, name in longest:
             write(f"{took:8.2f} s  {name}")
         for took, kernel in made[:5]:
             write(f"{took:8.2f} s  to make {kernel}")
+        if self.config.getoption("--budgets") == "quick":
+            used = {kernel for item in self.items.values() for kernel in item["used"]} & RECIPES
+            for kernel in sorted(used - set(BUDGETS["kernels"]["quick"])):
+                names = [name for name, item in self.items.items() if kernel in item["used"]]
+                write(f"{kernel} is none of the kernels of quick tests: {names[0]} and {len(names) - 1} more use it")
         for name in self.over:
             write(f"{name} takes over twice its budget of {self.budgets[name]:.0f} s (tests/budgets.toml)")
 

@@ -1,4 +1,4 @@
-"""Plant bugs one at a time and write down which tests see them: `mutate.py N [--seed S] [--engine K] [--limit SECONDS]`.
+"""Plant bugs one at a time, and write down which tests see them: `mutate.py N [--seed S] [--engine K] [--limit S]`.
 
 A bug is an operator that becomes another one, a number that is off by 1 %, or a branch that is taken the other way
 round, at a place of the package that is drawn. One in the engine that changes no bit of the recorded numbers is drawn
@@ -23,7 +23,8 @@ from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
+from itertools import islice
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -84,8 +85,9 @@ def bugs(file: Path) -> Iterator[Bug]:
             yield one(node, at(node.lineno, node.col_offset), at(node.end_lineno, node.end_col_offset),
                       repr(1.01 * node.value))
         elif isinstance(node, (ast.If, ast.IfExp)) and "TYPE_CHECKING" not in ast.unparse(node.test):
-            begin, end = (at(node.test.lineno, node.test.col_offset), at(node.test.end_lineno, node.test.end_col_offset))
-            yield one(node.test, begin, end, f"not ({source[begin:end]})")
+            test = node.test
+            begin, end = at(test.lineno, test.col_offset), at(test.end_lineno, test.end_col_offset)
+            yield one(test, begin, end, f"not ({source[begin:end]})")
 
 
 def _operator(one, node, source, begin, end, old, new) -> Iterator[Bug]:
@@ -113,7 +115,7 @@ def drawn(seed: int, engine: bool) -> Iterator[Bug]:
 # --- which tests import a module --------------------------------------------------------------------------------------
 
 
-def _named(tree: ast.AST, package: str) -> Iterator[str]:
+def _named(tree: ast.AST) -> Iterator[str]:
     """Yield names of modules, or of what may be one, that a file imports, also late."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
@@ -142,7 +144,7 @@ def imports() -> dict[str, set[str]]:
     found: dict[str, set[str]] = {}
     for file in files:
         to = found.setdefault(str(file), set())
-        for name in _named(ast.parse(file.read_text(encoding="utf-8")), ""):
+        for name in _named(ast.parse(file.read_text(encoding="utf-8"))):
             parts = name.split(".")
             if parts[0] == "servotwin" and len(parts) > 1:
                 home = (public | lazy).get(parts[1])
@@ -177,8 +179,8 @@ def tests_of(file: str) -> list[str]:
 def tree_with(bug: Bug, folder: Path) -> Path:
     """Return a copy of the repository with the bug in it."""
     tree = folder / "main"
-    shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".git", ".venv", "__pycache__", ".*_cache", "paper-report",
-                                                              "_build", ".hypothesis", "dist"))
+    shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".git", ".venv", "__pycache__", ".*_cache", "_build",
+                                                              "paper-report", ".hypothesis", "dist"))
     if (ROOT.parent / "shared").is_dir():
         (folder / "shared").symlink_to(ROOT.parent / "shared")
     bug.plant(tree)
@@ -190,7 +192,8 @@ def pytest(tree: Path, cache: Path, limit: float, *arguments: str) -> str:
     environment = os.environ | {"PYTHONPATH": str(tree / "src"), "SERVOTWIN_CACHE_DIR": str(cache)}
     most = int(limit + 120)
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-v", "-p", "no:cacheprovider", "--tb=no", "--cpu-limit", str(limit), *arguments],
+        [sys.executable, "-m", "pytest", "-v", "-p", "no:cacheprovider", "--tb=no", "--cpu-limit", str(limit),
+         *arguments],
         cwd=tree, env=environment, check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (most, most)))
     return done.stdout
@@ -232,11 +235,12 @@ def main() -> None:
                                (False, max(given.number - given.engine, 0))):
             draws, missing = drawn(given.seed, engine), number
             while missing > 0:
-                batch = [bug for bug, _ in zip(draws, range(missing))]
+                batch = list(islice(draws, missing))
                 names = {one["bug"] for one in kept}
                 missing -= sum(bug.name in names for bug in batch)
                 fresh = [bug for bug in batch if bug.name not in names]
-                for bug, row in zip(fresh, pool.map(lambda bug: result(bug, given.limit, engine), fresh), strict=True):
+                rows = pool.map(partial(result, limit=given.limit, engine=engine), fresh)
+                for bug, row in zip(fresh, rows, strict=True):
                     print(f"{bug.name}: " + ("changes nothing" if row is None else
                                              f"{len(row['seen_by'])} of {row['ran']} see it"), flush=True)
                     if row is not None:

@@ -57,6 +57,7 @@ def test_pulses_shrink_the_band_of_friction(pulse_bench, servo):
     assert math.degrees(by_pulses.friction_band) < 0.05
 
 
+@pytest.mark.long
 def test_friction_may_bend_the_line_by_the_mean_voltage_only(pulse_bench, servo, table):
     for bench, count, band in ((Bench(st.BoundedServo(bench_servo(servo))), 5, 2.10), (pulse_bench, 0, 0.44)):
         rows = bench.measure(table["V_i_V"])

@@ -8,6 +8,8 @@ from bench_fits import FREE, judged
 from servotwin.bench.emulator.build import harness
 from servotwin.errors import BenchError
 
+pytestmark = pytest.mark.long
+
 
 @pytest.mark.parametrize(("seed", "rate"), [(3, "frame"), (4, "fast")])
 def test_what_was_emulated_is_found_again(seed, rate):

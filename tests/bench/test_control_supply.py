@@ -44,6 +44,7 @@ def target(bench):
     return row.target_angle
 
 
+@pytest.mark.long
 def test_one_soft_supply_makes_the_shaft_vibrate(common):
     """Regression: the swing and the rate come from this program; that they last is the paper's observation."""
     for start in (1.5, 2.5, 3.0):
@@ -78,6 +79,7 @@ def test_a_reference_on_the_supply_is_no_better(soft):
     assert still.mean > target(soft) + math.radians(10.0)  # a reference that sags makes the count larger
 
 
+@pytest.mark.long
 def test_with_inductance_the_current_comes_too_late_for_an_early_look(servo):
     model = st.PulseServoInductive(bench_servo(servo).replace({"supply.internal_resistance": SOFT}))
     for delay, vibrates in ((2e-5, False), (1e-3, True)):
@@ -85,12 +87,14 @@ def test_with_inductance_the_current_comes_too_late_for_an_early_look(servo):
         assert (standing(run.result, 1.5).frequency > 5.0) == vibrates
 
 
+@pytest.mark.long
 def test_behind_a_regulator_its_limit_decides(servo):
     for limit, vibrates in ((1.0, True), (1.9, False)):  # from rest the servo draws 1.84 A
         bench = bench_with(servo, 0.0, supply__current_limit=limit)
         assert (standing(run_on_one_supply(bench, STEP, 2.5).result, 1.5).frequency > 5.0) == vibrates
 
 
+@pytest.mark.long
 def test_the_chips_own_coupling_alone_does_nothing(servo):
     for coupling in (0.02, 0.1):
         run = run_on_one_supply(bench_with(servo, SOFT, electronics__supply_coupling=coupling), STEP, 3.0, SEPARATE)

@@ -100,6 +100,7 @@ def test_pulses_are_exact_to_the_cycle_while_everything_else_goes_on(servo, fram
     assert set(np.round(np.diff(rises) / 62.5e-9).astype(int)) == {period}
 
 
+@pytest.mark.long(but="digital-frame")
 @pytest.mark.parametrize("rate", ["fast", "frame"])
 @pytest.mark.parametrize("model", MODELS)
 def test_each_count_is_that_of_the_voltage_at_its_instant(model, rate):
@@ -344,6 +345,7 @@ def test_the_harness_is_compiled_once(tmp_path, monkeypatch):
     assert (first.stat().st_mtime_ns, len(list(tmp_path.iterdir()))) == (made, 1)
 
 
+@pytest.mark.long
 def test_a_harness_that_others_may_write_is_not_run(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("SERVOTWIN_CACHE_DIR", str(tmp_path / "cache"))
     made = build.harness()

@@ -31,6 +31,7 @@ def disagreeing(table):
     return [pair.second for pair in instrument_pairs(bench_table(table)) if pair.disagrees_in]
 
 
+@pytest.mark.long(but="up to 1 count")
 @pytest.mark.parametrize("noise", [None, 0.0, 3.0], ids=["up to 1 count", "rounding alone", "3 counts"])
 def test_instruments_that_agree_are_left_alone(noise):
     # the level 0.005 means 1.5 of 300; counts that are only rounded stay far below it
@@ -126,6 +127,7 @@ def test_a_slip_in_one_column_is_found_and_the_column_named(table):
     assert row.p_value < 0.05
 
 
+@pytest.mark.long
 def test_tables_without_errors_rarely_have_rows_that_are_off():
     certain = hints = 0
     for seed in range(200):

@@ -156,6 +156,7 @@ def test_rows_that_stand_still_are_left_out():
     assert found.figure("stall torque").value == pytest.approx(of.stall_torque, rel=1e-6)
 
 
+@pytest.mark.long
 def test_a_sag_sets_the_gain_of_the_loop():
     servo = st.load_servo("hitec-hs-755hb")
     model = changed(st.PulseServo(servo), {"electronics.stretcher_gain": 180.0})

@@ -25,6 +25,7 @@ def software():
     return Bench(st.PulseServo(servo)).measure(st.load_dataset("urrea-kern-table-2").columns["V_i_V"])
 
 
+@pytest.mark.long
 def test_emulated_rows_are_as_near_to_table_ii_as_those_of_the_bench_in_software(chain, software):
     columns = st.load_dataset("urrea-kern-table-2").columns
     ours, theirs = (np.abs(np.array(compare(rows, columns))) for rows in (chain, software))

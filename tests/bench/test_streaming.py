@@ -9,6 +9,8 @@ from servotwin.bench.emulator.build import harness
 from servotwin.bench.wire import Board, protocol
 from servotwin.errors import BenchError
 
+pytestmark = pytest.mark.long
+
 
 class Clock(StillPins):
     """A tap that tells the time, and a command that stays."""

@@ -94,6 +94,7 @@ def servo_film(tmp_path_factory, step):
 # --- how well the angle is read
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("changes", "most"), [
     ({}, 0.3), ({"tilt": 0.0}, 0.3), ({"tilt": 30.0}, 0.3), ({"side": 60.0}, 0.3), ({"side": 30.0}, 0.3),
     ({"noise": 16.0}, 0.3), ({"exposure": 1 / 250}, 0.05), ({"readout": 0.02}, 0.3)],
@@ -107,15 +108,18 @@ def test_an_angle_is_read(tmp_path, changes, most):
     assert rms(off) < most
 
 
+@pytest.mark.long
 def test_a_servos_angle_is_read(servo_film, step):
     found = read_clip(servo_film / "clip.mp4")
     assert rms(error(found, lambda time: step(np.maximum(time - START, 0.0)))) < 0.3
 
 
+@pytest.mark.long
 def test_another_codec(tmp_path):
     assert rms(error(read_clip(film(tmp_path / "clip.avi", Scene(side=80.0), moves, TIMES, codec="MJPG")))) < 0.3
 
 
+@pytest.mark.long
 def test_the_standard_error_is_what_a_mark_at_rest_scatters(tmp_path):
     """In noise that does not repeat: within a factor of two, as an error of an error may be."""
     found = read_clip(film(tmp_path / "rest.avi", Scene(noise=12.0), lambda time: 0.3, TIMES, codec="MJPG"),
@@ -123,6 +127,7 @@ def test_the_standard_error_is_what_a_mark_at_rest_scatters(tmp_path):
     assert 0.5 < np.nanstd(found.angle) / found.angle_std < 2.0
 
 
+@pytest.mark.long
 def test_times_are_those_of_the_file(tmp_path):
     steps = np.random.default_rng(2).choice([1500, 3000, 9000], 50).tolist()
     times = np.concatenate([[0.0], np.cumsum(steps[:-1])]) / 90000
@@ -133,11 +138,13 @@ def test_times_are_those_of_the_file(tmp_path):
     np.testing.assert_allclose(slow.time, 4.0 * times, atol=1e-9)
 
 
+@pytest.mark.long
 def test_the_middle_of_the_mark_need_not_be_on_the_axis(tmp_path):
     found = read_clip(film(tmp_path / "clip.mp4", Scene(side=80.0, marks=((0, (0.3, 0.2)),)), moves, TIMES))
     assert rms(error(found)) < 0.3
 
 
+@pytest.mark.long
 def test_signs_and_zeros(clip, filmed):
     flipped, moved = read_clip(clip, flip=True), read_clip(clip, zero=0.2, flip=True)
     np.testing.assert_allclose(flipped.angle, -filmed.angle, atol=1e-12)
@@ -145,6 +152,7 @@ def test_signs_and_zeros(clip, filmed):
     assert (filmed.angle - filmed.angle[0])[np.searchsorted(TIMES, 0.7)] > 0.6  # counter-clockwise
 
 
+@pytest.mark.long
 def test_clips_of_one_camera_have_one_zero(tmp_path):
     """Wherever the horn was in the first picture: a fit has one offset for all its logs."""
     first, second = (read_clip(film(tmp_path / "clip.mp4", Scene(side=80.0), lambda time, a=a: a + moves(time),
@@ -154,6 +162,7 @@ def test_clips_of_one_camera_have_one_zero(tmp_path):
                      instant="none").angle[0] == pytest.approx(0.0, abs=2e-3)  # the plane is turned by 0.35 rad
 
 
+@pytest.mark.long
 def test_turns_are_counted(tmp_path):
     def turning(time):
         return 9.0 * time
@@ -163,6 +172,7 @@ def test_turns_are_counted(tmp_path):
     assert found.angle[-1] > 4.0 * np.pi
 
 
+@pytest.mark.long
 def test_a_mark_on_the_case_gives_the_zero_and_holds_the_camera(tmp_path):
     case = ((1, 5, 5, 50),)
     still = read_clip(film(tmp_path / "still.mp4", Scene(still=case, tilt=0.0), moves, TIMES))
@@ -175,6 +185,7 @@ def test_a_mark_on_the_case_gives_the_zero_and_holds_the_camera(tmp_path):
     assert rms(error(held)) < min(0.3, 0.5 * rms(error(alone)))
 
 
+@pytest.mark.long
 def test_pictures_without_the_mark_are_gaps(tmp_path):
     def hidden():
         for k, picture in enumerate(pictures(Scene(side=80.0), moves, TIMES)):
@@ -241,6 +252,7 @@ def test_a_led_gives_the_instant_within_half_a_picture(servo_film, how):
     assert found.instant.error == pytest.approx(1.0 / RATE / np.sqrt(12.0))
 
 
+@pytest.mark.long(but="0.6166666666666667")
 @pytest.mark.parametrize("instant", np.linspace(0.6, 0.6 + 1 / RATE, 5))
 def test_any_instant_within_a_picture(tmp_path, instant):
     scene = Scene(side=40.0, size=(200, 160), lamp=(180, 5, 10, instant))
@@ -254,6 +266,7 @@ def test_a_jump_is_between_two_pictures(filmed):
     assert filmed.time[0] == -filmed.instant.time
 
 
+@pytest.mark.long
 def test_instants_that_are_not_there(clip, servo_film):
     with pytest.raises(InputError, match="no light goes on"):
         read_clip(clip, instant="led")
@@ -269,6 +282,7 @@ def test_instants_that_are_not_there(clip, servo_film):
         jump(TIMES, np.linspace(0.0, 3.0, 50), 1e-4)
 
 
+@pytest.mark.long
 def test_two_lights_are_one_too_many(tmp_path):
     def two():
         for k, picture in enumerate(pictures(Scene(side=40.0, size=(200, 160)), lambda time: 0.0, TIMES)):
@@ -331,6 +345,7 @@ def test_without_pulses_a_row_says_so(servo_film, tmp_path):
     assert {p for t, p in told.items() if 0.2 <= t < 0.5} == {"1700"}
 
 
+@pytest.mark.long
 def test_a_servo_that_turns_the_other_way_is_pointed_out(servo_film):
     for flip, count in ((False, 0), (True, 1)):
         found = read_clip(servo_film / "clip.mp4", instant="led", flip=flip)
@@ -387,6 +402,7 @@ def spoiled(tmp_path, clip, kind):
     return tmp_path if kind == "folder" else tmp_path / "none.mp4" if kind == "missing" else path
 
 
+@pytest.mark.long(but="cut-the clip is cut")
 @pytest.mark.parametrize(("kind", "says"), [
     ("missing", "no such file"), ("folder", "cannot be read"), ("empty", "an empty file"),
     ("text", "no video that OpenCV reads"), ("cut", "the clip is cut"), ("cut in front", "the clip is cut"),

@@ -53,6 +53,7 @@ def test_servos(cli, tmp_path, words, said):
     assert nothing_new(tmp_path, SERVO_FILES)
 
 
+@pytest.mark.long(but="words17---ramp needs --over")
 @pytest.mark.parametrize(("words", "said"), [
     ([], "no command is given; use one of --step, --ramp"),
     (["--step", "0:1", "--ramp", "0:1", "--over", "1"], "commands contradict: got '--step, --ramp'"),
@@ -90,6 +91,7 @@ def test_commands(simulate, tmp_path, words, said):
     assert nothing_new(tmp_path, [])
 
 
+@pytest.mark.long(but="short.csv---pulses")
 @pytest.mark.parametrize("option", ["--command", "--pulses"])
 @pytest.mark.parametrize("name", COMMAND_FILES)
 def test_command_files(simulate, tmp_path, option, name):
@@ -98,6 +100,7 @@ def test_command_files(simulate, tmp_path, option, name):
     assert nothing_new(tmp_path, [name])
 
 
+@pytest.mark.long
 def test_files_that_are_none(simulate, tmp_path):
     for option in ("--command", "--pulses"):
         assert simulate(option, "none.csv").error == "none.csv: no such file"
@@ -111,6 +114,7 @@ def test_pulses_do_not_overlap(simulate, tmp_path):
     assert "a pulse that ends before the next" in simulate("--pulses", "pulses.csv").error
 
 
+@pytest.mark.long(but="pendulum=-1:1-got -1.0")
 @pytest.mark.parametrize(("load", "said"), [
     ("inertia=-1", "--load inertia: Inertia(inertia): got -1.0, allowed: a number of at least 0"),
     ("inertia=nan", "got 'nan'"),
@@ -142,6 +146,7 @@ def test_loads(simulate, tmp_path, load, said):
     assert nothing_new(tmp_path, files)
 
 
+@pytest.mark.long(but="electronics.off_state=stop-allowed: brake or coast")
 @pytest.mark.parametrize(("change", "said"), [
     ("motor.x=1", "unknown parameter 'motor.x'"),
     ("motor.armature_resistence=1", "did you mean 'motor.armature_resistance'?"),
@@ -199,6 +204,7 @@ def test_usage(cli, words, said):
     assert said in cli(*words).error
 
 
+@pytest.mark.long
 def test_json_tells_errors_as_json_too(simulate, cli):
     ended = simulate("--step", "0:nan", "--json")
     assert ended.error == ended.data["error"]["message"]

@@ -48,6 +48,7 @@ def test_check_names_the_firmware_and_reads_the_channels(cli, board):
     assert cli("bench", "check", "--port", board.port).out.count("\n") > 5
 
 
+@pytest.mark.long
 def test_record_makes_logs_that_can_be_read(cli, board):
     ended = cli("bench", "record", "my servo", "--port", board.port, "-e", "hold,torque_off", "--duration", "1",
                 *LIMITS, "--licence", "CC0-1.0", "--load", "inertia=1e-3", "--out", "runs")
@@ -109,6 +110,7 @@ WRONG = [
 ]
 
 
+@pytest.mark.long(but="record x --range 1000us:2000us --voltage 6V --curr1")
 @pytest.mark.parametrize(("words", "said"), WRONG, ids=[" ".join(words)[:50] for words, _ in WRONG])
 def test_what_is_wrong_is_told_in_one_line(cli, tmp_path, words, said):
     (tmp_path / "bench.csv").write_text("mine")
@@ -157,6 +159,7 @@ def pulsing(board):
     return board.board._framing
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("how", ["killed", "interrupted", "cable"])
 def test_whatever_ends_a_recorder_keeps_its_rows_and_stops_the_pulses(board, tmp_path, child_environment, how):
     process, log = recording(board, tmp_path, child_environment)
@@ -183,6 +186,7 @@ def test_whatever_ends_a_recorder_keeps_its_rows_and_stops_the_pulses(board, tmp
         assert not pulsing(board)
 
 
+@pytest.mark.long
 def test_an_emulated_board_can_be_talked_to_by_any_program(cli, child_environment):
     try:
         harness()
@@ -202,6 +206,7 @@ def test_an_emulated_board_can_be_talked_to_by_any_program(cli, child_environmen
         process.communicate()
 
 
+@pytest.mark.long
 def test_servos_of_a_bus_are_recorded_at_once(cli):
     pytest.importorskip("scservo_sdk")
     with bus_peers.Bus(bus_peers.STS, [1, 2], bus_peers.Ramp(2)) as peer:

@@ -11,6 +11,7 @@ ALONE = {"miuzei-25kg": {"digital"}}  # fitted to logs as one, without a sheet: 
 MISSING = {"analog": {"digital"}, "digital": set(), "bus": OF_PULSES}  # models that a kind of servo has no numbers for
 
 
+@pytest.mark.long
 def test_list_has_every_servo(cli):
     ended = cli("catalog", "list")
     rows = [line for line in ended.out.splitlines() if not line.startswith(" ")]
@@ -43,6 +44,7 @@ def test_show_takes_a_file_and_a_table_of_numbers(cli, tmp_path):
     assert cli("catalog", "show", "mine.toml", "--json").data["parameters"][1]["value"] == [0.0, 0.01]
 
 
+@pytest.mark.long(but="emax-es08ma")
 @pytest.mark.parametrize("name", st.catalog_names())
 def test_check_finds_the_catalog_ready_for_every_model_of_its_kind(cli, tmp_path, name):
     st.load_servo(name).save(tmp_path / "copy.toml")
@@ -70,6 +72,7 @@ def test_check_says_what_is_lacking(cli, tmp_path):
     assert "cannot run: lacks motor.armature_inductance" in text
 
 
+@pytest.mark.long
 def test_check_warns_of_calibrations_that_disagree(cli, tmp_path):
     servo = st.load_servo(SERVO)
     slope = servo.get("electronics.one_shot_slope")
@@ -84,6 +87,7 @@ def test_check_warns_of_calibrations_that_disagree(cli, tmp_path):
     assert run.err.count("\n") == 1
 
 
+@pytest.mark.long(but="words0-did you mean 'hitec-hs-755hb', ")
 @pytest.mark.parametrize(("words", "said"), [
     (["show", "hitec-hs-755"], "did you mean 'hitec-hs-755hb', "),
     (["check", "none.toml"], "none.toml: no such file"),
@@ -127,6 +131,7 @@ def test_a_servo_without_motor_has_no_torque(cli, tmp_path):
     assert "stall torque" not in cli("catalog", "show", "mine.toml").out
 
 
+@pytest.mark.long
 def test_a_wrong_unit_in_a_file_or_an_option_is_warned_of(cli, tmp_path):
     text = ('name = "mine"\n[electronics]\ndeadband = { value = 8, unit = "s", origin = "assumed" }\n')
     (tmp_path / "mine.toml").write_text(text)

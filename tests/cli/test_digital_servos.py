@@ -11,6 +11,7 @@ SOFTER = ["--register", "P_Coefficient=16"]
 STIFFER = ["--register", "P_Coefficient=32"]
 
 
+@pytest.mark.long
 def test_registers_are_those_of_the_servos_own_family(cli):
     found = cli("curves", BUS, *SOFTER, "--register", "Torque_Limit=500, D_Coefficient=0x20", "--load", "torque=0.2",
                 "--quick", "--json").data["servos"][0]
@@ -32,6 +33,7 @@ def test_registers_are_those_of_the_servos_own_family(cli):
     assert dynamixel["final_angle"] == float(stiff["output_angle"][-1])
 
 
+@pytest.mark.long
 def test_a_set_of_registers_has_a_name_and_single_values_go_on_top(cli):
     def gain(*words):
         return cli("curves", BUS, *words, "--quick", "--json").data["servos"][0]["voltages"][0]["loop"]["stiffness"]
@@ -41,6 +43,7 @@ def test_a_set_of_registers_has_a_name_and_single_values_go_on_top(cli):
     assert gain("--register", "P_Coefficient=32,lerobot") == gain("--register", "lerobot", *STIFFER) == 2 * soft
 
 
+@pytest.mark.long
 def test_set_comes_after_the_registers(cli):
     words = ["curves", BUS, *SOFTER, "--set", "firmware.proportional_gain=2", "--quick", "--json"]
     loop = cli(*words).data["servos"][0]["voltages"][0]["loop"]
@@ -48,6 +51,7 @@ def test_set_comes_after_the_registers(cli):
     assert loop["stiffness"] == pytest.approx(float(model.loop_stiffness()), rel=1e-12)
 
 
+@pytest.mark.long
 def test_the_loop_is_told_in_words_picture_and_page(cli, tmp_path):
     ended = cli("curves", BUS, *SOFTER, "--load", "torque=0.2", "--quick", "--loop", "loop.png", "--out", "page.html")
     assert ended.code == 0, ended.err
@@ -63,6 +67,7 @@ def test_the_loop_is_told_in_words_picture_and_page(cli, tmp_path):
     assert "The loop at rest" in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.long
 def test_a_servo_on_a_bus_follows_goals_and_says_that_it_trips(cli, tmp_path):
     words = ["simulate", BUS, "--step", "0:30", "--load", "torque=13", "--set", "stops.lower_angle=-60deg",
              "--duration", "3", "--plot", "run.png", "--out", "run.csv"]
@@ -75,6 +80,7 @@ def test_a_servo_on_a_bus_follows_goals_and_says_that_it_trips(cli, tmp_path):
     assert "ended on a stop" in text
 
 
+@pytest.mark.long(but="words8-this family has no named sets")
 @pytest.mark.parametrize(("words", "said"), [
     ([BUS, "--register", "P_Coefficient=0"], "P_Coefficient (21) of STS3215-12V: got 0, allowed: a whole number"),
     ([BUS, "--register", "P_Coefficient=300"], "P_Coefficient (21) of STS3215-12V: got 300"),
@@ -117,6 +123,7 @@ def test_curves_refuses_bad_input(cli, tmp_path, words, said):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.long
 def test_the_stiffness_is_that_of_the_standing_servo(cli):
     # without friction, drops and dead zone a load pulls the shaft off by torque over stiffness
     change = [f"friction.{name}=0" for name in ("coulomb_torque_forward", "coulomb_torque_backward",

@@ -7,6 +7,7 @@ import pytest
 from servotwin.cli import main
 
 
+@pytest.mark.long
 def test_doctor_names_cause_and_cure(capsys):
     words = ["doctor", "hitec-hs-422", "--set", "electronics.stretcher_gain=2500", "--load", "inertia=1e-3"]
     assert main(words) == 0
@@ -42,6 +43,7 @@ def test_bad_input_is_one_line(words, capsys):
     assert capsys.readouterr().err.count("\n") == 1
 
 
+@pytest.mark.long
 def test_a_log_is_read_as_other_commands_read_it(cli, tmp_path):
     """Without times and commands, torn, and at the end of its travel: on a supply that is said."""
     rows = [f"{min(3 * k, 60)};0.1" for k in range(100)]

@@ -19,6 +19,7 @@ def wheel(tmp_path):
     return "wheel.toml"
 
 
+@pytest.mark.long
 def test_it_is_simulated_by_pulses_only(cli, wheel):
     ended = cli("simulate", wheel, "--step", "1500:1560", "--unit", "us", "--json")
     assert ended.code == 0
@@ -28,6 +29,7 @@ def test_it_is_simulated_by_pulses_only(cli, wheel):
                                               "stops.upper_angle=2").error
 
 
+@pytest.mark.long
 def test_check_and_curves_take_it(cli, wheel):
     assert "fixed_angle" in cli("catalog", "check", wheel).out
     shown = cli("curves", wheel).out
@@ -35,6 +37,7 @@ def test_check_and_curves_take_it(cli, wheel):
     assert "smallest move" not in shown
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("words", [["--continuous"], ["--travel", "endless"]])
 def test_a_sheet_makes_a_servo_that_turns_without_end(cli, tmp_path, words):
     made = cli("catalog", "from-sheet", *FS90R, *words, "--out", "fs90r.toml")
@@ -68,6 +71,7 @@ def test_a_list_has_servos_that_turn_without_end(cli, tmp_path):
     assert st.load_servo(tmp_path / "mine" / "a.toml").potentiometer.fixed_angle == 0.0
 
 
+@pytest.mark.long
 def test_stops_can_be_taken_away_and_the_refusal_says_how(cli):
     fixed = ["--set", "potentiometer.fixed_angle=0", "--constant", "1700", "--unit", "us"]
     assert "stops=none" in cli("simulate", "towerpro-sg90", *fixed).error

@@ -18,6 +18,7 @@ def test_version(cli):
     assert cli("--version").out == f"servotwin {servotwin.__version__}\n"
 
 
+@pytest.mark.long(but="words7")
 @pytest.mark.parametrize("words", [[], ["--help"], ["-h"], ["catalog"], ["paper", "--help"], ["simulate", "--help"],
                                    ["catalog", "list", "--help"], ["catalog", "show", "-h"],
                                    ["catalog", "check", "--help"]])
@@ -29,6 +30,7 @@ def test_every_help_has_an_example(cli, words):
     assert "Example: servotwin " in ended.out
 
 
+@pytest.mark.long
 def test_examples_of_the_help_work(cli):
     ended = cli("simulate", "--help")
     line = next(line for line in ended.out.splitlines() if "Example: servotwin simulate hitec" in line)
@@ -40,6 +42,7 @@ def test_python_m(child_environment):
     assert (done.returncode, done.stdout, done.stderr) == (0, f"servotwin {servotwin.__version__}\n", "")
 
 
+@pytest.mark.long(but="words0")
 @pytest.mark.parametrize("words", [
     ["--help"], ["catalog", "list"], ["simulate", SERVO, "--step", "0:180", "--out", "run.csv"]])
 def test_heavy_libraries_are_not_loaded(words, child_environment, tmp_path):
@@ -59,6 +62,7 @@ def test_help_loads_no_numpy(child_environment):
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.long(but="words1")
 @pytest.mark.parametrize("words", [["catalog", "show", SERVO], ["--help"],
                                    ["simulate", SERVO, "--step", "0:1", "--json"]])
 def test_a_broken_pipe_is_one_line(words, child_environment):
@@ -72,6 +76,7 @@ def test_a_broken_pipe_is_one_line(words, child_environment):
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.long(but="words3")
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full here")
 @pytest.mark.parametrize("words", [["catalog", "list"], ["catalog", "list", "--json"], ["--version"], ["--help"]])
 def test_a_full_disk_is_one_line(words, child_environment):
@@ -83,6 +88,7 @@ def test_a_full_disk_is_one_line(words, child_environment):
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.long
 def test_closed_streams_do_no_harm(child_environment):
     words = f"{sys.executable} -m servotwin catalog"
     for line, code in ((f"{words} list >&-", 0), (f"{words} list 2>&-", 0), (f"{words} show nothing 2>&-", 2)):
@@ -90,6 +96,7 @@ def test_closed_streams_do_no_harm(child_environment):
         assert (done.returncode, done.stderr) == (code, "")
 
 
+@pytest.mark.long
 def test_text_that_the_terminal_cannot_show(child_environment, tmp_path):
     environment = {**child_environment, "PYTHONIOENCODING": "ascii"}
     done = subprocess.run([*COMMAND, "simulate", SERVO, "--sine", "90:1:1"], capture_output=True, text=True,

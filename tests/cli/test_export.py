@@ -9,6 +9,7 @@ from servotwin.cli import main
 SERVO = "hitec-hs-755hb"
 
 
+@pytest.mark.long
 def test_it_writes_two_files_and_says_what_is_left_out(tmp_path, capsys):
     assert main(["export", "c", SERVO, "--out", str(tmp_path / "firmware"), "--load", "inertia=1e-3", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
@@ -19,6 +20,7 @@ def test_it_writes_two_files_and_says_what_is_left_out(tmp_path, capsys):
     assert [path.name for path in files] == ["hitec_hs_755hb.c", "hitec_hs_755hb.h"]
 
 
+@pytest.mark.long
 def test_name_model_and_parameters(tmp_path):
     assert main(["export", "c", SERVO, "--model", "bounded", "--name", "elbow", "--parameters", "--out",
                  str(tmp_path)]) == 0
@@ -37,6 +39,7 @@ def test_what_is_not_possible_is_said_in_a_line_and_nothing_is_written(words, sa
     assert not (tmp_path / "new").exists()
 
 
+@pytest.mark.long
 def test_files_stay_unless_forced(tmp_path, capsys):
     words = ["export", "c", SERVO, "--model", "bounded", "--out", str(tmp_path)]
     assert main(words) == 0
@@ -48,6 +51,7 @@ def test_files_stay_unless_forced(tmp_path, capsys):
     assert (tmp_path / "hitec_hs_755hb.c").read_text() != "mine"
 
 
+@pytest.mark.long
 def test_a_folder_that_cannot_be_written(tmp_path, capsys):
     (tmp_path / "file").write_text("x")
     assert main(["export", "c", SERVO, "--model", "bounded", "--out", str(tmp_path / "file" / "below")]) == 2

@@ -74,6 +74,7 @@ def test_what_the_logs_cannot_say_is_said(fit):
     assert found["estimates"]["output_inertia"]["method"] == "undetermined"
 
 
+@pytest.mark.long
 def test_bounds_and_priors_have_units(fit):
     words = [*QUICK, "--bounds", "output_inertia=30..40kg cm2", "--json"]
     found = fit(*words).data
@@ -91,6 +92,7 @@ def test_bounds_and_priors_have_units(fit):
     assert one["words"] in about["warnings"]
 
 
+@pytest.mark.long
 def test_windows_are_left_out(fit):
     every = fit(*QUICK, "--holdout", "0", "--json").data
     some = fit(*QUICK, "--holdout", "0", "--leave-out", "step-0=0.3..0.5", "--leave-out", "0ms..100ms", "--json").data
@@ -98,6 +100,7 @@ def test_windows_are_left_out(fit):
     assert count == [4 * 35, 4 * 30 - 10]
 
 
+@pytest.mark.long
 def test_the_report_is_written(fit, tmp_path):
     ended = fit(*QUICK, "--report", "fit.html", "--out", "my.toml")
     assert ended.code == 0, ended.err
@@ -105,6 +108,7 @@ def test_the_report_is_written(fit, tmp_path):
     assert (tmp_path / "fit.html").read_text().startswith("<!DOCTYPE html>")
 
 
+@pytest.mark.long
 def test_advice_without_logs(cli):
     words = ["fit", "--advise", "--servo", fit_logs.SERVO, "--model", "bounded", "--free", "output_inertia"]
     found = cli(*words, "--json").data["advice"]
@@ -141,6 +145,7 @@ def test_the_ladder_is_shown(fit, folder, monkeypatch):
     assert (found["chosen"], found["error"], found["choices"]) == ("M1", 0.013, ["M1", "M2"])
 
 
+@pytest.mark.long
 def test_structures_are_shown_and_reported(fit, tmp_path, monkeypatch):
     """Four structures with Coulomb friction: a table in the terminal, in JSON and on the page."""
     monkeypatch.setattr("servotwin.identification.compare_structures", partial(compare_structures, rungs=("M1",)))
@@ -157,6 +162,7 @@ def test_the_ladder_and_structures_exclude_each_other(fit):
     assert "--ladder: got 'also --structures'" in fit(*QUICK[:2], "--ladder", "--structures").error
 
 
+@pytest.mark.long
 def test_what_is_wrong_with_logs_is_said_and_mended(cli, tmp_path):
     """A log whose angle was turned: without --mend it is named, with it the fit is as good as with the others."""
     folder = fit_logs.write_logs(tmp_path / "runs", 3)
@@ -241,6 +247,7 @@ def test_an_interrupt_before_the_first_step_leaves_nothing(fit, tmp_path, monkey
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.long
 def test_the_accuracy_is_that_of_the_words(fit, folder):
     found = {words: fit(*QUICK, *words, "--json").data["estimates"]["output_inertia"]["value"]
              for words in ((), ("--accuracy", "1e-7"), ("--accuracy", "1e-11"))}
@@ -251,6 +258,7 @@ def test_the_accuracy_is_that_of_the_words(fit, folder):
     assert fine == expected.estimates["output_inertia"]
 
 
+@pytest.mark.long(but="words20-unknown model 'averaged'")
 @pytest.mark.parametrize(("words", "said"), [
     (["--bounds", "output_inertia=3..1"], "LOWEST..HIGHEST"),
     (["--bounds", "output_inertia=1ohm..2ohm"], "one of the units kg m2"),
@@ -302,6 +310,7 @@ def test_an_input_is_never_an_output(cli, tmp_path):
                                                   "--force").error
 
 
+@pytest.mark.long
 def test_something_has_to_be_given(cli, folder):
     assert "no logs" in cli("fit").error
     assert "--servo is needed" in cli("fit", folder).error
@@ -334,6 +343,7 @@ def test_json_of_a_failure(fit):
     assert json.loads(ended.out)["error"]["what"] == "--level"
 
 
+@pytest.mark.long
 def test_the_same_words_give_the_same_numbers(fit):
     first, second = (fit(*QUICK, "--json").data for _ in range(2))
     first.pop("seconds"), second.pop("seconds")
@@ -341,6 +351,7 @@ def test_the_same_words_give_the_same_numbers(fit):
     assert np.isfinite(first["estimates"]["output_inertia"]["value"])
 
 
+@pytest.mark.long
 def test_the_supply_of_the_logs_is_that_of_the_servo_that_is_saved(cli, tmp_path):
     """Logs at 5 V gave a servo of 6 V, that of the sheet."""
     logs = fit_logs.write_logs(tmp_path / "runs", count=2)
@@ -371,6 +382,7 @@ def foreign(folder, end="\n"):
     return path.name
 
 
+@pytest.mark.long
 def test_columns_are_shown_changed_and_kept(cli, tmp_path):
     path = foreign(tmp_path, end="\n700;60,0;3")
     guessed = cli("validate", fit_logs.SERVO, path, "--model", "bounded")

@@ -47,6 +47,7 @@ def test_a_table_of_loads(cli, table):
     assert "at 5 V" in said.out
 
 
+@pytest.mark.long
 def test_what_is_missing_is_said_in_one_line(cli, table, tmp_path):
     assert "--arm 1cm" in cli("fit", "--table", table).error
     assert "a length" in cli("fit", "--table", table, "--arm", "far").error
@@ -60,6 +61,7 @@ def test_what_is_missing_is_said_in_one_line(cli, table, tmp_path):
     assert "--servo" in cli("fit", "--table", table, "--arm", "1cm", "--set", "supply.open_circuit_voltage=5V").error
 
 
+@pytest.mark.long
 def test_the_arm_is_read_from_the_name_and_from_beside(cli, table, tmp_path):
     (tmp_path / "lift_drum1cm.csv").write_text(TABLE)
     (tmp_path / "table.json").write_text(json.dumps({"arm": "1cm"}))
@@ -96,6 +98,7 @@ def test_records_of_lifts(cli, tmp_path):
     assert "lift200.txt" in cli("fit", "--table", "lift{mass}.txt", "--arm", "10cm", "--columns", COLUMNS).out
 
 
+@pytest.mark.long
 def test_records_that_cannot_be(cli, tmp_path):
     records(tmp_path, (0, 200))
     words = ("fit", "--table", "lift{mass}.txt", "--arm", "10cm")

@@ -251,6 +251,7 @@ def check_printed(text):
     assert not HIDDEN.search(re.sub(r"[\n\t]", "", text))
 
 
+@pytest.mark.long(but="doctor")
 @pytest.mark.parametrize("what", RUNS)
 def test_whatever_a_name_is_what_is_written_opens(what, here, tmp_path, request):
     if what.startswith("robot"):
@@ -288,6 +289,7 @@ def with_a_servo():
             k += 1
 
 
+@pytest.mark.long(but="catalog check-nul")
 @pytest.mark.parametrize(("what", "kind"), list(with_a_servo()))
 def test_a_servo_with_a_name_that_no_reader_sees_is_refused_before_anything_is_written(what, kind, here, tmp_path):
     if what.startswith("robot"):
@@ -314,6 +316,7 @@ def of_a_sidecar(path, key, value):
 HIDDEN_NAMES = [name for key, name in REFUSED.items() if key not in ("10 kB", "line end", "nul")]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", HIDDEN_NAMES)
 def test_names_of_columns_logs_joints_robots_and_scenes_are_refused_with_their_place(name, here, tmp_path):
     of_columns(tmp_path / "run.csv", name)

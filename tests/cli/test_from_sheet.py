@@ -22,6 +22,7 @@ def make(cli):
     return lambda *words: cli("catalog", "from-sheet", *words)
 
 
+@pytest.mark.long
 def test_the_table_shows_what_follows_with_its_range(make):
     ended = make(*GOOD)
     assert ended.code == 0
@@ -30,6 +31,7 @@ def test_the_table_shows_what_follows_with_its_range(make):
         assert text in ended.out
 
 
+@pytest.mark.long
 def test_a_file_is_written_that_the_function_makes_too(make, cli, tmp_path):
     ended = make(*GOOD, "--deadband", "8 us", "--pulse-range", "556-2410 us", "--rate", "45 deg/400us", "--neutral",
                  "1.5 ms", "--mass", "110 g", "--gear-ratio", "280:1", "--backlash", "0.5 deg", "--stops", "230 deg",
@@ -50,6 +52,7 @@ def test_a_file_is_written_that_the_function_makes_too(make, cli, tmp_path):
     assert found["warnings"] == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("words", "kind", "gain"), [
     (["--modulation", "digital"], "digital", 8.0),
     (["--modulation", "bus", "--registers", "dynamixel-mx"], "bus", 16.0 / math.pi)])
@@ -64,6 +67,7 @@ def test_a_servo_with_a_program_gets_its_firmware(make, tmp_path, words, kind, g
     assert (tmp_path / "again.toml").read_text() == (tmp_path / "mine.toml").read_text()
 
 
+@pytest.mark.long(but="0.23 s/60deg-13.2 kg.cm")
 @pytest.mark.parametrize("torque", ["1.2945 N m", "1.2945Nm", "1294.5 mN.m", "129.45 N-cm", "13.2 kg.cm", "13.2kgf·cm",
                                     "13.2 kg-cm", "183.3 oz-in", "183.31 ozf.in"])
 @pytest.mark.parametrize("speed", ["0.23 s/60deg", "0.23sec/60°", "0.23 s / 60 deg", "43.478 rpm", "260.87 deg/s"])
@@ -74,6 +78,7 @@ def test_units_as_people_write_them(make, torque, speed):
     assert found["speed"] == pytest.approx(60.0 / 0.23, rel=1e-3)
 
 
+@pytest.mark.long(but="figures4")
 @pytest.mark.parametrize("figures", [
     ["--at", "6V", "--torque", "1.8 kg/cm", "--speed", "0.11 s/60deg"],
     ["--at", "6V", "--torque", "25 oz/in", "--speed", "0.11s/60"],
@@ -92,6 +97,7 @@ def test_figures_as_shops_print_them(make, figures):
     assert ended.err.count("warning: read kg/cm as kgf cm") == 1
 
 
+@pytest.mark.long
 def test_json_has_everything_in_si(make, tmp_path):
     found = make(*GOOD, "--out", "mine.toml", "--json").data
     assert found["possible"] is True
@@ -102,6 +108,7 @@ def test_json_has_everything_in_si(make, tmp_path):
     assert names == set(st.load_servo(tmp_path / "mine.toml").names())
 
 
+@pytest.mark.long
 def test_every_printed_figure_is_simulated_and_what_is_off_is_flagged(make):
     words = [*GOOD, "--torque", "7 kgf.cm@4.8V", "--speed", "0.3 s/60deg@4.8V", "--idle-current", "8.7 mA@6",
              "--allow-impossible"]
@@ -119,6 +126,7 @@ def test_every_printed_figure_is_simulated_and_what_is_off_is_flagged(make):
     assert low < found["motion"]["passes"] < high
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("more", "said", "possible"), [
     ([], "not checked, needs a current", None), (["--stall-current", "3 A"], "yes", True),
     (["--torque", "20 kgf.cm@4.8V", "--speed", "0.25 s/60deg@4.8V"], "NO", False)])
@@ -136,6 +144,7 @@ def test_plain_leaves_out_what_grows_with_the_load(make, tmp_path):
     assert servo.gear.backlash is None
 
 
+@pytest.mark.long
 def test_nothing_is_overwritten_without_force(make, tmp_path):
     (tmp_path / "mine.toml").write_text("kept")
     assert "mine.toml exists already; use --force" in make(*GOOD, "--out", "mine.toml").error
@@ -144,6 +153,7 @@ def test_nothing_is_overwritten_without_force(make, tmp_path):
     assert st.load_servo(tmp_path / "mine.toml").name == "mine"
 
 
+@pytest.mark.long
 def test_two_voltages_are_used_together(make):
     one = make(*GOOD, "--json").data["motor"]["resistance"]
     two = make(*GOOD, "--torque", "11 kgf.cm @4.8V", "--speed", "0.28 s/60deg @4.8V", "--running-current",
@@ -153,6 +163,7 @@ def test_two_voltages_are_used_together(make):
     assert two["motor"]["resistance"]["lower"] < one["lower"]
 
 
+@pytest.mark.long
 def test_an_impossible_sheet_is_explained_and_not_made(make, tmp_path):
     ended = make(*IMPOSSIBLE, "--out", "wonder.toml")
     for word in ("2.5 N m and 0.11 s/60°", "2.1 A", "% or more efficiency", "at most"):
@@ -165,6 +176,7 @@ def test_an_impossible_sheet_is_explained_and_not_made(make, tmp_path):
     assert servo.sheet["flags"][0].startswith("impossible")
 
 
+@pytest.mark.long
 def test_the_sheet_of_a_servo_is_taken_again(make, tmp_path):
     ended = make("hitec-hs-645mg", "--out", "again.toml")
     assert ended.code == 0
@@ -174,6 +186,7 @@ def test_the_sheet_of_a_servo_is_taken_again(make, tmp_path):
     assert (servo.name, servo.friction.load_friction_motor) == ("other", None)
 
 
+@pytest.mark.long
 def test_a_list_makes_a_folder_of_servos(make, tmp_path):
     (tmp_path / "list.csv").write_text(LIST)
     ended = make("--csv", "list.csv", "--out", "mine")
@@ -188,6 +201,7 @@ def test_a_list_makes_a_folder_of_servos(make, tmp_path):
     assert len(found["left_out"]) == 1
 
 
+@pytest.mark.long(but="words18-stall torque at 6 V")
 @pytest.mark.parametrize(("words", "said"), [
     ([], "--name is missing"), (["--name", "mine"], "no figures of a sheet are given"),
     ([*GOOD[:4]], "torque without speed"), (["--name", "mine", *GOOD[4:6]], "speed without torque"),
@@ -231,6 +245,7 @@ def test_bad_words_end_in_one_line(make, tmp_path, words, said):
     assert [path.name for path in tmp_path.iterdir()] == ["list.csv"]
 
 
+@pytest.mark.long
 def test_the_list_of_the_catalog_shows_the_flags(cli):
     lines = {line.split()[0]: line for line in cli("catalog", "list").out.splitlines()}
     assert "impossible" in lines["feetech-ft-7235"]

@@ -70,6 +70,7 @@ def made(folder):
                                       "320,370,0.21\n400,450,0.27\n")
 
 
+@pytest.mark.long(but="line34")
 @pytest.mark.parametrize("line", [*documented(), *OF_FILES])
 def test_every_number_of_a_wide_terminal_stands_in_a_narrow_one(line, tmp_path, monkeypatch, capsys):
     """All widths are drawn of one run."""
@@ -132,6 +133,7 @@ def test_a_number_stays_with_its_unit():
             assert whole in text
 
 
+@pytest.mark.long
 def test_the_stall_torque_at_80_columns(capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
@@ -149,6 +151,7 @@ def commands(command, path=()):
                      for words in commands(each, (*path, name))]
 
 
+@pytest.mark.long(but="doctor")
 @pytest.mark.parametrize("words", commands(get_command(app)), ids=" ".join)
 def test_no_word_of_a_help_is_cut_at_80_columns(words, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")

@@ -30,6 +30,7 @@ def test_the_numbers_are_those_of_the_functions(cli):
     assert sines["sticks"] == st.linear.linearise(model, load, amplitude=math.radians(5.0)).sticks(omega).tolist()
 
 
+@pytest.mark.long
 def test_files(cli, tmp_path):
     names = [tmp_path / name for name in ("a.html", "a.png", "a.csv")]
     words = [word for option, name in zip(("--out", "--plot", "--csv"), names, strict=True) for word in (option, name)]
@@ -64,6 +65,7 @@ def test_what_has_no_linear_loop_still_has_sines(cli):
     assert "Hz" in seen.out
 
 
+@pytest.mark.long(but="words4-together with --tune")
 @pytest.mark.parametrize(("words", "text"), [
     (("nothing",), "unknown servo"), ((SERVO, "--tune"), "nothing to tune for"),
     ((SERVO, "--tune", "--overshoot", "ten"), "per cent"), ((SERVO, "--phase-margin", "50deg"), "together with --tune"),

@@ -29,6 +29,7 @@ def steps(*, sign=1.0, command=lambda c: c, delay=60, zero=0.0):
     return rows
 
 
+@pytest.mark.long(but="thousands 0")
 @pytest.mark.parametrize("one", ASKED, ids=lambda one: f"{one.kind} {one.seed}")
 def test_what_the_sentence_says_works_when_it_is_typed(cli, one):
     Path("run.csv").write_bytes(one.broken)
@@ -71,6 +72,7 @@ def test_what_a_log_holds(cli):
     assert "begins 60 ms after" in " ".join(text.split()).replace("70", "60")
 
 
+@pytest.mark.long(but="rows5-1 reading of the angle, the first at 2.5 s")
 @pytest.mark.parametrize(("rows", "words"), [
     (steps(sign=-1.0), 'angle=angle_deg:-deg"'),
     (steps(sign=-1.0, command=lambda c: c + 90, zero=90.0), 'angle=angle_deg:-deg+180"'),
@@ -116,6 +118,7 @@ def test_gaps_counts_and_the_end_of_a_range(cli):
     assert found["motion"]["lag"] == pytest.approx(0.05, abs=0.02)
 
 
+@pytest.mark.long
 def test_files_are_never_written_over(cli):
     written("run.csv", steps(command=lambda c: 1500 + 10 * c))
     before = Path("run.csv").read_bytes()
@@ -143,6 +146,7 @@ def test_what_is_no_log_is_one_line(cli, content, words):
     assert words in cli("log", "run.csv").error
 
 
+@pytest.mark.long
 def test_words_that_are_none(cli):
     written("run.csv", steps())
     for words, said in ((("--mend", "tron"), "did you mean 'torn'"), (("--mend", "wrap"), "beside a servo"),
@@ -174,6 +178,7 @@ def test_a_clean_log_is_left_as_it_is(cli):
     assert np.array_equal(log.measured["output_angle"], again.measured["output_angle"])
 
 
+@pytest.mark.long
 def test_measured_logs_raise_few_doubts(data_folder):
     from servotwin.identification.survey.survey import survey_of
 

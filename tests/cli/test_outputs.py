@@ -19,6 +19,7 @@ def never_simulated(monkeypatch):
     monkeypatch.setattr(simulation, "simulate", refuse)
 
 
+@pytest.mark.long(but="words11-is the same file as --out there.csv")
 @pytest.mark.parametrize(("words", "said"), [
     (["--out", "there.csv"], "there.csv exists already; use --force"),
     (["--plot", "there.png"], "there.png exists already"),
@@ -62,6 +63,7 @@ def test_only_regular_files_are_replaced(simulate, tmp_path):
     assert "no regular file" in simulate(*STEP, "--out", "pipe.csv", "--force").error
 
 
+@pytest.mark.long
 def test_force_replaces_and_a_link_stays_a_link(simulate, tmp_path):
     (tmp_path / "real.csv").write_text("old")
     (tmp_path / "link.csv").symlink_to("real.csv")
@@ -94,6 +96,7 @@ def test_if_the_picture_fails_the_table_is_not_written(simulate, tmp_path, monke
     assert (tmp_path / "run.csv").read_text() == "old"
 
 
+@pytest.mark.long
 def test_a_full_disk_names_the_file_that_was_asked_for(child_environment, tmp_path):
     import subprocess
     import sys

@@ -7,6 +7,8 @@ import pytest
 import servotwin as st
 from servotwin.datasheet.guesses import guesses
 
+pytestmark = pytest.mark.long
+
 
 def test_curves_and_simulate_show_the_range_and_name_the_guesses(cli):
     text = cli("curves", "hitec-hs-311", "--quick").out

@@ -49,6 +49,7 @@ def quick(*words, motion="wave.csv", out="out"):
     return (*words, "--motion", motion, "--out", out, "--no-video", "--settle", "0.05")
 
 
+@pytest.mark.long
 def test_files_and_table(robot, tmp_path):
     ended = robot(*quick("arm.xml", *SERVOS))
     assert ended.code == 0, ended.err
@@ -70,6 +71,7 @@ def test_files_and_table(robot, tmp_path):
     assert float(rows[1]["time_s"]) - float(rows[0]["time_s"]) == pytest.approx(0.01)
 
 
+@pytest.mark.long
 def test_json_is_the_summary(robot, tmp_path):
     found = robot(*quick("arm.xml", *SERVOS), "--json").data
     files = found.pop("files")
@@ -83,6 +85,7 @@ def test_json_is_the_summary(robot, tmp_path):
     assert found["supply"] is None
 
 
+@pytest.mark.long
 def test_nothing_is_replaced_without_force(robot, tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "sizing.png").write_text("mine")
@@ -92,6 +95,7 @@ def test_nothing_is_replaced_without_force(robot, tmp_path):
     assert (tmp_path / "out" / "sizing.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.long
 def test_slides_actuators_and_shared_supplies(robot):
     words = ("driven.xml", "--servo", "elbow=hitec-hs-755hb", "--servo", "shoulder=hitec-hs-755hb", "--servo",
              "slider=hitec-hs-755hb", "--mount", "*=-90deg", "--mount", "slider=-10mm:1:9mm", "--supply", "5V:0.2ohm")
@@ -102,11 +106,13 @@ def test_slides_actuators_and_shared_supplies(robot):
     assert found["joints"]["elbow"]["tracking"]["lowest_voltage"] < 5.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("how", ["clear", "keep"])
 def test_friction_of_the_model_is_cleared_or_kept(robot, how):
     assert robot(*quick("damped.xml", *SERVOS), "--friction", how, "--json").data["big_enough"]
 
 
+@pytest.mark.long
 def test_the_arm_of_the_package_has_servos_as_lerobot_sets_them(robot):
     found = robot(*quick("so101", motion="so.csv"), "--register", "P_Coefficient=32", "--json").data["joints"]
     assert len(found) == 6
@@ -117,6 +123,7 @@ def test_the_arm_of_the_package_has_servos_as_lerobot_sets_them(robot):
     assert share == pytest.approx(0.5, abs=0.05)
 
 
+@pytest.mark.long
 def test_an_episode_of_lerobot(robot, tmp_path):
     arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
     names = ["shoulder_pan.pos", "gripper.pos"]
@@ -147,6 +154,7 @@ def test_an_episode_of_lerobot(robot, tmp_path):
     assert not any("registers assumed" in note for note in own["notes"])
 
 
+@pytest.mark.long
 def test_a_video(robot, tmp_path, monkeypatch):
     pytest.importorskip("cv2", reason="the extra `video` is not installed")
     from servotwin.robots.camera import NoDrawingError, check_drawing
@@ -163,6 +171,7 @@ def test_a_video(robot, tmp_path, monkeypatch):
     assert 'src="robot.webm"' in (tmp_path / "out" / "index.html").read_text()
 
 
+@pytest.mark.long(but="words8-joint shoulder of wave.csv: got 'no servo at it'")
 @pytest.mark.parametrize(("words", "said"), [
     (("none.xml", *SERVOS), "none.xml is no file"),
     (("wave.csv", *SERVOS), "wave.csv is no model that MuJoCo reads"),
@@ -225,6 +234,7 @@ def test_help_has_an_example(cli, words):
     assert "Example: servotwin robot run" in ended.out
 
 
+@pytest.mark.long
 def test_a_joint_that_mimics_another_gets_no_servo(robot, tmp_path):
     """Two fingers of 20 g on one servo needed 20 N m when each had its own."""
     (tmp_path / "grip.urdf").write_text(URDF)

@@ -20,6 +20,7 @@ def robot(cli, tmp_path, monkeypatch):
     return lambda *words: cli("robot", *words)
 
 
+@pytest.mark.long
 def test_a_task_with_ideal_actuators(robot, tmp_path):
     ended = robot("scara", "--task", "square", "--redundancy", "limits", "--ideal", *SMALL)
     assert ended.code == 0, ended.err
@@ -38,6 +39,7 @@ def test_a_task_with_ideal_actuators(robot, tmp_path):
     assert "Redundancy" in page
 
 
+@pytest.mark.long
 def test_a_task_with_servos(robot, tmp_path):
     ended = robot("two-link", "--payload", "50g", "--supply", "6V:0.1ohm", "--json", *SMALL)
     assert ended.code == 0, ended.err
@@ -52,6 +54,7 @@ def test_a_task_with_servos(robot, tmp_path):
     assert "tool.png" in page
 
 
+@pytest.mark.long
 def test_servos_models_and_controllers_by_name(robot):
     words = ("two-link", "--servo", "towerpro-mg996r", "--servo", "elbow=hitec-hs-755hb", "--model", "bounded",
              "--controller", "feedforward", "--json")
@@ -63,6 +66,7 @@ def test_servos_models_and_controllers_by_name(robot):
     assert found["big_enough"]
 
 
+@pytest.mark.long(but="words2-unknown task 'cirle'; did you mean 'circle'?")
 @pytest.mark.parametrize(("words", "said"), [
     (("scara", "--size", "0.2"), "circle of 400 mm at 0.00 s: got 'a place 50 mm out of its reach"),
     (("two-link", "--size", "97.2mm"), "joint elbow: got"),

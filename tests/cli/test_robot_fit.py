@@ -18,6 +18,8 @@ from robots.robots_cases import links
 from robots.test_replay import JOINTS, recorded
 from servotwin.identification.fitting import checks, stopping
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture
 def arm(tmp_path, monkeypatch):

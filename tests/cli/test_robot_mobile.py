@@ -17,6 +17,7 @@ def robot(cli, tmp_path, monkeypatch):
     return lambda *words: cli("robot", "mobile", *words, "--out", "out", "--no-video")
 
 
+@pytest.mark.long
 def test_a_short_way_by_encoders(robot, tmp_path):
     ended = robot("--waypoints", "0,0; 0.15,0", "--encoders", "4096")
     assert ended.code == 0, ended.err

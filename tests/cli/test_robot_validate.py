@@ -11,6 +11,8 @@ from robots.robots_cases import links
 from robots.test_replay import JOINTS, recorded
 from servotwin.robots.replay import IDEAL, SERVOS
 
+pytestmark = pytest.mark.long
+
 
 def test_the_command(cli, tmp_path, monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "off")

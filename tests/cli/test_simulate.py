@@ -17,6 +17,7 @@ def columns(path):
     return {name: np.array([float(row[k]) for row in rows[1:]]) for k, name in enumerate(rows[0])}
 
 
+@pytest.mark.long
 def test_the_example_works_as_documented(cli, tmp_path):
     ended = cli("simulate", SERVO, "--step", "0:180", "--load", "inertia=1e-3", "--model", "averaged",
                 "--out", "run.csv", "--plot", "run.png")
@@ -32,6 +33,7 @@ def test_the_example_works_as_documented(cli, tmp_path):
                                atol=1e-12)
 
 
+@pytest.mark.long
 def test_the_summary_says_what_matters(simulate):
     ended = simulate("--step", "0:180", "--load", "inertia=1e-3")
     labels = [line.split("  ")[1] for line in ended.out.splitlines()[1:] if not line.startswith("    ")]
@@ -45,6 +47,7 @@ def test_the_summary_says_what_matters(simulate):
     assert "armature_inductance" in ended.out
 
 
+@pytest.mark.long
 def test_json_holds_the_numbers_of_the_result(simulate):
     found = simulate("--step", "0:90", "--at", "0.2", "--json", "--duration", "1").data
     result = st.simulate(st.PulseServo(st.load_servo(SERVO)), st.signals.step(0.0, 90.0, at=0.2, unit="deg"),
@@ -64,6 +67,7 @@ def test_what_is_not_finite_is_null_in_json(cli):
     assert found["step_metrics"]["target"] is None
 
 
+@pytest.mark.long(but="words5-signal5")
 @pytest.mark.parametrize(("words", "signal"), [
     (["--step", "1200:1700", "--unit", "us"], st.signals.step(1200.0, 1700.0, at=0.1, unit="us")),
     (["--step", "-5:20"], st.signals.step(-5.0, 20.0, at=0.1, unit="deg")),
@@ -86,6 +90,7 @@ def test_every_shape_is_the_signal_of_its_name(simulate, tmp_path, words, signal
                                atol=1e-10)
 
 
+@pytest.mark.long
 def test_files_of_samples_and_pulses(simulate, tmp_path):
     (tmp_path / "pulses.csv").write_text("time_s,pulse_width_us\n0,1500\n0.02,1600\n0.04,1600\n")
     sampled = simulate("--command", "pulses.csv", "--json", "--model", "bounded").data
@@ -96,6 +101,7 @@ def test_files_of_samples_and_pulses(simulate, tmp_path):
     assert held["final_angle"] != sampled["final_angle"]
 
 
+@pytest.mark.long
 def test_the_output_of_a_run_is_the_command_of_the_next(simulate, tmp_path):
     first = simulate("--step", "0:90", "--out", "run.csv", "--json").data
     assert "chosen by column" in simulate("--command", "run.csv").error
@@ -103,6 +109,7 @@ def test_the_output_of_a_run_is_the_command_of_the_next(simulate, tmp_path):
     assert second["final_angle"] == pytest.approx(first["final_angle"], abs=1e-6)
 
 
+@pytest.mark.long
 def test_loads_add_up(simulate, tmp_path):
     (tmp_path / "torque.csv").write_text("time_s,torque_Nm\n0,0.1\n2,0.1\n")
     together = simulate("--step", "0:90", "--json", "--load", "inertia=1e-3,viscous=1e-4,coulomb=0.01",
@@ -116,6 +123,7 @@ def test_loads_add_up(simulate, tmp_path):
     assert together["final_angle"] == pytest.approx(float(result["output_angle"][-1]), rel=1e-8)
 
 
+@pytest.mark.long
 def test_set_replaces_a_parameter(simulate):
     words = ["--step", "0:90", "--json"]
     plain, changed, again = (simulate(*words, *more).data for more in (
@@ -127,6 +135,7 @@ def test_set_replaces_a_parameter(simulate):
     assert simulate(*words, "--set", "electronics.off_state=coast").code == 0
 
 
+@pytest.mark.long(but="pulse")
 @pytest.mark.parametrize("model", ["averaged", "averaged-inductive", "bounded", "pulse", "geared-motor", "dc-motor"])
 def test_every_model_runs_and_is_drawn(cli, tmp_path, model):
     ended = cli("simulate", SERVO, "--model", model, "--step", "0.5:1", "--unit", "V", "--duration", "0.3",
@@ -136,12 +145,14 @@ def test_every_model_runs_and_is_drawn(cli, tmp_path, model):
     assert "<svg" in (tmp_path / "run.svg").read_text()
 
 
+@pytest.mark.long
 def test_a_servo_file_is_a_servo(cli, tmp_path):
     st.load_servo(SERVO).save(tmp_path / "mine.toml")
     same = [cli("simulate", servo, "--step", "0:90", "--json").data["final_angle"] for servo in (SERVO, "mine.toml")]
     assert same[0] == same[1]
 
 
+@pytest.mark.long
 def test_a_pulse_servo_gives_the_numbers_of_the_result(simulate):
     found = simulate("--model", "pulse", "--step", "0:60", "--duration", "0.5", "--json").data
     result = st.simulate(st.PulseServo(st.load_servo(SERVO)), st.signals.step(0.0, 60.0, at=0.1, unit="deg"),
@@ -153,6 +164,7 @@ def test_a_pulse_servo_gives_the_numbers_of_the_result(simulate):
     assert "electronics.bridge_gain" in found["ignored"]
 
 
+@pytest.mark.long
 def test_a_pulse_servo_writes_what_its_chip_does(simulate, tmp_path):
     ended = simulate("--model", "pulse", "--step", "1500:1600", "--unit", "us", "--duration", "0.3",
                      "--out", "run.csv", "--plot", "run.png")
@@ -195,12 +207,14 @@ def test_a_pulse_servo_refuses_in_one_line(simulate, tmp_path, words, parts):
         assert part in error
 
 
+@pytest.mark.long
 def test_noise_follows_the_seed(simulate):
     noisy = ("--model", "pulse", "--step", "0:20", "--duration", "0.5", "--json", "--set", "potentiometer.noise=0.02")
     first, again, other = (simulate(*noisy, "--seed", seed).out for seed in ("1", "1", "2"))
     assert first == again != other
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("words", "said", "remarks"), [
     (("--load", "torque=3"), ["ended on a stop that it was not sent to at 1.5 s", "cannot hold its load at 1.5 s"],
      [{"kind": "ended on a stop", "time": 1.5}, {"kind": "cannot hold", "time": 1.5}]),
@@ -226,6 +240,7 @@ def test_warnings_are_one_line_each(cli):
         "feetech-ft-7235", "feetech-ft-7235", "the first change of the command"]
 
 
+@pytest.mark.long
 def test_nothing_is_minus_zero(simulate, tmp_path):
     words = ("--constant", "0", "--out", "run.csv", "--force")
     ended = simulate(*words)

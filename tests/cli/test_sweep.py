@@ -82,6 +82,7 @@ def test_a_file_without_spreads_has_nothing_to_draw(cli, tmp_path):
                                                  "--lanes", "4").out
 
 
+@pytest.mark.long
 def test_failed_lanes_are_shown(sweep, tmp_path):
     (tmp_path / "draws.csv").write_text("load.spring.stiffness\n0.1\n1e27\n")
     ended = sweep(*STEP, "--draws", "draws.csv", "--load", "spring=0.1")
@@ -89,6 +90,7 @@ def test_failed_lanes_are_shown(sweep, tmp_path):
     assert "1: lane 1 at" in ended.out
 
 
+@pytest.mark.long
 def test_resume(sweep, tmp_path):
     words = [*STEP, *VARY, "--lanes", "30", "--out", "study"]
     first = sweep(*words)
@@ -105,6 +107,7 @@ def test_truncation(sweep):
     assert sweep(*wide, "--truncate").code == 0
 
 
+@pytest.mark.long(but="words1---vary: got 'load.inertia', allowed: NAME=DISTRIBUTION")
 @pytest.mark.parametrize(("words", "said"), [
     ([], "nothing varies; use at least one of --vary, --from-file, --draws"),
     (["--vary", "load.inertia"], "--vary: got 'load.inertia', allowed: NAME=DISTRIBUTION"),

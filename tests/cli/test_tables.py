@@ -71,6 +71,7 @@ def draws(stiff, lanes=8):
     return "load.spring.stiffness\n" + "".join(f"{1e27 if k in stiff else 0.1}\n" for k in range(lanes))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("failed", "named", "more"), [
     ((1,), [1], ""), ((0, 4, 6), [0, 4, 6], ""), ((1, 2, 5, 7), [1, 2, 5], "; and 1 more"),
     (range(1, 8), [1, 2, 3], "; and 4 more")])

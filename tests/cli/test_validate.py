@@ -44,6 +44,7 @@ def test_what_is_printed(cli, folder, truth):
     assert {line.split()[0] for line in lines if line.endswith("°")} == {"step-0", "stairs-1", "step-2", "step-3"}
 
 
+@pytest.mark.long
 def test_a_limit_that_is_exceeded_fails(cli, folder):
     words = ["validate", fit_logs.SERVO, folder, "--model", "bounded"]
     assert cli(*words, "--max-error", "20deg").code == 0
@@ -54,6 +55,7 @@ def test_a_limit_that_is_exceeded_fails(cli, folder):
     assert "! step: " in cli(*words, "--max-error", "step=1e-4 rad").out
 
 
+@pytest.mark.long(but="words8-unknown model")
 @pytest.mark.parametrize(("words", "said"), [
     (["--max-error", "3"], "a number with one of the units rad, deg"), (["--max-error=-3deg"], "a positive number"),
     (["--max-error", "3 V"], "rad, deg"), (["--max-error", "fish=3deg"], "unknown motion"),
@@ -66,6 +68,7 @@ def test_bad_words(cli, folder, tmp_path, words, said):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.long
 def test_a_report_is_not_overwritten(cli, folder, truth, tmp_path):
     words = ["validate", truth, folder / "step-0.csv", "--model", "bounded", "--report", "check.html"]
     assert cli(*words).code == 0
@@ -118,6 +121,7 @@ def test_errors_are_rms_over_samples(folder, truth):
     assert found.total == pytest.approx(math.sqrt(np.mean(every**2)), rel=1e-12)
 
 
+@pytest.mark.long
 def test_what_is_found_of_columns_is_kept_with_what_was_said(cli, tmp_path):
     """Commands of servo.write: the sidecar has zero and unit, and the same words may be typed again."""
     rows = [f"{20 * k} {90 if k < 20 else 150} {90 if k < 20 else min(90 + 3 * (k - 20), 150)}" for k in range(60)]

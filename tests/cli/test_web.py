@@ -51,6 +51,7 @@ def test_without_the_extra(cli, monkeypatch):
     assert "servotwin[web]" in cli("web", "--no-open", "--port", "0").error
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize(("how", "codes", "said"), [
     (signal.SIGINT, {130}, "servotwin: interrupted\n"), (signal.SIGTERM, {143}, "servotwin: interrupted\n")])

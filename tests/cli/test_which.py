@@ -38,6 +38,7 @@ def facts(found):
     return {each["id"]: each for each in (*found["found"], *found["refused"])}
 
 
+@pytest.mark.long
 def test_those_that_are_named_stand_side_by_side_with_what_their_sheets_say(which):
     words = ["--lift", "0.3kg", "--arm", "10cm", "--voltage", "6", "--among", ",".join(FOUR[:3])]
     found = facts(which(*words, "--json").data)
@@ -58,6 +59,7 @@ def test_those_that_are_named_stand_side_by_side_with_what_their_sheets_say(whic
     assert "above 130 deg C" in text or "gives way" in text or "sinks" in text
 
 
+@pytest.mark.long
 def test_each_limit_says_its_reason(which):
     limits = {"current=1A": "draws", "mass=10g": "weighs", "voltage=7.4V": "its sheet ends at",
               "travel=350deg": "travels", "time=0.1s": "takes", "kind=digital": "is analog"}
@@ -72,11 +74,13 @@ def test_each_limit_says_its_reason(which):
         name for name in st.catalog_names() if "xl330" in name or "xl-320" in name}
 
 
+@pytest.mark.long
 def test_what_is_not_known_keeps_no_limit(which):
     found = facts(which("--limit", "mass=1kg", "--among", "hitec-hs-425bb", "--json").data)["hitec-hs-425bb"]
     assert [reason["text"] for reason in found["reasons"]] == ["its mass is not known"]
 
 
+@pytest.mark.long
 def test_prices_are_a_shop_and_the_cheapest_comes_first(which, tmp_path):
     (tmp_path / "shop.csv").write_text("servo,price_EUR\nhitec-hs-422,14\ntowerpro-sg90,2.50\nfutaba-s3003,9\n")
     found = which("--lift", "100g", "--arm", "10cm", "--prices", "shop.csv", "--limit", "price=10", "--json").data
@@ -91,6 +95,7 @@ def test_limits_and_prices_that_cannot_be(which, tmp_path):
     assert "1200, if the point" in which("--lift", "100g", "--arm", "10cm", "--prices", "shop.csv").error
 
 
+@pytest.mark.long
 def test_usb_is_a_supply_wherever_one_is_said(cli, which):
     usb = st.Supply.of("usb")
     assert (usb.open_circuit_voltage, usb.current_limit) == (5.0, 0.5)
@@ -108,6 +113,7 @@ def test_usb_is_a_supply_wherever_one_is_said(cli, which):
         assert "--supply" in cli(command, "--help").out
 
 
+@pytest.mark.long
 def test_a_motion_of_a_robot_is_that_of_robot_run(which, wave, tmp_path):
     pytest.importorskip("mujoco")
     found = facts(which("--robot", "arm.xml", "--motion", "wave.csv", "--voltage", "6", "--among",
@@ -126,6 +132,7 @@ def test_a_motion_of_a_robot_is_that_of_robot_run(which, wave, tmp_path):
     assert 298.15 < hottest < max(each.heating.winding for each in sized.values())
 
 
+@pytest.mark.long
 def test_one_joint_counts_where_it_is_named(which, wave):
     pytest.importorskip("mujoco")
     words = ["--robot", "arm.xml", "--motion", "wave.csv", "--among", "hitec-hs-422", "--json"]
@@ -135,6 +142,7 @@ def test_one_joint_counts_where_it_is_named(which, wave):
     assert one["margin"] == both["joints"]["elbow"]["margin"] > both["margin"]
 
 
+@pytest.mark.long
 def test_a_motion_of_one_arm_takes_the_torque_of_its_mass(which, wave):
     pytest.importorskip("mujoco")
     light, heavy = (facts(which("--motion", "lift.csv", "--lift", mass, "--arm", "10cm", "--among",
@@ -145,12 +153,14 @@ def test_a_motion_of_one_arm_takes_the_torque_of_its_mass(which, wave):
     assert light["hitec-hs-422"]["margin"] < lifts  # it moves as well
 
 
+@pytest.mark.long
 def test_a_motion_beyond_the_travel_is_a_reason(which, wave):
     pytest.importorskip("mujoco")
     found = facts(which("--motion", "far.csv", "--among", "hitec-hs-422", "--json").data)["hitec-hs-422"]
     assert [reason["text"] for reason in found["reasons"]] == ["arm moves 360 deg, the servo travels 180 deg"]
 
 
+@pytest.mark.long(but="words19-unknown joint of --joint 'wrist'")
 @pytest.mark.parametrize(("words", "said"), [
     ([], "nothing is asked: allowed: --lift MASS"),
     (["--among", "towerpro-sg9"], "unknown servo 'towerpro-sg9'; did you mean 'towerpro-sg90'"),
@@ -187,6 +197,7 @@ def test_bad_input_is_one_line(which, wave, tmp_path, words, said):
     assert said in which(*words).error
 
 
+@pytest.mark.long
 def test_curves_of_several_servos_end_with_one_table(cli):
     words = ["curves", "hitec-hs-422", "towerpro-sg90", "--voltage", "5", "--quick"]
     text = cli(*words).out
@@ -201,6 +212,7 @@ def test_curves_of_several_servos_end_with_one_table(cli):
     assert "side by side" not in cli(*words[:2], "--voltage", "5", "--quick").out
 
 
+@pytest.mark.long(but="words0-True")
 @pytest.mark.parametrize(("words", "warned"), [
     (["--supply", "9V"], True), (["--set", "supply.open_circuit_voltage=9V"], True), (["--supply", "7.4V"], False),
     ([], False)])

@@ -14,6 +14,7 @@ LOADS = {"free": None, "pendulum": st.loads.Pendulum(mass=0.2, length=0.15) + st
          "pressed": st.loads.Constant(0.4) + st.loads.Inertia(3e-3)}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", LOADS)
 def test_equation_40_returns_the_load_torque_of_a_simulated_motion(servo, name):
     model, load = st.AveragedServo(servo), LOADS[name]

@@ -110,6 +110,7 @@ def test_loops_by_rule_are_stable_on_every_servo_and_bear_wrong_numbers(kind, na
                     control.check_stable(controller, other, lag=1.5e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "J_L"), [("hitec-hs-755hb", 1e-3), ("towerpro-sg90", 5e-3)])
 def test_an_integral_by_rule_leaves_more_than_45_degrees_of_phase_at_the_frames_of_a_pulse_servo(name, J_L):
     model, load = st.PulseServo(st.load_servo(name)), st.loads.Inertia(J_L)
@@ -118,6 +119,7 @@ def test_an_integral_by_rule_leaves_more_than_45_degrees_of_phase_at_the_frames_
     assert 0.4 * most < rate < most
 
 
+@pytest.mark.long
 def test_a_servo_lags_slow_motions_as_the_rule_says(servo):
     model = st.PulseServo(servo)
     for speed in (0.02, 0.05):

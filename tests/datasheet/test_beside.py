@@ -44,6 +44,7 @@ def test_a_figure_that_is_off_by_more_than_15_percent_is_flagged_by_name_and_num
     assert any(flag.startswith(flagged) for flag in flags), flags
 
 
+@pytest.mark.long
 def test_a_slow_step_is_flagged():
     servo = servo_from_sheet(Sheet(name="a", points=(ONE,)))
     motion = motion_of(servo)

@@ -19,6 +19,7 @@ def rest(model, command, load, duration):
     return st.simulate(model, command, load=load, duration=duration).rest
 
 
+@pytest.mark.long
 def test_each_number_that_stops_an_analog_servo_from_hunting():
     """Coasting between pulses and far too stiff it swings; a step of the search back, 9 %, is not enough."""
     found = buzz(ANALOG, command=STEP, duration=2.5)
@@ -34,6 +35,7 @@ def test_each_number_that_stops_an_analog_servo_from_hunting():
             assert rest(model, STEP, load, 2.5).restless == restless, (name, value)
 
 
+@pytest.mark.long
 def test_a_bus_servo_whose_output_shaft_has_no_friction():
     """shared/cases/digital-servo-never-rests: any friction ends it, as a dead zone of two counts does, and P 15."""
     servo = st.feetech_sts({"P_Coefficient": 16, **LEROBOT}, servo="feetech-sts3215-7v4")

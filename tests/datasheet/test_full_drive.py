@@ -43,6 +43,7 @@ def settled(model, torque):
     return result["output_speed"][0], result["armature_current"][0]
 
 
+@pytest.mark.long(but="M3--0.1")
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.8, -0.1])
 @pytest.mark.parametrize("terms", TERMS)
 def test_simulated_pulses_at_full_drive_settle_at_this_speed_and_current(servo, terms, share):

@@ -14,6 +14,7 @@ def ends(servo, name):
     return quantity.lower, quantity.upper
 
 
+@pytest.mark.long
 def test_the_sag_ranges_from_one_end_of_the_stretcher_s_gain_to_the_other():
     """u = |e| - w/2 has to last K u: the sag beyond the deadband goes as 1/K, and t_min takes some of it away."""
     servo = st.load_servo("hitec-hs-755hb")
@@ -31,6 +32,7 @@ def test_the_sag_ranges_from_one_end_of_the_stretcher_s_gain_to_the_other():
     assert part.holding[2].span is not None
 
 
+@pytest.mark.long
 def test_stiffness_and_droop_of_a_digital_servo_range_as_its_gain_does():
     servo = st.load_servo("towerpro-mg996r")
     loop = st.curves(st.DigitalServo(servo), bandwidth=False).voltages[0].loop

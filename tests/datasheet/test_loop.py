@@ -94,6 +94,7 @@ def test_the_smallest_error_that_moves_is_that_of_a_run():
     assert not moves((counts - 1) * COUNT)
 
 
+@pytest.mark.long
 def test_the_overload_is_what_a_run_does_when_held_fast():
     free = STS.replace(STILL | {"friction.coulomb_torque_forward": 1e3, "friction.coulomb_torque_backward": 1e3,
                                 "firmware.trip_current": None, "firmware.speed_limit": None,
@@ -137,6 +138,7 @@ def test_full_drive_is_that_of_the_most_duty():
     assert run["output_speed"][-1] == pytest.approx(half.no_load_speed, rel=1e-6)
 
 
+@pytest.mark.long
 def test_a_load_that_trips_is_not_held():
     model = st.DigitalServo(st.load_servo("feetech-sts3215-12v"))
     strong = hold(model, 11.5)

@@ -19,6 +19,7 @@ def sheet():
         return st.curves(st.PulseServo(st.load_servo("towerpro-mg995")), voltage=[4.8, 6.0], bandwidth=False)
 
 
+@pytest.mark.long
 def test_curves_run_from_standing_to_turning_freely(sheet):
     for part in sheet.voltages:
         for curve in (part.cold, part.hot):
@@ -85,6 +86,7 @@ def test_temperatures_change_copper_and_magnets_once(servo):
     assert not warm.heats
 
 
+@pytest.mark.long(but="options1-voltage: got nan")
 @pytest.mark.parametrize(("options", "said"), [
     ({"voltage": 0.0}, "got 0.0, allowed: a positive number"),
     ({"voltage": math.nan}, "voltage: got nan"),
@@ -110,6 +112,7 @@ def test_only_models_have_curves(servo):
         st.curves(st.AveragedServo(servo), bandwidth=False)
 
 
+@pytest.mark.long
 def test_which_servos_lift_is_what_each_of_them_says():
     found = st.servos_that_lift(0.3, 0.1, voltage=5.0, time=0.5)
     assert len(found.found) + len(found.refused) == len(st.catalog_names())

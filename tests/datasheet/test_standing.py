@@ -105,6 +105,7 @@ def test_thermal_numbers_of_the_file_count_before_the_mass(servo):
     assert (hot.housing - 298.15) / (hot.winding - hot.housing) == pytest.approx(1.6, rel=1e-12)
 
 
+@pytest.mark.long
 def test_looks_at_the_pulses_warm_as_a_simulation_does(servo):
     """Small masses, so that four seconds tell; a simulation carries its own temperatures along."""
     given = {"winding_capacity": 0.12, "housing_capacity": 0.6, "winding_to_housing": 6.0, "housing_to_ambient": 8.0,
@@ -140,6 +141,7 @@ def test_a_lift_knows_where_it_ends():
     assert strong.warming.now.winding >= strong.warming.now.housing >= 298.15
 
 
+@pytest.mark.long
 def test_a_hinge_lifts_as_far_as_the_torque_goes():
     """From hanging at full drive the arm comes to rest where the lift says that it ends."""
     servo = st.load_servo("hitec-hs-311").replace({

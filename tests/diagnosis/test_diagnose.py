@@ -34,6 +34,7 @@ def test_nothing_is_found_in_healthy_servos():
     assert len(SOUND) == 10
 
 
+@pytest.mark.long
 def test_a_cure_cures():
     servo = st.load_servo("hitec-hs-422").replace({"supply.internal_resistance": 8.0})
     load = st.loads.Constant(0.08)
@@ -45,6 +46,7 @@ def test_a_cure_cures():
     assert "sags" not in names(st.diagnose(cured, load=load))
 
 
+@pytest.mark.long
 def test_a_number_that_cannot_be_taken_away_alone_is_no_cause():
     """A program that computes for thirteen of its ticks: with ticks as short as usual there is no such servo."""
     servo = st.load_servo("jx-pdi-6221mg").replace({"firmware.control_period": 4.5e-3, "firmware.compute_delay": 60e-3})
@@ -72,6 +74,7 @@ def test_two_that_cure_only_together_are_a_pair():
     assert {each.cause for each in pair} == {"load", "frame rate"}
 
 
+@pytest.mark.long
 def test_a_log_that_shows_more_than_the_servo_says_so():
     model = st.PulseServo(st.load_servo("hitec-hs-422"))
     restless = st.PulseServo(model.servo.replace({"electronics.stretcher_gain": 2500.0}))
@@ -97,6 +100,7 @@ def test_tables_have_the_causes_and_symptoms():
     assert len(SYMPTOMS) == 6
 
 
+@pytest.mark.long
 def test_noise_of_a_log_is_no_swing():
     model = st.PulseServo(st.load_servo("hitec-hs-422"))
     run = st.simulate(model, st.signals.step(-0.5, 0.2, at=0.5, unit="rad"), duration=3.0, output_step=0.01)
@@ -108,6 +112,7 @@ def test_noise_of_a_log_is_no_swing():
     assert found.findings == ()
 
 
+@pytest.mark.long
 def test_what_only_a_wide_deadband_makes_is_a_sag():
     servo = st.load_servo("hitec-hs-422").replace({"electronics.deadband": 70e-6})
     found = names(st.diagnose(servo, load=st.loads.Constant(0.05)))

@@ -22,6 +22,7 @@ def set_s():
     return module("set_s")
 
 
+@pytest.mark.long(but="step")
 @pytest.mark.parametrize("name", ["sag", "stiffness", "step"])
 def test_the_table_is_the_one_that_the_runs_give(set_s, name):
     assert set_s.TABLES[name]() in PAGE.read_text(encoding="utf-8")

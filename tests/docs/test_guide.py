@@ -19,6 +19,7 @@ def name_of(page):
     return page.relative_to(ROOT).as_posix()
 
 
+@pytest.mark.long(but="docs/guide/signals.md")
 @pytest.mark.parametrize("page", with_code("python"), ids=name_of)
 def test_python(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -29,6 +30,7 @@ def test_python(page, tmp_path, monkeypatch):
         assert printed.getvalue().splitlines() == promised(block.code), f"{name_of(page)}, line {block.line}"
 
 
+@pytest.mark.long(but="docs/guide/ticks.md")
 @pytest.mark.parametrize("page", with_code("c"), ids=name_of)
 def test_programs_in_c(page, tmp_path):
     """What includes the header compiles with it."""

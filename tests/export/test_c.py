@@ -68,6 +68,7 @@ def apart(name, draw, c):
     return angle, signal
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", FEW)
 def test_c_is_python(name, compiled):
     for draw in range(3):
@@ -174,6 +175,7 @@ def test_a_copied_state_goes_on_alike(compiled):
         np.testing.assert_equal(seen[0], seen[1])
 
 
+@pytest.mark.long
 def test_what_a_servo_lacks_is_not_in_its_code():
     plain, warm = (export.c(model_of(name, 0)) for name in ("plain", "warm"))
     assert "heat" in plain.left_out
@@ -194,6 +196,7 @@ LACKS = {  # what asks for what the code of a structure leaves out
     "bounded": (INDUCTANCE,), "on a bus": (INDUCTANCE, HEAT)}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", FEW)
 def test_c_makes_the_numbers_that_python_makes(name, tmp_path):
     load = st.loads.Inertia(2e-3) + st.loads.Coulomb(0.02) + st.loads.Constant(0.01)
@@ -209,6 +212,7 @@ def test_c_makes_the_numbers_that_python_makes(name, tmp_path):
         assert c.numbers == before
 
 
+@pytest.mark.long
 def test_all_names_of_the_header_begin_with_that_of_the_servo():
     for name in ("on a bus", "everything"):
         header = export.c(model_of(name, 0), name="servo", parameters=True).header
@@ -217,6 +221,7 @@ def test_all_names_of_the_header_begin_with_that_of_the_servo():
         assert all(each.startswith("servo_") for each in types)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("name", FEW)
 def test_no_compiler_complains(compiler, name, tmp_path):
@@ -234,6 +239,7 @@ def test_no_compiler_complains_of_any_structure(tmp_path):
             subprocess.run([compiler, *STRICT, "-fsyntax-only", str(tmp_path / "servo.c")], check=True)
 
 
+@pytest.mark.long
 def test_the_header_is_one_for_cpp_too(tmp_path):
     if shutil.which("g++") is None:
         pytest.skip("needs g++")
@@ -243,6 +249,7 @@ def test_the_header_is_one_for_cpp_too(tmp_path):
                     str(tmp_path / "main.o"), str(tmp_path / "main.cpp")], check=True)
 
 
+@pytest.mark.long
 def test_the_program_of_the_guide_prints_what_the_page_says(tmp_path):
     page = (ROOT / "docs" / "guide" / "export.md").read_text(encoding="utf-8")
     program, told = (re.search(rf"```{kind}\n(.*?)```", page, re.DOTALL)[1] for kind in ("c", "text"))
@@ -272,6 +279,7 @@ def test_what_has_no_c_is_refused_in_a_line(tmp_path):
         assert "\n" not in str(caught.value)
 
 
+@pytest.mark.long
 def test_files_are_replaced_only_where_that_is_asked_for(tmp_path):
     code = export.c(st.BoundedServo(st.load_servo(SERVO)), name="servo")
     header, source = code.write(tmp_path / "new" / "folder")
@@ -284,6 +292,7 @@ def test_files_are_replaced_only_where_that_is_asked_for(tmp_path):
     assert sorted(path.name for path in header.parent.iterdir()) == ["servo.c", "servo.h"]
 
 
+@pytest.mark.long
 def test_a_folder_that_cannot_be_written_is_said(tmp_path):
     code = export.c(st.BoundedServo(st.load_servo(SERVO)), name="servo")
     (tmp_path / "file").write_text("x")

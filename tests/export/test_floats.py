@@ -35,6 +35,7 @@ def angles(name, draw, folder, dtype):
     return [float(each) for each in told.split()]
 
 
+@pytest.mark.long
 @needs_compiler
 @pytest.mark.parametrize("name", ["worn", *(pytest.param(name, marks=pytest.mark.slow) for name in WHOLE
                                             if name != "worn")])
@@ -57,6 +58,7 @@ def test_a_servo_on_a_bus_stays_within_counts(tmp_path):
         assert np.max(np.abs(floats - doubles)) < 10.0 * COUNT
 
 
+@pytest.mark.long
 @needs_compiler
 def test_times_keep_their_digits(tmp_path):
     """A long call is one of many: the servo has moved as in calls of 20 ms, ten minutes later too."""
@@ -91,6 +93,7 @@ int main(void) {
     assert 0.0 <= event <= 0.03
 
 
+@pytest.mark.long
 @needs_compiler
 @pytest.mark.parametrize("period", [1e-3, 9e-4])  # a float that is longer, and one that is shorter
 def test_ticks_stay_where_they_are(tmp_path, period):
@@ -136,6 +139,7 @@ int main(void) {
     assert heard["float32"] == heard["float64"]
 
 
+@pytest.mark.long
 @needs_compiler
 def test_what_is_no_number_changes_nothing(tmp_path):
     export.c(model_of("on a bus", 0), name="servo", dtype="float32").write(tmp_path)

@@ -106,12 +106,14 @@ def beside(kind, **changes):
     return st.VectorSimulator(default_model(st.load_servo(name).replace(changes)), 1, load=load)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("kind", SERVOS)
 def test_it_has_nothing_that_a_tool_complains_about(made, kind, version):
     assert validate_fmu(made(kind, version)) == []
 
 
+@pytest.mark.long
 def test_a_name_is_no_code(tmp_path, monkeypatch):
     """A name that ended its comment ran code where a tool loaded the FMU; one of a header hid it from the compiler."""
     monkeypatch.chdir(tmp_path)
@@ -125,6 +127,7 @@ def test_a_name_is_no_code(tmp_path, monkeypatch):
             fmu(st.BoundedServo(servo), name=taken)
 
 
+@pytest.mark.long(but="0.001-pendulum-3.0")
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("kind", SERVOS)
 @pytest.mark.parametrize("step", [1e-4, 1e-3, 7e-3, 20e-3])
@@ -267,6 +270,7 @@ def test_a_tool_builds_it_from_its_sources(tmp_path, monkeypatch, version):
     assert list((tmp_path / "sources" / "binaries").rglob("hitec_hs_755hb.so"))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("version", VERSIONS)
 def test_its_sources_have_no_warning(tmp_path, version):
     compiler = next((each for each in ("clang", "gcc") if shutil.which(each)), None)
@@ -281,6 +285,7 @@ def test_its_sources_have_no_warning(tmp_path, version):
                         "-c", text, "-o", tmp_path / "object.o"], check=True)
 
 
+@pytest.mark.long
 def test_it_is_small_and_the_same_each_time(made, tmp_path):
     with zipfile.ZipFile(made("bus", "2.0")) as whole:
         sizes = [each.file_size for each in whole.infolist() if each.filename.startswith("binaries/")]
@@ -290,6 +295,7 @@ def test_it_is_small_and_the_same_each_time(made, tmp_path):
     assert one == two
 
 
+@pytest.mark.long
 def test_bad_input(monkeypatch, tmp_path):
     model = default_model(st.load_servo("hitec-hs-755hb"))
     with pytest.raises(InputError, match="fmi"):

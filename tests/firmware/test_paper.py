@@ -67,6 +67,7 @@ def test_each_step_of_the_generator(board, first):
     assert {wide % 16 for _, wide in log.pulses} == {0}
 
 
+@pytest.mark.long
 def test_the_shortest_pulses_become_at_most_a_little_longer(board):
     """Below 13 counts a pulse has 6 us, less than an interrupt may wait: firmware/README.md says how much is added."""
     script = Script(jumper=True).adc(0, 3, millivolt_of(5)).wire(0.1, stream(15, 2)).asking(0.15, 8.0, every=0.005)

@@ -59,6 +59,7 @@ def check_exact(log, width, period, frames):
                for (a, _), (b, _) in pairwise(pulses)) <= 1
 
 
+@pytest.mark.long(but="2000-6006")
 @pytest.mark.parametrize(("width", "period"), [(3001, 40000), (2000, 6006), (200, 6007), (6000, 50000)])
 def test_width_and_period_are_exact_under_full_load(board, width, period):
     seconds = 0.1 + FRAMES * period / 2e6
@@ -157,6 +158,7 @@ def test_the_pin_is_low_after_a_reset_until_a_pulse_is_ordered(board):
     assert log.of(EVENT)[0].payload == bytes([RESET, 0, 0, 0, 0])
 
 
+@pytest.mark.long
 def test_time_wraps(make, board):
     """A board whose time starts half a second before it wraps at 32 bits."""
     firmware, _ = make("-DSTART=65520")
@@ -169,6 +171,7 @@ def test_time_wraps(make, board):
         assert {(b.time - a.time) % 2**32 for a, b in pairwise(told)} == {step}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("width", "period"), [(3001, 40000), (2000, 6006)])
 def test_avr8js_agrees(avr8js, shipped, tmp_path, width, period):
     seconds = 0.1 + 300 * period / 2e6

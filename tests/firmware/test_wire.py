@@ -4,6 +4,8 @@ import os
 import random
 import struct
 
+import pytest
+
 from board_talk import (
     ASK,
     CYCLES_PER_TICK,
@@ -78,6 +80,7 @@ def test_bent_bytes_are_never_obeyed_and_always_counted(board):
     assert status(log)["good"] == len(valid) + 1
 
 
+@pytest.mark.long
 def test_random_frames_leave_the_board_alive(board):
     """Noise, true frames of noise, and orders with random numbers; then it still is who it was."""
     rng = random.Random(1811)

@@ -50,6 +50,7 @@ def widths(fit):
             if name in FREE}
 
 
+@pytest.mark.long
 def test_the_best_is_first_and_narrows_what_is_widest(fit, advice):
     best = advice.experiments[0]
     assert advice.widest in fit.undetermined
@@ -69,6 +70,7 @@ def test_no_experiment_can_make_anything_worse(advice):
             assert width <= advice.now[name] * (1.0 + 1e-9), (str(experiment), name)
 
 
+@pytest.mark.long(but="5")
 @pytest.mark.parametrize("which", [0, 5])
 def test_predicted_widths_are_those_of_a_fit_with_the_experiment(logs, advice, which):
     experiment = advice.experiments[which]
@@ -78,6 +80,7 @@ def test_predicted_widths_are_those_of_a_fit_with_the_experiment(logs, advice, w
         assert experiment.widths[name] == pytest.approx(width, rel=0.25), name
 
 
+@pytest.mark.long
 def test_what_is_known_is_what_the_fit_says():
     known = [noisy(run(TRUTH, motion, seed=k, delay=0.05, duration=1.5,
                        load=st.loads.Inertia(1e-2) + st.loads.Constant(0.3)), STD, seed=k)
@@ -124,6 +127,7 @@ def test_priors_count_as_known(fit):
     assert all(e.widths["output_inertia"] <= best[str(e)] * (1.0 + 1e-9) for e in tight.experiments)
 
 
+@pytest.mark.long
 def test_advice_is_the_same_each_time(fit):
     a, b = (advise(fit, sensors=("supply_current",)) for _ in range(2))
     assert [str(e) for e in a.experiments] == [str(e) for e in b.experiments]

@@ -45,6 +45,7 @@ def _close(found, truth, rel=1e-5):
         assert getattr(found, name) == pytest.approx(getattr(truth, name), rel=rel, abs=1e-7), name
 
 
+@pytest.mark.long(but="0")
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_closed_form_agrees_with_fine_steps(seed):
     time = _uneven(60, seed)

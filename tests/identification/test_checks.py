@@ -84,6 +84,7 @@ def test_a_shaft_faster_than_the_servo_can_be(logs, factor):
     assert "unit" in text
 
 
+@pytest.mark.long
 def test_a_log_of_a_servo_that_is_much_slower_contradicts_the_sheet():
     """A sheet's speed and torque with narrow spread, and logs of another servo: a line says so."""
     slow = TRUTH.replace({"motor.back_emf_constant": 3.0 * TRUTH.motor.back_emf_constant,
@@ -95,6 +96,7 @@ def test_a_log_of_a_servo_that_is_much_slower_contradicts_the_sheet():
     assert all("\n" not in line for line in fit.warnings)
 
 
+@pytest.mark.long
 def test_a_good_servo_is_not_contradicted(logs):
     fit = identify(logs, TRUTH, free=FREE, priors="servo", starts=1, compare_with=(), holdout=0)
     assert fit.warnings == ()
@@ -113,6 +115,7 @@ def test_the_zero_of_an_encoder_may_be_anywhere(logs):
     assert fit.training.total()["PulseServo"] < 0.01
 
 
+@pytest.mark.long
 def test_no_torque_at_all(logs):
     """Nothing is commanded: nothing can be said, and nothing is divided by it."""
     off = replace(logs[0], torque_on=np.zeros(len(logs[0]), np.bool_))
@@ -174,6 +177,7 @@ def test_loads_that_differ_are_not_searched(logs):
     refused("load without it", [other], free=["load.pendulum.mass"])
 
 
+@pytest.mark.long
 def test_bad_arguments_of_a_fit(logs):
     fit = identify(logs, TRUTH, free=FREE, priors=None, starts=1, compare_with=(), holdout=0)
     for level in (0.0, 1.0, -1.0, 2.0, float("nan")):

@@ -34,6 +34,7 @@ def on_bus():
             for gain in (1.5, 6.0) for k, motion in enumerate(("step", "triangle"))]
 
 
+@pytest.mark.long
 def test_plant_and_firmware_of_a_servo_with_pulses_are_found(pulsed):
     """What the usual search asks of a digital servo comes back within its intervals, from a start far off."""
     wrong = off(PULSED, {**PLANT, "firmware.proportional_gain": 0.6, "firmware.derivative_gain": 1.8,
@@ -44,6 +45,7 @@ def test_plant_and_firmware_of_a_servo_with_pulses_are_found(pulsed):
     assert fit.noise["output_angle"] == pytest.approx(1e-3, rel=0.3)
 
 
+@pytest.mark.long
 def test_what_is_searched_unless_one_says(pulsed, on_bus):
     """The plant, and of the firmware what neither registers nor logs say."""
     plant = ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque")
@@ -55,6 +57,7 @@ def test_what_is_searched_unless_one_says(pulsed, on_bus):
     assert usual_free(st.DigitalServo(st.load_servo("dynamixel-xl330-m288"))) == bus
 
 
+@pytest.mark.long
 def test_the_plant_of_a_bus_servo_is_one_at_all_gains_that_its_logs_say(on_bus):
     fit = identify(on_bus, off(ON_BUS, PLANT), nuisance=STILL, **QUICK)
     assert GAIN not in fit.names
@@ -62,6 +65,7 @@ def test_the_plant_of_a_bus_servo_is_one_at_all_gains_that_its_logs_say(on_bus):
     assert fit.noise["output_angle"] == pytest.approx(1e-3, rel=0.3)
 
 
+@pytest.mark.long
 def test_without_a_current_gain_and_voltage_are_one_product():
     """Below its limit the duty acts by k_p V K/R alone."""
     small = [digital_log(ON_BUS, motion, seed=k, reach=0.12) for k, motion in enumerate(("triangle", "step"))]
@@ -70,6 +74,7 @@ def test_without_a_current_gain_and_voltage_are_one_product():
     assert [item.parameters for item in fit.unidentifiable] == [(GAIN, "supply.open_circuit_voltage")]
 
 
+@pytest.mark.long
 def test_ticks_of_every_log_have_a_phase():
     """Ticks of 20 ms, half of them late: with a phase of their own the logs leave noise, without one far more."""
     slow = ON_BUS.replace({"firmware.control_period": 0.02})
@@ -108,6 +113,7 @@ def test_a_log_of_pulses_keeps_its_parameters():
     assert with_loop_gain(log, st.DigitalServo(PULSED)) is log
 
 
+@pytest.mark.long
 def test_where_torque_is_off_a_bus_servo_is_not_compared(on_bus):
     log = on_bus[0]
     on = log.time < 1.0
@@ -154,6 +160,7 @@ def test_a_deadband_of_pulses_is_where_that_of_angles_begins():
     assert nominal(servo, "firmware.deadband_angle") == pytest.approx(5e-3)
 
 
+@pytest.mark.long
 def test_structures_are_told_apart_and_the_simplest_is_chosen():
     """A digital servo that brakes: pulses, or a bridge that opens, fit it worse."""
     logs = [digital_log(PULSED, ("step", "triangle")[k % 2], seed=k, duration=0.8) for k in range(6)]
@@ -169,6 +176,7 @@ def test_structures_are_told_apart_and_the_simplest_is_chosen():
         assert ladder[other].holdout > 2.0 * ladder[ladder.chosen].holdout, other
 
 
+@pytest.mark.long
 def test_a_gear_that_gives_way_is_told_from_a_stiff_one():
     """Of a log of one angle an elastic arm says the same, but for where the motor's friction acts."""
     servo = PULSED.replace({"gear.stiffness": 12.0, "gear.damping": 0.01})
@@ -212,6 +220,7 @@ def test_structures_that_make_no_sense_are_refused(servo, more, words):
         compare_structures([digital_log(PULSED, "step")], servo, **more)
 
 
+@pytest.mark.long
 def test_a_log_that_begins_off_its_goal_starts_at_the_side_of_its_play():
     """The motor pushes towards the goal; a log of a load says nothing of it."""
     servo = st.load_servo("feetech-sts3215-12v")

@@ -73,6 +73,7 @@ def hidden():
     return truth, fitted(logs, TRUTH, free=SCALED, priors="servo")
 
 
+@pytest.mark.long
 def test_what_is_open_is_drawn_within_its_prior_and_keeps_what_is_known(hidden):
     truth, fit = hidden
     assert set(fit.undetermined) == {SCALED[0], *SCALED[2:]}
@@ -107,6 +108,7 @@ def test_what_is_open_is_saved_with_what_was_known_of_it(hidden):
     assert fit.servo.fit["prior_share"]["output_inertia"] == 1.0
 
 
+@pytest.mark.long
 def test_without_priors_what_is_open_fills_the_bounds():
     logs = [noisy(run(TRUTH, "step", load=None, delay=0.05, duration=1.5), 1e-3)]
     logs = [replace(log, load=st.loads.Inertia(1e-3)) for log in logs]

@@ -59,6 +59,7 @@ def check_same(found, expected):
         np.testing.assert_array_equal(one.simulated, other.simulated, err_msg=one.log.name)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("executor", [Counting(1), Counting(3), Backwards()], ids=["one", "three", "backwards"])
 def test_the_fit_is_the_same_to_the_last_bit(mixed, local, executor):
     check_same(fitted(mixed, WRONG, executor=executor, **OPTIONS), local)
@@ -79,6 +80,7 @@ def test_a_killed_worker_costs_nothing_but_time(mixed, local):
     assert killed
 
 
+@pytest.mark.long
 def test_a_ladder_hands_its_executor_on(logs):
     with Counting(1) as pool:
         friction_ladder(logs, WRONG, free=["output_inertia"], rungs=("M1",), priors=None, starts=1, holdout=0,
@@ -112,6 +114,7 @@ def test_an_executor_that_is_lost_is_said_in_one_line(logs):
 
 # ----------------------------------------------------------------------------------------- accuracy
 
+@pytest.mark.long
 def test_what_is_not_integrated_does_not_ask_for_accuracy(logs, fit):
     check_same(fitted(logs, accuracy=1e-11), fit)
 
@@ -121,6 +124,7 @@ def swinging():
     return some(load=PENDULUM, kind="angle", duration=1.0, motions=("step", "prbs"))
 
 
+@pytest.mark.long
 def test_fits_ask_for_a_tenth_of_a_microradian_unless_told(swinging):
     usual, said, fine = (fitted(swinging, WRONG, model=st.BoundedServo, free=["output_inertia"], nuisance=(), **more)
                          for more in ({}, {"accuracy": 1e-7}, {"accuracy": 1e-11}))
@@ -143,6 +147,7 @@ def test_simulations_are_as_close_as_asked(swinging):
     assert all(error < accuracy for error, accuracy in zip(off, (1e-4, 1e-7, 1e-10), strict=True))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("accuracy", [1e-7, 1e-10])
 def test_what_pendulum_logs_leave_open_is_told_alike_at_any_accuracy(swinging, accuracy):
     free = ["output_torque_constant", "output_inertia", "output_coulomb_torque", "gear.gear_reduction"]

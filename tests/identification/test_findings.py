@@ -44,6 +44,7 @@ def test_nothing_is_found_on_logs_of_clean_benches():
         assert findings([log], st.PulseServo(servo_of(file_of(truth)))) == (), condition
 
 
+@pytest.mark.long
 def test_nothing_is_found_on_outliers_or_counts(logs):
     rng = np.random.default_rng(4)
     for share in (0.05, 0.1):
@@ -145,6 +146,7 @@ def test_rows_that_are_missing_where_the_command_changed(logs):
     assert not seen([smooth])  # a triangle's next sample says where it was
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("factor", [2.0, 3.0, 180.0 / np.pi])
 def test_another_scale(factor):
     log = noisy(run(TRUTH, "step", kind="pulse_width", reach=0.4, middle=0.6, duration=3.0), 1e-3)
@@ -194,6 +196,7 @@ def test_pulses_that_the_chip_refuses(logs):
 
 # ------------------------------------------------------------------------------------------------- in fits
 
+@pytest.mark.long
 def test_a_fit_says_it_first_and_mends_it_on_request(logs):
     spoilt = [logs[0], with_angle(logs[1], lambda q: -q)]
     options = {"free": ["output_inertia"], "priors": None, "starts": 1, "compare_with": (), "holdout": 0,

@@ -27,6 +27,7 @@ def test_traces_and_errors_are_those_of_the_simulation(logs, fit):
     assert not fit.holdout
 
 
+@pytest.mark.long
 def test_logs_that_are_held_out_have_no_say(logs):
     other = noisy(run(WRONG, "prbs", seed=9, load=DISC, delay=0.05, duration=1.5), STD)
     found = fitted([*logs, other], holdout=[other.name])
@@ -38,6 +39,7 @@ def test_logs_that_are_held_out_have_no_say(logs):
     assert found.holdout.total()["PulseServo"] > 3.0 * found.training.total()["PulseServo"]
 
 
+@pytest.mark.long
 def test_simpler_models_stand_beside():
     """Of a servo with friction that grows with load, M1 is off, and so is delay + slew + lag."""
     truth = TRUTH.replace({"friction.load_friction": 0.25})
@@ -88,6 +90,7 @@ def test_draws_have_the_covariance_and_stay_within_bounds(fit):
                      output_times=[0.3], outputs=("output_angle",))
 
 
+@pytest.mark.long
 def test_draws_keep_to_bounds(logs):
     value = nominal(TRUTH, "output_inertia")
     found = fitted(logs, bounds={"output_inertia": (0.999 * value, 1.001 * value)})
@@ -124,6 +127,7 @@ def test_an_interrupt_keeps_the_best_so_far(logs, at):
     assert found.servo.fit["interrupted"] is True
 
 
+@pytest.mark.long
 def test_an_interrupt_in_a_bad_start_keeps_the_good_one(logs):
     """The first start ends at the truth; the others begin at random, and all are interrupted midway."""
     best = fitted(logs, intervals=False)

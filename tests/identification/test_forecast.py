@@ -209,6 +209,7 @@ def test_noise_of_the_potentiometer_is_not_drawn():
 
 # ---------------------------------------------------------------------------------------- Jacobian
 
+@pytest.mark.long
 @pytest.mark.parametrize(("kind", "central"), [("pulse", True), ("bounded", False)], ids=["central", "forward"])
 def test_jacobian_is_that_of_single_simulations(kind, central):
     """All kinds of numbers: servo, lumps, load, delays, offset, start angle and speed; and of a current beside it."""
@@ -396,6 +397,7 @@ def test_what_no_servo_is_counts_as_failed_and_harms_no_other():
     assert np.isfinite(good.shared).all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 @pytest.mark.parametrize("central", [False, True])
 def test_a_shaft_that_starts_on_a_stop_has_derivatives(side, central):

@@ -78,6 +78,7 @@ def test_pulses_without_a_command_are_not_sent(first):
     assert set(np.flatnonzero(np.diff(silent)) + 1) <= set(log.changes.tolist())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["a fitted phase", "a fitted period"])
 def test_clocks_are_found_in_logs_without_some_pulses(kind):
     servo = TRUTH.replace({"electronics.pulse_timeout": 0.03, "electronics.silence_state": "coast"})
@@ -120,6 +121,7 @@ def test_a_beat_is_found_behind_stamps_that_scatter():
     assert made_regular(uneven()).name == "uneven"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("jitter", "clock"), [(1e-9, 0.0), (1e-6, 0.0), (0.0, -1e-6)],
                          ids=["1 ns of jitter", "1 us of jitter", "1 ppm slow"])
 def test_a_clock_that_is_off_by_nothing_changes_nothing(jitter, clock):
@@ -134,6 +136,7 @@ def test_a_clock_that_is_off_by_nothing_changes_nothing(jitter, clock):
     assert high - low < 0.0115
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("clock", [-4e-4, 4e-4])
 def test_pulses_that_drift_a_little_get_a_period_of_their_own(clock):
     """As far as quartz clocks are off: residuals are hardly larger for it, and parameters were biased."""

@@ -12,6 +12,7 @@ from servotwin.identification.fitting.free import nominal
 
 # --------------------------------------------------------------------------------------- the truth
 
+@pytest.mark.long(but="bounded")
 @pytest.mark.parametrize("kind", ["pulse", "bounded"])
 def test_exact_logs_give_the_truth(kind):
     model, free = (st.PulseServo, FREE) if kind == "pulse" else (st.BoundedServo, BOUNDED)
@@ -41,6 +42,7 @@ def test_values_lie_within_their_intervals(fit):
     assert fit.noise["output_angle"] == pytest.approx(STD, rel=0.2)
 
 
+@pytest.mark.long(but="huber")
 @pytest.mark.parametrize("loss", ["huber", "squares"])
 def test_outliers(loss):
     """Every twentieth value off by 0.2 rad: least squares feel it, Huber's loss hardly."""
@@ -55,6 +57,7 @@ def test_outliers(loss):
     assert off < 1.5e-3 if loss == "huber" else off > 4e-3
 
 
+@pytest.mark.long
 def test_what_priors_say_holds_where_logs_say_less():
     """A belief of 0.01 % beside logs that say 0.16 % wins, and nearly all of the interval is prior."""
     value = 1.002 * TRUTH.motor.armature_resistance
@@ -84,6 +87,7 @@ def test_the_order_of_logs_changes_rounding_only(logs, fit):
         assert abs(turned.estimates[name] - fit.estimates[name]) < 0.01 * (upper - lower), name
 
 
+@pytest.mark.long(but="bounded")
 @pytest.mark.parametrize("kind", ["pulse", "bounded"])
 def test_half_the_output_step_moves_nothing(kind):
     """Midpoints at which nothing was measured: by less than 1 % of the interval, as promised."""
@@ -106,6 +110,7 @@ def test_half_the_output_step_moves_nothing(kind):
 
 # ------------------------------------------------------------------------------------ odd logs
 
+@pytest.mark.long
 def test_uneven_samples_gaps_and_other_clocks():
     rng = np.random.default_rng(8)
     logs = []
@@ -190,6 +195,7 @@ def test_the_delay_of_each_log():
 
 # ----------------------------------------------------------------------------------------- bounds
 
+@pytest.mark.long
 def test_what_ends_at_a_bound_is_named_and_has_no_interval(logs):
     limit = 1.2 * nominal(TRUTH, "output_inertia")
     found = fitted(logs, bounds={"output_inertia": (limit, 10.0 * limit)})
@@ -200,6 +206,7 @@ def test_what_ends_at_a_bound_is_named_and_has_no_interval(logs):
     assert found.intervals()["angle_offset"].method in ("normal", "profile")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["motor.motor_viscous_friction", "electronics.minimum_drive_time",
                                   "friction.breakaway_ratio", "supply.internal_resistance", "friction.load_friction"])
 def test_what_the_servo_does_not_have_is_found_to_be_nearly_nothing(logs, name):

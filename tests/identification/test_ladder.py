@@ -44,12 +44,14 @@ def loaded():
     return friction_ladder(logs(LOADED), TRUTH, free=FREE, rungs=("M1", "M3"), **PLAIN)
 
 
+@pytest.mark.long
 def test_coulomb_and_viscous_friction_is_enough_where_there_is_no_more(plain):
     assert plain.chosen == "M1"
     assert "simplest" in plain.reason or "smallest" in plain.reason
     assert plain.fit is plain["M1"].fit
 
 
+@pytest.mark.long
 def test_load_friction_is_found_where_there_is_some(loaded):
     assert loaded.chosen == "M3"
     assert loaded["M1"].holdout > 2.0 * loaded["M3"].holdout
@@ -58,6 +60,7 @@ def test_load_friction_is_found_where_there_is_some(loaded):
         loaded["M3"].fit.estimates["friction.load_friction"] - 0.35) < 0.02
 
 
+@pytest.mark.long
 def test_a_supply_that_gives_way_is_found_on_the_best_law(soft):
     """Stands behind its law, and is searched where the law is chosen; the reason says what it gains, and where."""
     names = [rung.name for rung in soft.rungs]
@@ -145,6 +148,7 @@ def swung(servo, count=5, duration=2.0):
     return some
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("truth", "expected"), [
     (PENDULUMS, "M3"), (PENDULUMS.replace({"supply.bridge_drop_resistance": 2.0}), "M3, soft bridge")],
     ids=["hard", "soft"])

@@ -9,6 +9,8 @@ from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.point import Point
 
+pytestmark = pytest.mark.long
+
 FREE = ("output_torque_constant", "output_inertia", "output_coulomb_torque")
 ARM = st.loads.Pendulum(mass=0.2, length=0.15, inertia=0.0)
 FADES = {"firmware.control_period": 1e-3, "friction.breakaway_ratio": 1.5, "friction.stribeck_speed": 40.0,

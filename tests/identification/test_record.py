@@ -30,6 +30,7 @@ def fit(logs):
                     bounds={"load.inertia": (0.011, 0.05)})
 
 
+@pytest.mark.long
 def test_numbers_say_where_they_come_from(fit):
     for name in ("motor.armature_resistance", "motor.torque_constant", "motor.back_emf_constant",
                  "friction.coulomb_torque_forward", "friction.coulomb_torque_backward"):
@@ -103,6 +104,7 @@ def test_the_fitted_servo_is_the_prior_of_the_next_fit(fit, logs):
                                                        (upper - lower) / 3.92), rel=1e-4)
 
 
+@pytest.mark.long
 def test_what_is_not_determined_keeps_origin_and_spread(logs):
     """Its value goes with the others; what was known of it is what is still known of it."""
     found = identify(logs, TRUTH, free=["gear.gear_reduction", "motor.torque_constant", "motor.back_emf_constant",

@@ -63,6 +63,7 @@ def read(page):
     return reader
 
 
+@pytest.mark.long
 def test_the_page_is_whole_and_needs_nothing_else(page):
     found = read(page)
     assert all(address.startswith(("#", "data:image/svg+xml;base64,")) for address in found.addresses)
@@ -121,6 +122,7 @@ def test_the_window_with_the_largest_difference_is_enlarged(fit):
     assert high - low < 0.6 * (trace.time[-1] - trace.time[0])
 
 
+@pytest.mark.long
 def test_the_verdict_is_on_top(fit, page):
     bad = replace(fit.verdict, holds=False, sentence="residuals are 4 times < the noise",
                   causes=(Cause("load friction", "", 4e-3, 1e-3, "climb the ladder"),))
@@ -133,6 +135,7 @@ def test_the_verdict_is_on_top(fit, page):
         read(text)
 
 
+@pytest.mark.long
 def test_what_is_not_determined_is_said(fit):
     item = Unidentifiable(("output_inertia", "output_coulomb_torque"), (1.0, -1.0),
                           ("output_inertia · output_coulomb_torque",), ("a known inertia at the horn",))
@@ -144,6 +147,7 @@ def test_what_is_not_determined_is_said(fit):
     assert "none: not determined" in row
 
 
+@pytest.mark.long
 def test_an_interrupted_fit_says_so(fit):
     text = report.page(replace(fit, interrupted=True, doubt=None, ends={}, warnings=("a < b",)))
     assert "The fit was interrupted" in text
@@ -154,10 +158,12 @@ def test_an_interrupted_fit_says_so(fit):
     read(text)
 
 
+@pytest.mark.long
 def test_the_same_fit_gives_the_same_page(fit, page):
     assert report.page(fit) == page
 
 
+@pytest.mark.long
 def test_nothing_is_overwritten(fit, tmp_path):
     path = tmp_path / "fit.html"
     path.write_text("mine")

@@ -66,6 +66,7 @@ def test_delay_and_offset_are_found_from_anywhere(delay):
     assert found.total < 3e-3
 
 
+@pytest.mark.long(but="nuisance5")
 @pytest.mark.parametrize("nuisance", [*RIGS[1:], ("angle_sag",), ("log_delay",), ("frame_period",)])
 def test_a_rig_is_never_worse_than_none(nuisance):
     rng = np.random.default_rng(1)
@@ -85,6 +86,7 @@ def test_a_search_that_wanders_beyond_the_stops_is_no_error():
     assert np.isfinite(validate([far], servo, nuisance=("delay", "angle_offset", "initial_state")).total)
 
 
+@pytest.mark.long
 def test_the_rig_of_a_catalog_servo_is_not_that_of_other_logs():
     """Its author's bench had a delay of 34 ms and a zero 2.8 degrees off; a log of that very servo was off by it."""
     servo, time = st.load_servo("miuzei-25kg"), np.arange(0.0, 3.0, 0.02)

@@ -49,6 +49,7 @@ def test_a_servo_whose_registers_were_written_keeps_them():
     assert as_logs_say(factory, of_no_robot([log()])) == (factory, ())
 
 
+@pytest.mark.long
 def test_validate_says_it():
     found = validate([log()], st.load_servo(STS))
     assert found.warnings[0].startswith("registers assumed as LeRobot writes them for so101_follower (set lerobot)")

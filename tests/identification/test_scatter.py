@@ -48,6 +48,7 @@ def test_what_stands_or_moves_for_a_few_values_only_does_not_count():
     assert moving(np.arange(7.0), ramp).tolist() == [False, False, True, True, True, False, False]
 
 
+@pytest.mark.long
 def test_a_fit_of_logs_with_outliers():
     """5 % of the samples are off by a radian: the noise is still the encoder's, and the intervals hold."""
     rng = np.random.default_rng(12)
@@ -77,6 +78,7 @@ def test_noise_of_times_counts_as_far_as_the_signal_moves_about_a_sample():
     assert sigma[(time < 0.15) | (time > 0.65)] == pytest.approx(0.02)
 
 
+@pytest.mark.long
 def test_a_fit_with_noise_of_times_is_that_of_its_residuals_in_rad():
     fit = fitted(some(), free=FREE, noise={"output_angle": 1e-3, "time": 1e-4})
     assert fit.noise == {"output_angle": 1e-3}

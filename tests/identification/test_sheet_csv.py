@@ -67,6 +67,7 @@ def test_files_that_are_no_lists(tmp_path):
         read_sheets(tmp_path)
 
 
+@pytest.mark.long
 def test_the_compiled_list_makes_servos_and_names_what_cannot_be(data_folder):
     """FT-7235 asks for 145 to 152 % of efficiency, RDS3115 for 117 to 165 %, DS3218 for 128 % and more."""
     found = read_sheets(data_folder / "servo_specs" / "servo_specs_by_voltage.csv")

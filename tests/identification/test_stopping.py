@@ -37,6 +37,7 @@ def test_a_time_has_to_be_one(logs, within):
         fitted(logs, within=within)
 
 
+@pytest.mark.long(but="all logs-what is left")
 @pytest.mark.parametrize(("at", "unknown"), [("6 starts", "what is left"), ("all logs", "what is left"),
                                              ("intervals", "intervals"), ("errors", "what may be the matter")])
 def test_ctrl_c_at_any_time_keeps_the_best_so_far(logs, at, unknown):
@@ -78,6 +79,7 @@ def test_what_is_left_rises_by_itself_by_no_more_than_a_tenth():
     assert told[150][2] == "all logs, longer than usual"
 
 
+@pytest.mark.long
 def test_a_fit_that_is_stopped_has_wider_intervals(logs):
     """They are those of the problem made straight at the best so far."""
     def tell(share, text):

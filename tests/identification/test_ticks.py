@@ -38,6 +38,7 @@ def point(shared, first, tick):
     return Point(shared, (np.array([first / DELAY_SCALE]),), (Frames(0.005, 0.01, tick),))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("first", [0.004, 0.0049, -0.002, -2e-5])
 @pytest.mark.parametrize("tick", [1e-3, TICK])
 def test_pulses_that_come_later_move_the_motion_by_as_much(first, tick):
@@ -49,11 +50,13 @@ def test_pulses_that_come_later_move_the_motion_by_as_much(first, tick):
     np.testing.assert_allclose(there.residual - here.residual, expected, atol=2e-3 * np.abs(expected).max())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("first", [1.3, -1.3])
 def test_a_trial_whose_pulses_come_after_the_log_can_be_run(first):
     assert np.isfinite(part(forecast_of(digital_log(PULSED, "prbs", delay=0.06)), first).residual).all()
 
 
+@pytest.mark.long
 def test_between_the_ends_of_pulses_ticks_cannot_be_told_from_pulses():
     forecast = forecast_of(digital_log(PULSED, "step", std=0.0, duration=1.6, delay=0.06, load=DISC))
     shared = np.append(forecast.space.start, 0.06 / DELAY_SCALE)
@@ -74,6 +77,7 @@ def test_between_the_ends_of_pulses_ticks_cannot_be_told_from_pulses():
     assert np.mean(waits) == pytest.approx(0.5 * TICK, rel=0.01)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("tick", "phases"), [
     (1e-3, (0.634, 0.631, 0.722, 0.414)), (TICK, (0.262, 0.323, 0.011, 0.398))],
                          ids=["1 ms, all between the ends of pulses", "5 ms, two between them"])
@@ -94,6 +98,7 @@ def test_ticks_are_found_for_all_logs_at_once(tick, phases):
     assert low < 0.05 < high < low + 0.01 + tick + 1e-3
 
 
+@pytest.mark.long
 def test_friction_that_went_to_nothing_comes_back():
     """The search of these logs ended with a quarter of their friction, beside a ridge: 2.1 mrad were left of them."""
     servo, truth, rng = bench(7)
@@ -107,6 +112,7 @@ def test_friction_that_went_to_nothing_comes_back():
     assert fit.estimates["output_coulomb_torque"] == pytest.approx(truth["output_coulomb_torque"], rel=0.1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("watched", [False, True])
 def test_trials_of_several_logs_say_what_each_says_alone(watched):
     """Logs have as many trials as they have gaps: one runs on where another has none left, to the same bits."""

@@ -31,6 +31,7 @@ def steps(model, unit, middle, reach, hold=25):
     return logs
 
 
+@pytest.mark.long(but="BoundedServo-deg-60.0-30.0-1.2")
 @pytest.mark.parametrize(("model", "unit", "middle", "reach", "off"), [
     (st.BoundedServo, "deg", 60.0, 30.0, 1.0), (st.BoundedServo, "deg", 60.0, 30.0, 1.2),
     (st.PulseServo, "us", 1500.0, 300.0, 1.2)])
@@ -46,6 +47,7 @@ def test_logs_without_noise_end_exact(model, unit, middle, reach, off):
     assert fit.verdict.causes == ()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("servo", [PULSED, ON_BUS], ids=["pulses", "bus"])
 @pytest.mark.parametrize("nuisance", [None, ("delay", "control_phase", "angle_offset")], ids=["usual", "ticks"])
 def test_traces_of_a_digital_servo_run_again(servo, nuisance):

@@ -161,6 +161,7 @@ def covered(logs, n, p, *, rho=0.0, limit=math.inf, tails=False, cluster=0.0, dr
     return 100.0 * np.mean(hits), methods
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", [{}, {"limit": 1.345}, {"tails": True}, {"tails": True, "limit": 1.345}],
                          ids=["squares", "huber", "tails, squares", "tails, huber"])
 def test_intervals_cover_the_truth_with_white_noise(case):
@@ -168,15 +169,18 @@ def test_intervals_cover_the_truth_with_white_noise(case):
     assert 92.0 < share < 97.5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rho", [0.15, 0.3, 0.7, 0.9])
 def test_intervals_cover_the_truth_with_correlated_noise(rho):
     assert 90.5 < covered(3, 125, 4, rho=rho)[0] < 98.8
 
 
+@pytest.mark.long
 def test_intervals_cover_the_truth_with_correlated_noise_and_huber():
     assert 90.0 < covered(3, 125, 4, rho=0.7, limit=1.345, draws=120)[0] < 98.8
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("rho", "cluster"), [(0.7, 0.0), (0.9, 0.0), (0.0, 0.3)])
 def test_many_logs_speak_for_themselves(rho, cluster):
     """Noise that lasts, or a servo that is a little different in each log: the scatter between logs knows."""
@@ -228,6 +232,7 @@ def test_the_memory_of_noise_is_found_behind_what_a_fit_takes_away(rho, toleranc
     assert rho > 0.6 or middle[1] == pytest.approx(1.0, abs=0.12)
 
 
+@pytest.mark.long
 def test_few_samples_that_say_most_are_not_believed_too_much():
     """Six of 60 samples tell a slope: intervals hold it in 95 % of 1000 fits, ± 0.7 % by chance."""
     rng = np.random.default_rng(11)

@@ -10,6 +10,8 @@ import servotwin as st
 from identification.fits import STD, fitted, near, some
 from identification.synthetic_logs import PENDULUM, TRUTH
 
+pytestmark = pytest.mark.long
+
 RAW = ["gear.gear_reduction", "motor.torque_constant", "motor.back_emf_constant", "motor.rotor_inertia",
        "friction.coulomb_torque_forward", "friction.coulomb_torque_backward"]
 

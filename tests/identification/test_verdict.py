@@ -67,6 +67,7 @@ def bench(seed, kind="white", wrong=0.0, rests=True, logs=4):
     return found
 
 
+@pytest.mark.long(but="counts")
 @pytest.mark.parametrize("kind", ["white", "remembers", "counts", "jitters"])
 def test_noise_of_a_true_model_passes(kind):
     """Of 15 benches none: two tests of one in a thousand each blame one in 33 such rows of a new seed."""
@@ -193,6 +194,7 @@ def test_a_good_fit_says_so():
     assert fit.verdict.noise["output_angle"] == pytest.approx(NOISE, rel=0.3)
 
 
+@pytest.mark.long
 def test_the_cause_is_named(driven):
     told = []
     fit = fitted(driven, starts=4, progress=lambda share, text: told.append((share, text)))

@@ -36,6 +36,7 @@ def one_way(truth, torque, seed):
     return noisy(replace(log, measured={"output_angle": result["output_angle"]}), 1e-3, seed=seed)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("factor", "torque", "share"), [(1.6, 0.45, 0.03), (1.6, 0.35, 0.02), (0.6, 0.3, 0.02)],
                          ids=["slides back", "does not slide back", "slides easily"])
 def test_a_sheet_does_not_beat_the_data(factor, torque, share):
@@ -61,6 +62,7 @@ def test_a_sheet_does_not_beat_the_data(factor, torque, share):
     assert fit.prior_share[BACKWARD] < fit.prior_share[FORWARD]
 
 
+@pytest.mark.long
 def test_an_interval_is_open_where_the_cost_is_flat_behind_a_cliff():
     """Friction that holds the load from some value on: the best is at the cliff, and all above it as likely."""
     truth = TRUTH.replace({BACKWARD: 1.6 * TRUTH.get(BACKWARD)})
@@ -81,6 +83,7 @@ def unloaded():
 FREE = ["motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque"]
 
 
+@pytest.mark.long
 def test_a_prior_within_its_own_doubt_stays(unloaded):
     """Two and a half of its standard deviations off, beside logs that say nothing of it alone."""
     value = TRUTH.motor.armature_resistance
@@ -89,6 +92,7 @@ def test_a_prior_within_its_own_doubt_stays(unloaded):
     assert fit.warnings == ()
 
 
+@pytest.mark.long
 def test_of_a_product_the_least_certain_prior_yields_and_none_is_far_off_alone(unloaded):
     """Resistance times inertia is seen, and is a third of what the priors say; inertia is the one that they guess."""
     r, j = TRUTH.motor.armature_resistance, N**2 * TRUTH.motor.rotor_inertia
@@ -123,6 +127,7 @@ def sag(model, **more):
     return np.degrees(zero - lanes["output_angle"].mean(axis=1))
 
 
+@pytest.mark.long
 def test_a_prior_that_is_pushed_is_widened():
     """A file that is sure of resistance, rotor and friction to 5 %, and 15 % off in the first; nothing on the horn."""
     names = ["motor.armature_resistance", "output_inertia", "output_coulomb_torque"]

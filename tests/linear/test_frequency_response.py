@@ -19,6 +19,7 @@ def differs(seen, expected):
     return np.abs(seen.response / expected - 1.0).max()
 
 
+@pytest.mark.long(but="BoundedServo-pulse_width-feedback_voltage-2e-05")
 @pytest.mark.parametrize(("model_class", "input", "output", "amplitude"), [
     (st.DCMotor, "armature_voltage", "motor_angle", 1.0), (st.GearedMotor, "armature_voltage", "output_speed", 1.0),
     (st.BoundedServo, "command_angle", "output_angle", 0.02),

@@ -21,6 +21,7 @@ def test_mean_and_first_harmonic():
     assert found.first == pytest.approx(2j * 4.0 / math.pi, abs=1e-4)
 
 
+@pytest.mark.long
 def test_without_friction_deadband_and_limit_it_is_the_transfer_function():
     model = st.BoundedServo(bare("hitec-hs-755hb"))
     seen = st.linear.linearise(model, st.loads.Spring(0.4, rest_angle=1.0), amplitude=1e-3)
@@ -70,6 +71,7 @@ def test_what_friction_holds_does_not_move(servo):
         seen.system(3.0)
 
 
+@pytest.mark.long
 def test_the_equivalent_system_answers_alike(servo):
     coil = servo.replace({"motor.armature_inductance": 1e-3, "friction.zero_crossing_slope": 1.0})
     for model in (st.BoundedServo(servo), st.AveragedServoInductive(coil)):

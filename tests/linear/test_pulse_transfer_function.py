@@ -30,6 +30,7 @@ def test_it_is_that_of_the_averaged_servo(servo, period, names):
     np.testing.assert_allclose(pulsed(1j * OMEGA), mean(1j * OMEGA), rtol=1e-9)
 
 
+@pytest.mark.long(but="{'supply.internal_resistance': 0.5}")
 @pytest.mark.parametrize("changed", [
     {}, {"supply.internal_resistance": 0.5}, {"supply.bridge_drop_resistance": 0.4}, {"supply.current_limit": 1.0},
     {"supply.bridge_drop_voltage": 0.8}], ids=str)

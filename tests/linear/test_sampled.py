@@ -45,6 +45,7 @@ def test_a_burst_on_a_lossless_motor_is_a_velocity_jump():
                                / (1.0 + loop), rtol=1e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["hitec-hs-755hb", *(
     pytest.param(name, marks=pytest.mark.slow) for name in ("towerpro-mg90s", "gobilda-2000-67"))])
 def test_simulated_sines_of_pulse_servos(name):
@@ -61,6 +62,7 @@ def test_simulated_sines_of_pulse_servos(name):
         assert np.degrees(np.abs(np.angle(error))).max() < 2.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("D", "P"), [(0, 16), (32, 32)])
 def test_simulated_sines_of_ticks(D, P):
     """Exact where nothing is cut, held or dropped: D is renewed every 20th tick, duties come a tick later."""

@@ -26,6 +26,7 @@ def overshoot(found, load):
     return st.simulate(found.model, command, duration=2.0, load=load).step_metrics().overshoot
 
 
+@pytest.mark.long
 @quiet
 @pytest.mark.parametrize(("name", "inertia", "wanted"), [
     ("dsservo-ds3218", 1e-3, 0.2),
@@ -41,6 +42,7 @@ def test_the_gain_gives_the_overshoot(name, inertia, wanted):
     assert found.margins.gain > 1.0
 
 
+@pytest.mark.long
 @quiet
 def test_a_phase_margin_is_kept_by_the_largest_gain():
     model, load = st.DigitalServo(st.load_servo("dsservo-ds3218")), st.loads.Inertia(5e-3)
@@ -53,6 +55,7 @@ def test_a_phase_margin_is_kept_by_the_largest_gain():
     assert found.stiffness == pytest.approx(float(found.model.loop_stiffness()))
 
 
+@pytest.mark.long
 @quiet
 @pytest.mark.parametrize(("name", "wanted"), [
     ("hitec-hs-755hb", 45.0), ("gws-micro-2bbmg", 45.0), ("dfrobot-df05bb", 60.0), ("dsservo-ds3218", 50.0)])
@@ -63,6 +66,7 @@ def test_the_phase_margin_is_the_one_that_was_asked_for(name, wanted):
     assert wanted <= math.degrees(found.margins.phase) < wanted + 0.1
 
 
+@pytest.mark.long
 @quiet
 def test_a_register_takes_the_largest_number_that_leaves_the_margin():
     model, wanted = st.DigitalServo(st.load_servo("feetech-sts3215-12v")), math.radians(75.0)
@@ -83,6 +87,7 @@ def test_a_derivative_buys_stiffness():
     assert set(found.settings) == {"firmware.proportional_gain", "firmware.derivative_gain"}
 
 
+@pytest.mark.long
 def test_registers_are_whole_numbers():
     found = st.linear.tune(st.DigitalServo(st.load_servo("feetech-sts3215-12v")), phase_margin=math.radians(70.0))
     value = found.settings["P_Coefficient"]
@@ -102,6 +107,7 @@ def test_the_loop_around_a_servo(servo):
         assert abs(outer.closed_loop(np.array([1e-4]))[0]) == pytest.approx(1.0, abs=1e-2)
 
 
+@pytest.mark.long(but="wanted0-nothing")
 @pytest.mark.parametrize(("wanted", "text"), [
     ({}, "nothing"), ({"overshoot": 0.1, "phase_margin": 1.0}, "both"), ({"overshoot": -0.1}, "overshoot"),
     ({"overshoot": 1.0}, "overshoot"), ({"phase_margin": 4.0}, "phase margin"), ({"phase_margin": math.nan}, "phase"),
@@ -116,6 +122,7 @@ def test_what_has_no_gain_to_tune(servo):
         st.linear.tune(st.BoundedServo(servo), overshoot=0.1)
 
 
+@pytest.mark.long
 @quiet
 def test_what_no_gain_gives_is_said():
     model = st.DigitalServo(st.load_servo("dsservo-ds3218"))

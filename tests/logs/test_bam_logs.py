@@ -333,6 +333,7 @@ def integrated(p, log, convention, dt=5e-5):
     return np.interp(log.time - log.start, np.arange(held.size) * dt, path)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("model", ["m1", "m3", "m6"])
 def test_a_pendulum_is_lifted_as_bam_says(file, model):
     p, convention = parameters(model), BamConvention(frame_period=5e-4)

@@ -32,6 +32,7 @@ def test_there_are_thirty_and_five_kinds_more():
     assert len(LOGS) == 15 * len(SEEDS)
 
 
+@pytest.mark.long(but="micros 2")
 @pytest.mark.parametrize("name", LOGS)
 def test_what_comes_back_is_the_clean_log_to_the_bit(tmp_path, name):
     one = LOGS[name]
@@ -66,6 +67,7 @@ MACCEPA = "time=%time:ns command=field.u{0}:rad angle=field.servo{0}_position:ra
 FEETECH = "time=timestamp:iso command=target pos ({0}):360/4096deg angle=pos ({0}):360/4096deg"
 
 
+@pytest.mark.long
 def test_ten_clean_logs_come_through_unchanged(data_folder):
     files = [(path, MACCEPA.format(path.name[5])) for path in sorted((data_folder / "maccepa_hitec").glob("*.csv"))]
     files += [(data_folder / "feetech_backlash_robonine" / f"motor_telemetry_{name}.csv", FEETECH.format(joint))

@@ -173,6 +173,7 @@ def test_a_saved_result_is_a_log(tmp_path, servo):
 finite = some.floats(-50.0, 50.0, allow_nan=False).map(lambda x: x / 3.0)
 
 
+@pytest.mark.long
 @settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=some.data(), kind=some.sampled_from(["angle", "pulse_width", "voltage"]), n=some.integers(3, 8))
 def test_what_is_written_is_read_back_bit_for_bit(tmp_path, data, kind, n):
@@ -353,6 +354,7 @@ def test_almost_right_files_are_read_or_refused(run, rows, from_first):
     read_or_refuse(run("t,p,q\n" + "\n".join(",".join(row) for row in rows), sidecar))
 
 
+@pytest.mark.long
 @settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(some.dictionaries(some.sampled_from([
     "name", "motion", "source", "conditions", "load", "parameters", "leave_out", "command_hold", "command", "columns",

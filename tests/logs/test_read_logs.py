@@ -200,6 +200,7 @@ def test_the_measured_servo_coasts_without_pulses(data_folder):
     assert max(value for (silence, _), value in off.items() if silence == "coast") < 20.0
 
 
+@pytest.mark.long
 def test_the_maccepa_steps_are_read_without_code(data_folder, tmp_path):
     columns = {"time": {"column": "%time", "unit": "ns", "from_first": True}}
     columns["command_angle"] = {"column": "field.u1"}

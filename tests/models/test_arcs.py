@@ -134,6 +134,7 @@ def one_by_one(work):
     return raw
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", FEATURES)
 def test_side_by_side_against_one_by_one(name):
     """Where the final speed lies within the creep the integrator takes over, with steps of its own."""
@@ -165,6 +166,7 @@ def plain(work):
     return raw
 
 
+@pytest.mark.long(but="plain")
 @pytest.mark.parametrize("name", [name for name in FEATURES if name not in GIVING_UP and not name.endswith(
     "everything")])
 def test_plain_source_against_compiled(name):
@@ -172,6 +174,7 @@ def test_plain_source_against_compiled(name):
     assert_same(plain(work), run_lanes(work), 1e-12)
 
 
+@pytest.mark.long
 def test_edges_of_the_command():
     """Late, jittered, missing, and none at all."""
     edges = [[0.0, 0.021, 0.0385, 0.1, 0.12], [0.03, 0.05], [], [0.0]]
@@ -182,6 +185,7 @@ def test_edges_of_the_command():
     assert_same(run_lanes(work), one_by_one(work), 1e-11)
 
 
+@pytest.mark.long
 def test_commands_that_are_not_constant():
     work = case(3, duration=0.5, times=np.linspace(0.0, 0.5, 11), fields=FIELDS)
     rows = np.array([[0.0, 1.2e-3, 1e-3, 0, 0, 0, 0], [0.2, 1.4e-3, 0, 3e-4, 9.0, 0.5, 0],
@@ -190,6 +194,7 @@ def test_commands_that_are_not_constant():
     assert_same(run_lanes(work), one_by_one(work), 1e-11)
 
 
+@pytest.mark.long(but="plain")
 @pytest.mark.parametrize("name", ["plain", "inductance"])
 def test_lanes_know_nothing_of_each_other(name):
     work = case(300, duration=0.5, times=np.linspace(0.0, 0.5, 5), fields=FIELDS, changes=FEATURES[name])
@@ -200,6 +205,7 @@ def test_lanes_know_nothing_of_each_other(name):
             np.testing.assert_array_equal(part.fields[name], whole.fields[name][start:stop])
 
 
+@pytest.mark.long
 def test_float32_follows_float64():
     work = case(100, duration=0.5, times=np.array([0.5]), fields=FIELDS)
     exact, single = run_lanes(work), run_lanes(replace(work, asked=replace(work.asked, dtype="float32")))
@@ -207,6 +213,7 @@ def test_float32_follows_float64():
     assert np.median(np.abs(single.fields["angle"] - exact.fields["angle"])) < 2e-6
 
 
+@pytest.mark.long
 def test_lanes_that_need_the_general_way_are_mixed_with_others():
     lane = np.arange(12)
     work = case(12, duration=0.3, times=np.array([0.1, 0.3]), fields=FIELDS, changes={
@@ -227,6 +234,7 @@ def test_numbers_beyond_all_bounds_end_with_a_status():
     np.testing.assert_array_equal(raw.fields["angle"][::2], run_lanes(work).fields["angle"][::2])
 
 
+@pytest.mark.long
 def test_a_current_at_the_start_flows_on():
     work = case(20, duration=0.05, times=np.array([0.0, 2e-4, 0.05]), fields=FIELDS, changes=COIL)
     start = work.packed.lanes.start.copy()

@@ -43,6 +43,7 @@ each_case = pytest.mark.parametrize(("load", "command"), [(LOADS[load], COMMANDS
                                     ids=map("-".join, CASES))
 
 
+@pytest.mark.long(but="averaged-coulomb-ramp")
 @each_case
 def test_energy_balances_and_nothing_depends_on_the_output_step(model, load, command):
     fine = st.simulate(model, command, duration=END, load=load, output_step=0.01).raise_if_failed()
@@ -56,6 +57,7 @@ def test_energy_balances_and_nothing_depends_on_the_output_step(model, load, com
         np.testing.assert_allclose(coarse[name], fine[name][[5, 30, 32]], rtol=1e-13, atol=1e-12)
 
 
+@pytest.mark.long(but="pulse-mixture-sine")
 @each_case
 def test_splitting_a_run_changes_nothing(model, load, command):
     sim = st.Simulator(model, load=load)
@@ -83,6 +85,7 @@ def test_a_thousand_splits(model, kind):
     np.testing.assert_allclose(state.values, whole.values, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.long(but="averaged")
 def test_the_state_is_comparable_and_survives_pickling(model):
     command = COMMANDS["step"]
     sim = st.Simulator(model, load=loads.Inertia(1e-3))
@@ -129,6 +132,7 @@ def test_every_signal_has_unit_and_shape(model):
         result["propeller_pitch"]
 
 
+@pytest.mark.long(but="averaged")
 def test_a_command_that_changes_mid_way_takes_effect_at_once(model):
     first, second = st.signals.constant(1.0, unit="V"), st.signals.constant(1.6, unit="V")
     sim = st.Simulator(model)
@@ -139,6 +143,7 @@ def test_a_command_that_changes_mid_way_takes_effect_at_once(model):
     np.testing.assert_allclose(changed.values, whole.values, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.long(but="pulse-inductive")
 def test_an_external_torque_of_a_call_equals_a_constant_load(model):
     command = COMMANDS["step"]
     sim = st.Simulator(model)

@@ -72,6 +72,7 @@ def fine(numbers, torque, drive, q, w, end):
     return q, w
 
 
+@pytest.mark.long(but="M2, steep-regulator")
 @pytest.mark.parametrize("source", SOURCES)
 @pytest.mark.parametrize("law", LAWS)
 def test_a_slide_follows_the_law(law, source):

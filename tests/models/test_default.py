@@ -44,6 +44,7 @@ def test_the_catalog_runs_by_default_and_says_which_servos_are_digital(recwarn, 
         assert (kind in servo.sheet["flags"]) == (servo.kind == kind)
 
 
+@pytest.mark.long(but="dynamixel-ax-12a")
 @pytest.mark.filterwarnings("ignore:.*data sheet contradicts itself")
 @pytest.mark.parametrize("name", [name for name in st.catalog_names() if st.load_servo(name).kind != "analog"])
 def test_every_digital_and_bus_servo_of_the_catalog_makes_a_small_step(name):

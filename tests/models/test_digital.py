@@ -52,6 +52,7 @@ def test_overload_trips_at_tick_2000_and_lets_go_below_its_output():
         (2.0, "trips by overload"), (3.5, "trip ends")]
 
 
+@pytest.mark.long(but="50.0-ticks0")
 @pytest.mark.parametrize(("v_0", "ticks"), [(50.0, (20, 35, 108, 400, 1056)), (0.0, (38, 57, 133, 429, 1099))])
 def test_profile_arrives_at_the_tick_of_the_makers(v_0, ticks):
     for counts, tick in zip((1, 2, 10, 100, 600), ticks, strict=True):
@@ -204,6 +205,7 @@ def test_goals_on_their_way_arrive_whatever_is_written_next():
     np.testing.assert_allclose(seen[6:], 0.1 * np.arange(1, 15), atol=1e-12)
 
 
+@pytest.mark.long
 def test_noise_is_drawn_anew_at_every_tick():
     model = digital({"proportional_gain": 1.0}, friction=LOCKED,
                     potentiometer={"feedback_gain": 0.5, "feedback_offset": 1.0, "noise": 5e-3})

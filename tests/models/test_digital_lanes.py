@@ -10,6 +10,8 @@ from servotwin.errors import InputError
 
 from .digital_servos import COUNT, digital, feetech
 
+pytestmark = pytest.mark.long
+
 TIMES = np.sort(np.random.default_rng(0).uniform(0.0, 0.4, 80))
 NAMES = ("output_angle", "output_speed", "duty", "goal_angle", "reference_angle", "trip", "drive", "armature_current",
          "armature_voltage", "bus_voltage", "supply_current", "motor_torque", "load_torque")

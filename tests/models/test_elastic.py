@@ -39,6 +39,7 @@ def run(name, kind=st.PulseServo, duration=DURATION, times=TIMES, more=None, **w
                        initial=case.initial, **words).raise_if_failed()
 
 
+@pytest.mark.long(but="arm")
 @pytest.mark.parametrize("name", CASES)
 def test_both_bodies_move_as_the_reference_says(name):
     result = run(name, accuracy=1e-11)
@@ -57,6 +58,7 @@ def test_both_bodies_move_as_the_reference_says(name):
     assert result["error_time"][-1] == pytest.approx(float(width - 1.3e-3 * (0.44 * q + 0.5)[0]), abs=1e-12)
 
 
+@pytest.mark.long(but="1")
 @pytest.mark.parametrize("seed", range(8))
 def test_a_mixture_of_everything_moves_as_the_reference_says(seed):
     case = random_case(seed)
@@ -136,6 +138,7 @@ def test_an_arm_on_a_shaft_that_is_held_rings_at_16_hertz():
     assert np.abs(waves @ left[0] - swing).max() < 1e-10
 
 
+@pytest.mark.long(but="heavy arm-PulseServo-more4")
 @pytest.mark.parametrize(("name", "kind", "more"), [
     ("stops", st.PulseServo, {"gear.backlash": 0.02, "gear.damping": 0.3}),
     ("pendulum", st.PulseServo, {"friction.breakaway_ratio": 1.5, "friction.stribeck_speed": 20.0}),
@@ -193,6 +196,7 @@ def test_lanes_and_ticks_move_as_one_servo_does(name, kind):
         assert ticks[signal][1] == pytest.approx(result[signal][-1], abs=1e-9 * (1.0 + abs(result[signal][-1])))
 
 
+@pytest.mark.long
 def test_a_measured_angle_of_the_load_is_compared():
     case, both = CASES["arm"], ("output_angle", "load_angle")
     result = run("arm", times=np.linspace(0.0, DURATION, 101))

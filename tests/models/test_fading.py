@@ -5,6 +5,8 @@ import pytest
 
 import servotwin as st
 
+pytestmark = pytest.mark.long
+
 FADES = {"gear.output_inertia": 1e-3, "friction.breakaway_ratio": 1.3, "supply.internal_resistance": 0.2,
          "friction.stribeck_speed": 10.0, "friction.stribeck_exponent": 1.5}
 SHARES = {"friction.load_friction_motor": 0.08, "friction.load_friction_external": 0.1,

@@ -119,6 +119,7 @@ def test_it_turns_through_hundreds_of_revolutions_as_evenly_as_at_first(wheel):
     assert batch.remarks == ()
 
 
+@pytest.mark.long(but="PulseServo-command0")
 @pytest.mark.parametrize("command", [st.signals.constant(10.0, unit="deg"), st.signals.constant(1.2, unit="V")])
 @pytest.mark.parametrize("kind", [st.PulseServo, st.PulseServoInductive, st.DigitalServo])
 def test_commands_are_pulses_only(wheel, kind, command):
@@ -172,6 +173,7 @@ def test_its_transfer_function_is_an_integrator_behind_a_lag(wheel):
         st.linear.frequency_response(model, [3.0], amplitude=0.1)
 
 
+@pytest.mark.long
 def test_curves_show_the_drive_and_nothing_of_holding(wheel, servo):
     sheet = st.curves(st.PulseServo(wheel)).voltages[0]
     assert sheet.cold.no_load_speed == pytest.approx(
@@ -295,6 +297,7 @@ def test_a_vector_simulator_turns_on_as_a_simulator_does(servo, name):
         widths = np.roll(widths, 1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("gain", "noise", "load"), [
     (None, 0.0, None), (0.5, 0.0, None), (0.5, 1e-3, None),
     pytest.param(0.5, 1e-3, st.loads.Pendulum(mass=0.1, length=0.1), marks=pytest.mark.slow)])

@@ -129,21 +129,25 @@ def test_the_file_has_all_cases(frozen):
     assert len(frozen["bus_draw"]) == BUSES
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("k", range(GROUPS))
 def test_one_by_one(frozen, k):
     fail_of(one_by_one(frozen, n) for n in group(k))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("k", range(GROUPS))
 def test_in_lanes(frozen, k):
     fail_of(in_a_lane(frozen, n) for n in group(k) if is_batched(n))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("k", range(GROUPS))
 def test_motors_and_averaged_servos_in_lanes(frozen, k):
     fail_of(in_a_lane_as_alone(frozen, n) for n in group(k) if not is_batched(n))
 
 
+@pytest.mark.long(but="0")
 @pytest.mark.parametrize("k", range(4))
 def test_on_a_bus(frozen, k):
     fail_of(on_a_bus(frozen, n) for n in range(k, BUSES, 4))

@@ -26,6 +26,7 @@ def exact(coefficients, time):
 rates = s.floats(-6, 3).map(lambda x: 10**x)
 
 
+@pytest.mark.long
 @settings(max_examples=100, deadline=None)
 @given(a=rates, kind=s.sampled_from(["none", "weak", "near critical", "critical", "stiff"]), size=s.floats(0.0, 1.0),
        time=s.floats(-6, 0).map(lambda x: 10**x), f0=s.floats(-300, 300), f1=s.floats(-300, 300),

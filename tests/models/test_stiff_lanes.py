@@ -36,6 +36,7 @@ def many(servo, name, lanes=LANES, which=slice(None), **options):
                             parameters={key: x[which] for key, x in parameters.items()}, **options).raise_if_failed()
 
 
+@pytest.mark.long(but="heat")
 @pytest.mark.parametrize("name", KINDS)
 def test_the_error_is_below_the_accuracy_and_falls_with_it(servo, name):
     """The finest run is one of many small steps: that of the general engine in other tests."""
@@ -45,6 +46,7 @@ def test_the_error_is_below_the_accuracy_and_falls_with_it(servo, name):
         assert np.max(errors) < max(accuracy, 2e-12)
 
 
+@pytest.mark.long(but="heat")
 @pytest.mark.parametrize("name", KINDS)
 def test_one_many_and_those_that_go_on_are_the_same(servo, name):
     model, told, parameters = fleet(servo, name)
@@ -66,6 +68,7 @@ def test_one_many_and_those_that_go_on_are_the_same(servo, name):
     np.testing.assert_allclose(ticked["output_angle"], whole["output_angle"][:, 0], rtol=0.0, atol=1e-9)
 
 
+@pytest.mark.long(but="heat")
 @pytest.mark.parametrize("name", KINDS)
 def test_lanes_know_nothing_of_each_other(servo, name):
     whole = many(servo, name)["output_angle"]

@@ -141,6 +141,7 @@ def go(numbers, power, torque, start, times, accuracy=1e-11):
     return np.array([tile.servo[name][:count].copy() for name in State._fields])
 
 
+@pytest.mark.long(but="off4-0.15-1e-07")
 @pytest.mark.parametrize(("off", "torque", "w"), [
     (Off(0.0, 3.0, 0.0), 0.0, 4.0), (Off(0.0, 3.0, 0.0), -0.1, -0.02), (Off(6.7, 3.2, 1.0), 0.1, 1e-4),
     (Off(6.7, 3.2, 1.0), -0.2, -5.0), (Off(0.0, 3.0, 0.0), 0.15, 1e-7)])
@@ -174,6 +175,7 @@ def test_a_shaft_at_rest_cools_as_two_masses_do():
     np.testing.assert_allclose(go(SWINGING, 0.0, 0.0, half, 0.7 * times)[2:], warmth, rtol=1e-14)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("numbers", "power", "torque", "w"), [
     (SWINGING, 1.0, 0.1, 0.0), (FADING, -1.0, 0.1, 2.0), (FADING, 0.0, 1.5, 0.0), (HOT, 1.0, 1.8, 0.0),
     (OPEN, 0.0, 0.4, 5.0)], ids=["driven", "turned back", "falling", "stalled and heated", "open"])
@@ -296,6 +298,7 @@ def test_fleets_go_by_strides(name):
     assert (kind.form, kind.dtype, kind.wider) == (tiles.STRIDES, "float64", FLEETS[name][2])
 
 
+@pytest.mark.long(but="spring-1e-09")
 @pytest.mark.parametrize("accuracy", [1e-7, 1e-9])
 @pytest.mark.parametrize("name", FLEETS)
 def test_a_fleet_is_as_accurate_as_asked(name, accuracy):
@@ -307,6 +310,7 @@ def test_a_fleet_is_as_accurate_as_asked(name, accuracy):
     np.testing.assert_array_equal(np.sign(batch["output_speed"]), np.sign(exact["output_speed"]))
 
 
+@pytest.mark.long(but="heat, pendulum")
 @pytest.mark.parametrize("name", [name for name in FLEETS if len(signals_of(name)) > 3])
 def test_signals_of_a_warm_fleet(name):
     batch, exact = many(name, np.arange(COUNT), accuracy=1e-11), alone(name)
@@ -315,6 +319,7 @@ def test_signals_of_a_warm_fleet(name):
         np.testing.assert_allclose(batch[signal], exact[signal], rtol=1e-9, atol=1e-9, err_msg=signal)
 
 
+@pytest.mark.long(but="heat, pendulum")
 @pytest.mark.parametrize("name", ["heat, pendulum", "play of the potentiometer, pendulum", "M6, pendulum"])
 def test_lanes_know_nothing_of_each_other(name):
     """However many there are for the slots, in whatever chunks and order."""
@@ -348,6 +353,7 @@ def ensemble(name):
     return sims, own, list(zip(ticks, np.repeat(rng.uniform(1.0e-3, 2.0e-3, (4, LANES)), 10, axis=0), strict=True))
 
 
+@pytest.mark.long(but="pendulum")
 @pytest.mark.parametrize("name", ENSEMBLES)
 def test_many_that_go_on_are_simulators(name):
     """Cut at random instants, and read there."""

@@ -62,6 +62,7 @@ def page(report):
     return parser
 
 
+@pytest.mark.long
 def test_progress_rises_to_one(report):
     assert report[1] == sorted(report[1])
     assert report[1][-1] == 1.0

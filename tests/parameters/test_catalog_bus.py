@@ -43,6 +43,7 @@ TOLD_BY_LOGS = {  # and nothing else: the rest of a file that was fitted is assu
 NEEDED = ("control_period", "compute_delay", "angle_quantum", "proportional_gain")
 
 
+@pytest.mark.long
 def test_these_are_the_bus_and_the_digital_servos():
     kinds = {name: load_servo(name).kind for name in catalog_names()}
     assert {name for name, kind in kinds.items() if kind == "bus"} == set(BUS)
@@ -107,6 +108,7 @@ def test_a_bus_servo_has_the_factorys_registers_and_an_encoder(name):
     assert servo.firmware.command_kind == "goal"
 
 
+@pytest.mark.long(but="dynamixel-xl330-m077")
 @pytest.mark.parametrize("name", BUS)
 def test_each_file_is_what_its_own_sheet_makes_but_for_what_was_identified(name):
     servo = load_servo(name)
@@ -157,6 +159,7 @@ def test_each_turns_about_as_fast_as_its_sheet_says(name):
     assert servo.supply.open_circuit_voltage == sheet_of(servo).nominal.supply_voltage
 
 
+@pytest.mark.long
 def test_impossible_sheets_are_known_and_flagged():
     for name in BUS:
         found = sheet_contradictions(sheet_of(load_servo(name)))

@@ -144,6 +144,7 @@ def test_mappings_cannot_be_changed(servo):
         servo.title = "other"
 
 
+@pytest.mark.long
 @given(servos())
 def test_servos_are_comparable_hashable_picklable_and_copyable(servo):
     for other in (pickle.loads(pickle.dumps(servo)), copy.deepcopy(servo), copy.copy(servo), servo.replace({})):

@@ -42,6 +42,7 @@ def refused(path):
 
 # -- round trips
 
+@pytest.mark.long
 @given(servos())
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 def test_what_is_saved_is_read_back(tmp_path, servo):

@@ -113,6 +113,7 @@ def _unbalanced(found):
     return max(abs(energy[-1]) / np.abs(energy[:-1]).max() for energy in energies)
 
 
+@pytest.mark.long
 def test_every_law_is_run_by_the_engine_or_named_as_analysis(runs):
     assert set(physics.ANALYSIS) <= set(PUBLIC)
     called = set().union(*runs.called.values())
@@ -136,6 +137,7 @@ def test_a_law_that_changes_changes_the_plain_engine(runs, name):
     _check(runs.scaled([name], "plain", *callers)[0], runs.before, name)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", [*FEW, *(pytest.param(name, marks=pytest.mark.slow)
                                            for name in (*HIDDEN, *REPEATED))])
 def test_a_law_that_changes_changes_all_paths_alike(runs, name):

@@ -47,6 +47,7 @@ def test_without_errors_a_real_potentiometer_is_an_ideal_one(q, p, b_o):
     assert physics.angle_from_sensed_voltage(v, p, b_o) == physics.angle_from_voltage(v, p, b_o)
 
 
+@pytest.mark.long
 @settings(deadline=None)
 @given(q=st.floats(-4, 4), p=st.floats(0.15, 2.0), b_o=st.floats(-1.0, 1.0))
 def test_angle_and_voltage_with_errors_are_inverse(q, p, b_o):

@@ -47,6 +47,7 @@ def test_a_light_winding_knows_its_own_time_and_then_the_housing_s():
     assert times.slow == pytest.approx(480.0, rel=1e-4)
 
 
+@pytest.mark.long
 @settings(deadline=None)
 @given(t=st.floats(0.0, 2000.0), P=st.floats(0.0, 20.0), T_w=st.floats(250.0, 450.0), T_h=st.floats(250.0, 450.0))
 def test_the_closed_form_is_the_matrix_exponential(t, P, T_w, T_h):

@@ -43,6 +43,7 @@ def test_a_loop_without_zone_startup_and_trips_is_drawn_without_them():
         assert words not in said
 
 
+@pytest.mark.long
 def test_several_voltages_are_told_apart_and_too_many_refused():
     sheet = st.curves(st.DigitalServo(STS), voltage=[12.0, 9.0], bandwidth=False)
     loops = [part.loop for part in sheet.voltages]

@@ -16,6 +16,7 @@ def result(servo):
     return st.simulate(st.BoundedServo(servo), command, duration=0.8)
 
 
+@pytest.mark.long
 def test_nothing_is_loaded_before_it_is_needed():
     code = ("import sys, servotwin, servotwin.plotting; assert 'matplotlib' not in sys.modules; "
             "servotwin.plotting.axes_grid(); assert 'matplotlib.pyplot' not in sys.modules")
@@ -57,6 +58,7 @@ def test_unknown_signals_are_refused(result):
         plotting.time_response("x")
 
 
+@pytest.mark.long(but="png")
 @pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
 def test_files_are_the_same_every_time(tmp_path, result, ending):
     first, second = tmp_path / f"a.{ending}", tmp_path / f"b.{ending}"
@@ -99,6 +101,7 @@ def test_block_diagrams_of_other_numbers_are_refused():
         plotting.block_diagram(3)
 
 
+@pytest.mark.long(but="4")
 @pytest.mark.parametrize("number", [2, 4, 5, 6, 8])
 def test_labels_of_block_diagrams_do_not_overlap(number):
     figure = plotting.block_diagram(number)

@@ -31,6 +31,7 @@ def shaft(**more):
     return plotting.ShaftTrace(**values)
 
 
+@pytest.mark.long(but="2-4")
 @pytest.mark.parametrize(("count", "axes"), [(1, 2), (2, 4), (5, 10)])
 def test_each_joint_has_its_motion_and_its_error(count, axes):
     figure = plotting.joint_tracking([joint(f"joint {k}") for k in range(count)])
@@ -90,6 +91,7 @@ def test_too_much_to_tell_apart_is_refused(draw, count):
         draw([joint()] * count)
 
 
+@pytest.mark.long
 def test_they_can_be_saved(tmp_path):
     plotting.save(plotting.shaft_torques([shaft(), shaft(), shaft(), shaft()]), tmp_path / "a.png")
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")

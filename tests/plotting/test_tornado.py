@@ -54,6 +54,7 @@ def test_a_tornado_of_nothing_finite_can_be_drawn():
     assert plotting.to_bytes(plotting.tornado(Tornado("overshoot", math.nan, bars)), "png").startswith(b"\x89PNG")
 
 
+@pytest.mark.long(but="end_motor_speed")
 @pytest.mark.parametrize("metric", [*METRICS, *(f"end_{name}" for name in SIGNALS)])
 def test_every_metric_has_words_and_a_unit_that_fits(metric):
     shown = plotting.metric_shown(metric)

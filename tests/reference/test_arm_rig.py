@@ -108,6 +108,7 @@ CASES = {"feetech-sts3215-12v": 12.0, "feetech-sts3215-7v4": 7.4, "dynamixel-xl4
          "dynamixel-xl330-m288": 5.0}
 
 
+@pytest.mark.long(but="feetech-sts3215-12v")
 @pytest.mark.parametrize("name", CASES)
 def test_one_joint_moves_as_the_engine_moves_it(name):
     """Two solutions of one specification: a pole that goes up and down by steps, within a tenth of a count."""

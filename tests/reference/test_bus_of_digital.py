@@ -29,6 +29,7 @@ def off(one, other):
                for name in ("output_angle", "motor_angle", "current"))
 
 
+@pytest.mark.long(but="changes0-1.0")
 @pytest.mark.parametrize("limit", [None, 1.0])
 @pytest.mark.parametrize("changes", [{}, {"motor.brush_drop_voltage": 0.2, "supply.bridge_drop_resistance": 0.3,
                                           "firmware.off_state": "diode", "firmware.control_phase": 4e-4}])
@@ -46,6 +47,7 @@ def test_one_servo_on_a_bus_is_the_servo_alone(limit, changes):
         assert energy == pytest.approx(alone.energy[name], abs=1e-12)
 
 
+@pytest.mark.long
 def test_the_series_and_steps_of_an_integrator_go_the_same_way(monkeypatch):
     ones = [told(seed) for seed in range(3)]
     series = digital_bus.run(ones, Source(12.0, 0.8), END, TIMES)
@@ -57,6 +59,7 @@ def test_the_series_and_steps_of_an_integrator_go_the_same_way(monkeypatch):
                                               for n, x in rows.items()}}, {"inertia": 1e-3}))
 
 
+@pytest.mark.long
 def test_servos_with_masses_that_hardly_get_warm_are_cold_ones():
     large = {name: 1e9 if name.endswith("capacity") else value for name, value in WARM.items()}
     cold = digital_bus.run([told(0), told(1)], Source(12.0, 0.8), END, TIMES)

@@ -172,6 +172,7 @@ def test_an_undervoltage_resets_or_stops() -> None:
     assert stop.trip[:4].tolist() == [0, 4, 0, 0]
 
 
+@pytest.mark.long
 def test_heat_trips_until_five_kelvin_lower() -> None:
     heat = {"winding_capacity": 0.05, "housing_capacity": 0.05, "winding_to_housing": 0.05, "housing_to_ambient": 1.0}
     trace = run(servo(PLAIN | {"trip_temperature": 308.0}, thermal=heat), goals((0.0, 1.0), (0.6, -0.5)),
@@ -272,6 +273,7 @@ def _energy_error(trace: Trace) -> float:
     return abs(trace.energy["supply"] - spent) / sum(abs(joule) for joule in trace.energy.values())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("linear", "seeds"), [(True, range(16)), (False, range(7))])
 def test_energy_is_kept(linear: bool, seeds: range) -> None:
     for seed in seeds:
@@ -279,6 +281,7 @@ def test_energy_is_kept(linear: bool, seeds: range) -> None:
         assert _energy_error(run(*one, times=[one.duration])) < 1e-11, seed
 
 
+@pytest.mark.long(but="100")
 @pytest.mark.parametrize("seed", [100, 101, 102, 104, 105, 106])
 def test_closed_form_and_integration_agree(seed: int) -> None:
     """A spring too soft to act sends a linear plant through the integrator."""
@@ -314,6 +317,7 @@ def test_energy_and_momentum_are_kept_across_the_play(torque: float) -> None:
         assert meeting.lost == pytest.approx(lost, rel=1e-6, abs=1e-15)
 
 
+@pytest.mark.long
 def test_hardly_any_play_is_none() -> None:
     """Two ways of moving: from event to event in closed form, and one body whose load friction is integrated."""
     times, load = np.linspace(1e-3, 0.2, 100) + 1e-4, {"inertia": 1e-3, "torque": 0.3}

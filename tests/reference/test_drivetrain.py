@@ -53,6 +53,7 @@ def mixture(seed: int) -> Case:
 # --- whole runs -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [5, 6, 7])  # between them they have every term
 def test_energy_balances_and_tolerances_do_not_matter(seed: int) -> None:
     case = replace(mixture(seed), duration=0.2)
@@ -66,6 +67,7 @@ def test_energy_balances_and_tolerances_do_not_matter(seed: int) -> None:
     assert abs(residual(fine)) < 2e-11
 
 
+@pytest.mark.long(but="4")
 @pytest.mark.parametrize("seed", range(12))
 def test_without_the_new_terms_it_is_the_older_reference(seed: int) -> None:
     """Taylor series there, DOP853 here; one chip."""
@@ -88,6 +90,7 @@ def test_without_the_new_terms_it_is_the_older_reference(seed: int) -> None:
     assert run.margin == pytest.approx(older.margin, abs=1e-14)
 
 
+@pytest.mark.long
 def test_a_small_inductance_tends_to_none() -> None:
     case = random_case(3, frozenset({"coast", "heat", "stribeck", "m5"})).replace(
         electronics__back_emf_injection=None)
@@ -100,6 +103,7 @@ def test_a_small_inductance_tends_to_none() -> None:
     assert abs(math.log2(gap[0] / gap[1]) - 1.0) < 0.15
 
 
+@pytest.mark.long
 def test_bounces_between_stop_and_flank_are_all_seen() -> None:
     """Nanoseconds apart, beside pieces of milliseconds: two scans of different density find the same events."""
     case = replace(random_case(1022, TERMS - {"m3", "m4", "m6", "coast"}), duration=0.25)
@@ -109,6 +113,7 @@ def test_bounces_between_stop_and_flank_are_all_seen() -> None:
     np.testing.assert_allclose(stops[0], stops[1], rtol=0.0, atol=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("limit", [math.inf, 1.5])
 def test_the_energy_of_three_servos_on_one_bus_balances(limit: float) -> None:
     terms = [frozenset({"inductance", "m5", *more}) for more in ((), ("coast", "stops"), ("backlash", "coast"))]
@@ -157,6 +162,7 @@ def test_a_regulator_gives_a_stalled_motor_what_it_may(inductance: float | None)
     assert run.bus_voltage[0] == pytest.approx(3.0 * 0.9 + 0.4, abs=1e-8)
 
 
+@pytest.mark.long(but="0")
 @pytest.mark.parametrize("seed", range(4))
 def test_a_regulator_keeps_its_limits(seed: int) -> None:
     case = random_case(seed, frozenset({"limit", "coast"} | ({"inductance"} if seed % 2 else set())))
@@ -169,6 +175,7 @@ def test_a_regulator_keeps_its_limits(seed: int) -> None:
     assert np.all(run.bus_voltage[drawn < -1e-9] == V_oc)
 
 
+@pytest.mark.long(but="terms2")
 @pytest.mark.parametrize("terms", [frozenset(), frozenset({"inductance", "coast"}), frozenset({"limit"})])
 def test_twins_on_one_bus_are_one_servo_on_twice_the_resistance(terms: frozenset[str]) -> None:
     case = random_case(11, terms).replace(supply__internal_resistance=0.2)
@@ -196,6 +203,7 @@ def test_two_masses_cool_by_two_exponentials() -> None:
     np.testing.assert_allclose([run.winding_temperature[0], run.housing_temperature[0]], want, rtol=1e-12)
 
 
+@pytest.mark.long(but="False")
 @pytest.mark.parametrize("inductance", [False, True])
 def test_copper_loss_is_what_heats(inductance: bool) -> None:
     terms = frozenset({"heat", "stribeck", "coast"} | ({"inductance"} if inductance else set()))
@@ -266,6 +274,7 @@ def test_contact_ends_where_its_force_changes_sign() -> None:
         assert apart * P.J_m * P.J_L / P.J == pytest.approx(force, abs=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("play", [0.0, 0.04])
 def test_a_pendulum_swings_with_its_period(play: float) -> None:
     """Frictionless and open; with play the hanging side swings alone as long as it does not touch."""
@@ -282,6 +291,7 @@ def test_a_pendulum_swings_with_its_period(play: float) -> None:
     np.testing.assert_allclose(run.output_angle - 1.0, [0.0, size, size], rtol=0.0, atol=1e-10)
 
 
+@pytest.mark.long
 def test_the_wiper_follows_through_its_play() -> None:
     case = random_case(2, frozenset({"wiper", "table", "coulomb"}))
     times = np.linspace(0.0, case.duration, 20_001)
@@ -328,6 +338,7 @@ def test_one_formula_says_what_six_say(law: str) -> None:
             assert got + P.B_m * abs(w) == pytest.approx(budget(R, law, direction, w, tau_m, tau_e), rel=1e-13)
 
 
+@pytest.mark.long(but="True-24-M6")
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize(("inductance", "seed"), [(False, 21), (True, 24)])
 def test_small_steps_come_to_the_same_angle(law: str, inductance: bool, seed: int) -> None:

@@ -115,6 +115,7 @@ def check_frames(case: PulseCase, run: PulseRun, times: np.ndarray) -> None:
     np.testing.assert_array_equal(run.drive[clear], np.array(want)[clear])
 
 
+@pytest.mark.long(but="0")
 @pytest.mark.parametrize("seed", range(6))
 def test_runs_satisfy_the_specification(seed: int) -> None:
     case = random_pulse_case(5000 + seed)
@@ -124,6 +125,7 @@ def test_runs_satisfy_the_specification(seed: int) -> None:
     check_frames(case, run, times)
 
 
+@pytest.mark.long(but="1")
 @pytest.mark.parametrize("seed", range(20))
 def test_power_balance(seed: int) -> None:
     """Kinetic energy gained = work of motor, drag, friction and load, by quadrature over the pieces; without stops."""

@@ -191,6 +191,7 @@ def test_mean_voltage_servo_of_the_specification() -> None:
 # --- properties on random cases ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_power_balance_of_the_bounded_servo() -> None:
     """Kinetic energy gained = work of motor, drag, friction and load, by quadrature from event to event."""
     for seed in range(4):
@@ -225,6 +226,7 @@ def test_power_balance_of_the_averaged_servo() -> None:
         assert abs(work - 0.5 * P.J * run.w[-1] ** 2) < 1e-9 * float(weight @ np.abs(w * motor)) + 1e-13
 
 
+@pytest.mark.long
 def test_bounded_servo_does_not_depend_on_step_and_tolerance() -> None:
     times = np.linspace(0.0, DURATION, 51)
     for seed in range(100, 106):
@@ -236,6 +238,7 @@ def test_bounded_servo_does_not_depend_on_step_and_tolerance() -> None:
         np.testing.assert_allclose([t for t, _ in a.events], [t for t, _ in b.events], rtol=0, atol=1e-11)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("solver", [solve_averaged, solve_averaged_inductive])
 def test_averaged_servos_do_not_depend_on_tolerance(solver) -> None:
     times = np.linspace(0.0, DURATION, 51)
@@ -261,6 +264,7 @@ def test_inductive_tends_to_the_plain_averaged_servo() -> None:
 # --- independent integrations -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_averaged_servo_against_scipy() -> None:
     """SciPy's Radau on the equation as printed, (41) with its two branches and sgn."""
     P, times = replace(SERVO, load=Load(J_L=1e-3, pendulum=0.1, hanging=0.3, coulomb=0.02)), np.linspace(0.0, 0.5, 11)
@@ -330,6 +334,7 @@ def plain_euler(c, h: float) -> float:
     return q
 
 
+@pytest.mark.long
 def test_bounded_servo_against_plain_steps() -> None:
     """Looks for a misreading, not for digits: both come from the same sentences by different code."""
     for n, kind in enumerate(LOADS):
@@ -355,6 +360,7 @@ def test_cases_are_repeatable_and_complete() -> None:
     assert plant.V_max == servo["supply"]["open_circuit_voltage"] - servo["supply"]["bridge_drop_voltage"]
 
 
+@pytest.mark.long(but="inertia")
 @pytest.mark.parametrize("kind", LOADS)
 def test_every_load_and_command_runs(kind: str) -> None:
     for n, command in enumerate(COMMANDS):

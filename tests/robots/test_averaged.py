@@ -2,8 +2,11 @@
 
 import mujoco
 import numpy as np
+import pytest
 
 import servotwin as st
+
+pytestmark = pytest.mark.long
 
 INERTIA = 0.004
 JOINT = f"""<mujoco><option timestep="0.0005" gravity="0 0 0"/><worldbody><body><joint name="j" axis="0 1 0"/>

@@ -52,6 +52,7 @@ def test_all_of_a_motion_is_in_the_picture(model):
             assert max(picture[[0, -1]].max(), picture[:, [0, -1]].max()) == 0
 
 
+@pytest.mark.long
 def test_a_camera_of_the_model_is_taken_by_its_name():
     arm = robot_model("so101")
     with Camera(arm, 64, 48) as all_of_it, Camera(arm, 64, 48, "side") as own:

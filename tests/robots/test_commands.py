@@ -12,6 +12,8 @@ from robots.robots_cases import hinge, servo
 from servotwin.errors import InputError
 from servotwin.robots import CommandMap, Motion, Mount, ServoDrive, run_motion, wheel_servo
 
+pytestmark = pytest.mark.long
+
 DIGITAL = servo(st.DigitalServo)
 
 

@@ -61,6 +61,7 @@ def from_nowhere(energy, work, given):
     return (rest - rest[0]).max() / np.abs(np.concatenate([energy, work])).max()
 
 
+@pytest.mark.long(but="0.004 1-BoundedServo")
 @pytest.mark.parametrize("kind", [st.BoundedServo, st.PulseServo, st.DigitalServo])
 @pytest.mark.parametrize("solref", ["0.02 1", "0.004 1"])
 def test_an_arm_rests_at_its_limit(kind, solref):
@@ -74,6 +75,7 @@ def test_an_arm_rests_at_its_limit(kind, solref):
     assert from_nowhere(*energies) < 0.01
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", [st.BoundedServo, st.DigitalServo])
 def test_a_gripper_rests_at_a_box(kind):
     force, speed, *energies = run(gripper(1e-3, False), own(kind), CLOSE)
@@ -83,12 +85,14 @@ def test_a_gripper_rests_at_a_box(kind):
     assert from_nowhere(*energies) < 1e-6
 
 
+@pytest.mark.long
 def test_pulses_shake_a_gripper_alike_at_any_step():
     """At a box that blocks it a servo gets a pulse each frame: its mean force is the same within 5 %."""
     force, finer = (run(gripper(dt, False), servo(st.PulseServo), CLOSE)[0] for dt in (1e-3, 2.5e-4))
     assert force[1000:].mean() == pytest.approx(finer[4000:].mean(), rel=0.05)
 
 
+@pytest.mark.long(but="BoundedServo")
 @pytest.mark.parametrize("kind", [st.BoundedServo, st.PulseServo, st.DigitalServo])
 def test_a_box_that_moves_gets_no_energy_from_nowhere(kind):
     _, _, *energies = run(gripper(1e-3, True), servo(kind), CLOSE)

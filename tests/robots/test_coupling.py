@@ -64,6 +64,7 @@ def test_what_follows_what(rest, words, angles):
         assert at["a"] == pytest.approx(0.1 + 2.0 * at["b"] + 0.5 * at["b"]**2, abs=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("rest", "axis", "ratio"), [
     (MIMIC.format(1), -1, 1.0), (MIMIC.format(-1), 1, 1.0), (MIMIC.format(0.5), -1, 0.5), (CORD, -1, 1.0)])
 def test_what_a_pair_needs_counts_at_its_driver(rest, axis, ratio):
@@ -78,6 +79,7 @@ def test_what_a_pair_needs_counts_at_its_driver(rest, axis, ratio):
     assert list(sizing_of(run)) == ["grip"]
 
 
+@pytest.mark.long
 def test_goals_and_actuators_of_a_follower_are_left_out():
     """A recorded motion has a column of each joint."""
     both = '<actuator><position joint="grip" kp="5"/><position name="hold" joint="grip2" kp="5"/></actuator>'

@@ -47,6 +47,7 @@ def alone():
             for kind in (st.PulseServo, st.BoundedServo, st.DigitalServo)}
 
 
+@pytest.mark.long(but="implicitfast-BoundedServo")
 @pytest.mark.parametrize("kind", [st.PulseServo, st.BoundedServo, st.DigitalServo])
 @pytest.mark.parametrize("integrator", ["RK4", "implicitfast", "Euler"])
 def test_a_hinge_is_the_servo_alone(alone, kind, integrator):
@@ -104,6 +105,7 @@ def arm_goals(t):
     return {"shoulder": 0.3 if t < 0.05 else 1.2, "elbow": 0.5 if t < 0.15 else 1.4 if t < 0.6 else 0.7}
 
 
+@pytest.mark.long(but="0 1 0-BoundedServo")
 @pytest.mark.parametrize("kind", [st.PulseServo, st.BoundedServo])
 @pytest.mark.parametrize("axis", ["0 1 0", "0 0 1"])
 def test_an_arm_does_not_depend_on_the_step(kind, axis):
@@ -118,6 +120,7 @@ def test_an_arm_does_not_depend_on_the_step(kind, axis):
         assert np.abs(q - fine)[:, -1].max() < 0.5e-3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("axis", ["0 1 0", "0 0 1"])
 def test_an_arm_with_play_depends_little_on_the_step(axis):
     """Teeth meet at other instants: joints that play may be off meanwhile, the tool by less than 1 mm."""
@@ -129,6 +132,7 @@ def test_an_arm_with_play_depends_little_on_the_step(axis):
     assert np.abs(q - fine)[:, -1].max() < 1.5e-3
 
 
+@pytest.mark.long(but="implicitfast-BoundedServo")
 @pytest.mark.parametrize("kind", [st.PulseServo, st.BoundedServo, st.DigitalServo])
 @pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
 def test_a_held_arm_does_not_creep(kind, integrator):
@@ -143,6 +147,7 @@ def test_a_held_arm_does_not_creep(kind, integrator):
     assert np.abs(data.qvel).max() < 1e-9
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("goals", [[0.2] * 6, [0.1, -0.59, -0.14, -0.01, -0.23, 0.52]])
 def test_an_arm_whose_gears_play_falls_onto_its_teeth_and_rests(goals):
     """Links of an SO-101 are light beside rotors: teeth that met within a tick were apart again, and the arm crept."""
@@ -168,6 +173,7 @@ WHEEL = ('<body><joint name="{}" axis="0 0 1"/>'
 NAMES = ("one", "two", "three", "four")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", [st.PulseServo, st.DigitalServo])
 def test_servos_on_one_supply_are_those_of_simulate_bus(kind):
     """Four wheels that start one after the other: the bus within 10 mV, angles as those of a hinge alone."""
@@ -198,6 +204,7 @@ def test_servos_on_one_supply_are_those_of_simulate_bus(kind):
             assert off < (0.8e-3 if integrator == "RK4" else 0.55e-3 * np.abs(speed).max())
 
 
+@pytest.mark.long
 def test_a_slide_by_a_rack_is_a_hinge():
     """A mass on a rack is an inertia m r² at the pinion, and gravity a constant torque m g r."""
     radius, mass = 0.012, 0.4
@@ -221,6 +228,7 @@ def test_a_slide_by_a_rack_is_a_hinge():
     assert abs(turned.qpos[0] - 1.3) < 0.05
 
 
+@pytest.mark.long
 def test_the_rotor_is_the_armature():
     model = servo(st.BoundedServo)
     drive, _ = driven(hinge(), {"elbow": st.robots.Mount(model, ratio=0.5)})
@@ -256,6 +264,7 @@ def test_an_actuator_gives_its_control_as_command_and_no_force():
     assert data.qfrc_actuator[1] == 0.0
 
 
+@pytest.mark.long
 def test_a_push_is_felt():
     """A force at the joint, one at the body, and gravity count alike."""
     model = servo(st.PulseServo)
@@ -276,6 +285,7 @@ def test_a_push_is_felt():
     assert held[0][1] == pytest.approx(-MASS * 9.81 * LENGTH * math.cos(held[0][0]), rel=1e-6)
 
 
+@pytest.mark.long
 def test_signals_are_those_of_simulate(alone):
     drive, data = driven(hinge("RK4"), {"elbow": servo(st.DigitalServo)})
     data.qpos[0] = 0.3
@@ -293,6 +303,7 @@ def test_signals_are_those_of_simulate(alone):
     assert {"joint_angle", "joint_command", "winding_temperature"} - set(record.names) <= {"winding_temperature"}
 
 
+@pytest.mark.long
 def test_a_servo_that_trips_is_told():
     sts = st.feetech_sts({"P_Coefficient": 32, "Protection_Time": 20}, servo="feetech-sts3215-12v")
     blocked = """<mujoco><option timestep="0.001" integrator="implicitfast"/><worldbody><body>
@@ -305,6 +316,7 @@ def test_a_servo_that_trips_is_told():
     assert [remark.kind for remark in drive.result(data)["elbow"].remarks] == ["tripped by overload"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("friction", "kinds"), [(0.0, ["does not come to rest"]), (None, [])])
 def test_a_joint_that_does_not_come_to_rest_is_told(friction, kinds):
     """The bus servo of shared/cases/digital-servo-never-rests, at P 32: about 0.7 deg at 2 Hz at a light hinge."""

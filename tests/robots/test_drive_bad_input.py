@@ -69,6 +69,7 @@ def test_no_model_is_refused():
         st.robots.ServoDrive("arm.xml", {"elbow": PULSE})
 
 
+@pytest.mark.long
 def test_friction_of_the_joint_is_cleared_or_kept():
     for how, left in (("clear", 0.0), ("keep", 0.3)):
         model = mujoco.MjModel.from_xml_string(STIFF)
@@ -81,6 +82,7 @@ def arm():
     return drive, mujoco.MjData(drive.model)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("field", "value"), [("qpos", np.nan), ("qvel", np.inf), ("qpos", 1e300)])
 def test_numbers_that_are_none_are_told(field, value):
     drive, data = arm()
@@ -98,6 +100,7 @@ def test_numbers_that_are_none_are_told(field, value):
     drive.check(data)  # told once
 
 
+@pytest.mark.long
 def test_a_control_that_is_no_number_is_told():
     actuator = '<actuator><motor joint="elbow"/></actuator>'
     xml = hinge().replace("</mujoco>", f"{actuator}</mujoco>")
@@ -110,6 +113,7 @@ def test_a_control_that_is_no_number_is_told():
     drive.step(data, 5)
 
 
+@pytest.mark.long
 def test_a_step_that_gets_longer_than_a_frame_is_told():
     drive, data = arm()
     drive.step(data, 5)
@@ -118,6 +122,7 @@ def test_a_step_that_gets_longer_than_a_frame_is_told():
         drive.step(data)
 
 
+@pytest.mark.long
 def test_one_callback_at_a_time():
     (one, data), (other, more) = arm(), arm()
     mujoco.set_mjcb_control(one.callback())
@@ -135,6 +140,7 @@ def test_one_callback_at_a_time():
             call()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("call", "message"), [
     (lambda drive, data: drive.command(data, {"elbo": 1.0}), "unknown joint with a servo 'elbo'; did you mean 'elbow'"),
     (lambda drive, data: drive.command(data, {"elbow": np.nan}), "goal of joint elbow"),
@@ -160,6 +166,7 @@ def test_a_missing_package_is_told_in_one_line(monkeypatch):
         st.robots.ServoDrive(None, {"elbow": PULSE})
 
 
+@pytest.mark.long
 def test_memory_of_data_that_is_gone_is_given_up():
     drive, _ = arm()
     for k in range(50):

@@ -54,6 +54,7 @@ def by_steps(drive, seed, steps, kind=FULL):
     return np.array(found)
 
 
+@pytest.mark.long(but="False-implicit-BoundedServo")
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("integrator", ["implicitfast", "RK4", "Euler", "implicit"])
 @pytest.mark.parametrize("spec", [False, True])
@@ -78,6 +79,7 @@ def test_step_callback_and_rollout_are_one(kind, integrator, spec):
         drive.check(one)
 
 
+@pytest.mark.long(but="implicitfast-BoundedServo")
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("integrator", ["implicitfast", "RK4"])
 def test_forward_between_steps_changes_nothing(kind, integrator):
@@ -94,6 +96,7 @@ def test_forward_between_steps_changes_nothing(kind, integrator):
         np.testing.assert_allclose(state_of(drive, data), expected[k], rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.long(but="False-implicitfast-BoundedServo")
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("integrator", ["implicitfast", "RK4"])
 @pytest.mark.parametrize("spec", [False, True])
@@ -114,6 +117,7 @@ def test_saved_and_restored_it_goes_on_bit_for_bit(kind, integrator, spec):
             np.testing.assert_array_equal(state_of(drive, place), expected[k])
 
 
+@pytest.mark.long(but="BoundedServo")
 @pytest.mark.parametrize("kind", KINDS)
 def test_states_of_mujoco_hold_the_servos_of_a_spec(kind):
     """What `mj_getState` and `mj_copyData` have copied goes on as the original does."""
@@ -134,6 +138,7 @@ def test_states_of_mujoco_hold_the_servos_of_a_spec(kind):
             np.testing.assert_array_equal(state_of(drive, place), expected[k])
 
 
+@pytest.mark.long
 def test_a_batch_of_mujoco_is_many_robots():
     batch = pytest.importorskip("mujoco.batch")
     drive = arm(st.PulseServo, spec=True)
@@ -149,6 +154,7 @@ def test_a_batch_of_mujoco_is_many_robots():
         np.testing.assert_array_equal(qpos, expected[:, n, 1:3])
 
 
+@pytest.mark.long(but="BoundedServo")
 @pytest.mark.parametrize("kind", KINDS)
 def test_time_that_goes_back_resets_the_servos(kind):
     drive = arm(kind)
@@ -181,6 +187,7 @@ def test_derivatives_by_finite_differences_leave_the_servos_alone(integrator):
     np.testing.assert_allclose(A[:2, :2], np.eye(2), atol=5e-3)
 
 
+@pytest.mark.long
 def test_a_step_of_another_length_goes_on():
     """The length of MuJoCo's step may change on the way."""
     drive = st.robots.ServoDrive(mujoco.MjModel.from_xml_string(hinge("RK4")), {"elbow": servo(st.PulseServo)})
@@ -197,6 +204,7 @@ def test_a_step_of_another_length_goes_on():
     assert data.qpos[0] == pytest.approx(one.qpos[0], abs=5e-4)
 
 
+@pytest.mark.long
 def test_other_models_have_no_servos():
     drive = arm(st.PulseServo)
     other = mujoco.MjModel.from_xml_string(hinge())

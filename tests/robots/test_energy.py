@@ -9,6 +9,8 @@ import pytest
 import servotwin as st
 from robots.robots_cases import LENGTH, MASS, SPREAD, hinge, servo
 
+pytestmark = pytest.mark.long
+
 mujoco = pytest.importorskip("mujoco", reason="the extra `robots` is not installed")
 TRUNK = 0.155  # m
 LEGS = [f"{part}{k}" for k in range(4) for part in ("hip", "knee")]

@@ -111,6 +111,7 @@ def actuated(env, **options):
 
 # ---------------------------------------------------------------------------------------- an environment
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["Reacher-v5", "InvertedPendulum-v5"])
 def test_the_checker_finds_nothing_that_it_does_not_find_without_servos(own, name):
     found = []
@@ -124,6 +125,7 @@ def test_the_checker_finds_nothing_that_it_does_not_find_without_servos(own, nam
     assert found[0] <= found[1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["Reacher-v5", "InvertedPendulum-v5"])
 def test_same_seed_same_episode_bit_for_bit(own, name):
     env = actuated(own(name))
@@ -133,6 +135,7 @@ def test_same_seed_same_episode_bit_for_bit(own, name):
     assert np.array_equal(run(actuated(own(name))), first)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("options", [{"goes_back": False}, {"option": 'integrator="RK4"'}, {"skip": 1}])
 def test_reset_leaves_nothing_of_the_episode_before(options):
     env = ServoActuated(Arm(**options), SERVOS)
@@ -142,6 +145,7 @@ def test_reset_leaves_nothing_of_the_episode_before(options):
     assert np.array_equal(run(env), first)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("option", "command"), [
     ("", None), ('integrator="RK4"', None), ('integrator="implicitfast"', None), ("", "identity")])
 def test_an_environment_with_servos_is_the_loop_written_by_hand(option, command):
@@ -161,6 +165,7 @@ def test_an_environment_with_servos_is_the_loop_written_by_hand(option, command)
     assert np.array_equal(seen, np.array(rows))
 
 
+@pytest.mark.long
 def test_rewards_see_the_action_and_not_the_angle(own):
     env = actuated(own("Reacher-v5"))
     env.reset(seed=1)
@@ -171,6 +176,7 @@ def test_rewards_see_the_action_and_not_the_angle(own):
     assert env.action_space == env.env.action_space
 
 
+@pytest.mark.long
 def test_the_policy_finds_its_angle():
     env = ServoActuated(Arm(), SERVOS)
     action = np.array([0.5, 0.5, 0.01])
@@ -179,12 +185,14 @@ def test_the_policy_finds_its_angle():
     assert reached == pytest.approx(asked, abs=math.radians(2.0))  # deadband and friction
 
 
+@pytest.mark.long
 def test_a_control_beyond_its_range_counts_as_the_end_of_it():
     ends, beyond = (np.array([[1.0, -2.0, 0.02]] * 40) * factor for factor in (1.0, 5.0))
     assert np.array_equal(run(ServoActuated(Arm(), SERVOS), actions=ends)[:, :6],
                           run(ServoActuated(Arm(), SERVOS), actions=beyond)[:, :6])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("options", "damping", "loss"), [({}, 0.0, 0.0), ({"joint_friction": "keep"}, 0.1, 0.01)])
 def test_friction_of_the_joints_goes_unless_it_is_kept(options, damping, loss):
     model = ServoActuated(Arm(), SERVOS, **options).drive.model
@@ -192,6 +200,7 @@ def test_friction_of_the_joints_goes_unless_it_is_kept(options, damping, loss):
     assert model.dof_frictionloss[1] == loss
 
 
+@pytest.mark.long
 def test_what_servos_have_done_is_kept_by_episode():
     env = ServoActuated(Arm(), SERVOS)
     env.record()
@@ -204,6 +213,7 @@ def test_what_servos_have_done_is_kept_by_episode():
     assert np.array_equal(info["servo_torque"], env.drive.torque(env.data))
 
 
+@pytest.mark.long
 def test_a_shared_supply_is_given_by_names_of_actuators():
     supply = st.Supply(open_circuit_voltage=6.0, internal_resistance=1.0)
     both = {"turn": ANALOG, "elbow": ANALOG}
@@ -216,6 +226,7 @@ def test_a_shared_supply_is_given_by_names_of_actuators():
 
 # ---------------------------------------------------------------------------------------- several at once
 
+@pytest.mark.long
 def test_environments_side_by_side_do_not_disturb_each_other():
     many = gymnasium.vector.SyncVectorEnv([lambda: ServoActuated(Arm(), SERVOS)] * 2)
     rows = [many.reset(seed=[3, 5])[0]]
@@ -225,6 +236,7 @@ def test_environments_side_by_side_do_not_disturb_each_other():
         assert np.array_equal(np.array(rows)[:, n], run(ServoActuated(Arm(), SERVOS), seed=seed, steps=20)[:, :6])
 
 
+@pytest.mark.long
 def test_the_callback_is_there_during_a_step_alone():
     env = ServoActuated(Arm(), SERVOS)
     run(env, steps=2)
@@ -236,6 +248,7 @@ def test_the_callback_is_there_during_a_step_alone():
     assert found is callback
 
 
+@pytest.mark.long
 def test_a_foreign_callback_is_refused_and_stays():
     env = ServoActuated(Arm(), SERVOS)
     run(env, steps=2)
@@ -252,12 +265,14 @@ def test_a_foreign_callback_is_refused_and_stays():
         mujoco.set_mjcb_control(None)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("again", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
 def test_a_copy_behaves_like_the_original(again):
     env = ServoActuated(Arm(), SERVOS, command={"elbow": (0.0, 1.0)})
     assert np.array_equal(run(again(env)), run(env))
 
 
+@pytest.mark.long
 def test_a_specification_makes_it_once_more(own):
     env = actuated(own("Reacher-v5"), command={"joint0": (-1.0, 1.0)})
     assert np.array_equal(run(env.spec.make()), run(env))
@@ -265,6 +280,7 @@ def test_a_specification_makes_it_once_more(own):
 
 # ---------------------------------------------------------------------------------------- maps
 
+@pytest.mark.long
 @pytest.mark.parametrize(("actuator", "mount", "ends"), [
     ('<motor name="a" joint="shoulder" ctrlrange="-1 1"/>', ANALOG, (-1, 1, -REACH, REACH)),
     ('<motor name="a" joint="shoulder" ctrlrange="-1 1"/>', Mount(ANALOG.model, direction=-1), (
@@ -291,6 +307,7 @@ def test_maps_follow_from_the_model(actuator, mount, ends):
         assert one.control(one.angle(middle)) == pytest.approx(middle, abs=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("command", "words"), [
     ({"turn": (-0.5, 1.5)}, "shoulder: control -1 to 1 is -0.5 to 1.5 rad"),
     ({"shoulder": np.array([-0.5, 1.5])}, "shoulder: control -1 to 1 is -0.5 to 1.5 rad"),
@@ -303,6 +320,7 @@ def test_maps_can_be_given(command, words):
     assert words in [str(one) for one in ServoActuated(Arm(), SERVOS, command=command).maps.values()]
 
 
+@pytest.mark.long
 def test_controls_are_found_behind_an_actuator_with_several():
     two = '<pid joint="finger" kp="3" input="pos vel"/>'
     env = ServoActuated(Arm(two + MOTORS.splitlines()[0]), {"turn": ANALOG, "elbow": ANALOG})
@@ -310,6 +328,7 @@ def test_controls_are_found_behind_an_actuator_with_several():
     assert reached == pytest.approx([env.maps["turn"].angle(0.5), env.maps["elbow"].angle(1.0)], abs=math.radians(2.0))
 
 
+@pytest.mark.long
 def test_an_actuator_goes_before_a_joint_of_its_name():
     actuators = '<motor name="elbow" joint="shoulder" ctrlrange="-1 1"/><position name="b" joint="elbow" kp="1"/>'
     env = ServoActuated(Arm(actuators), {"b": DIGITAL, "elbow": ANALOG}, command={"elbow": (0.0, 1.0)})
@@ -318,6 +337,7 @@ def test_an_actuator_goes_before_a_joint_of_its_name():
     assert env.drive.model.dof_armature[:2] == pytest.approx([0.006, 2e-6])  # of the rotors through their gears
 
 
+@pytest.mark.long
 def test_an_actuator_without_a_name_goes_by_its_joint():
     env = ServoActuated(Arm(), {"elbow": ANALOG, "shoulder": ANALOG})
     assert list(env.maps) == ["elbow", "shoulder"]
@@ -375,6 +395,7 @@ def test_a_map_that_is_none_is_refused(scale, offset, low, high, words):
         CommandMap("elbow", low, high, scale, offset)
 
 
+@pytest.mark.long(but="<lambda>-words0")
 @pytest.mark.parametrize(("make", "words"), [
     (lambda: gymnasium.make("CartPole-v1"), ("model and data of CartPoleEnv", "NoneType", "an MjModel and an MjData")),
     (lambda: Arm().model, ("env", "'MjModel'", "a gymnasium.Env")),
@@ -387,6 +408,7 @@ def test_an_environment_that_cannot_have_servos_is_refused(make, words):
     assert all(word in str(caught.value) for word in words), str(caught.value)
 
 
+@pytest.mark.long
 def test_an_environment_that_changes_its_model_is_refused():
     env = ServoActuated(bare := Arm(), SERVOS)
     bare.model, bare.data = Arm().model, mujoco.MjData(Arm().model)
@@ -394,6 +416,7 @@ def test_an_environment_that_changes_its_model_is_refused():
         env.reset()
 
 
+@pytest.mark.long
 def test_what_goes_wrong_in_a_step_is_told_and_the_next_episode_is_well():
     env = ServoActuated(Arm(), SERVOS)
     first = run(env)
@@ -414,6 +437,7 @@ def test_what_goes_wrong_in_a_step_is_told_and_the_next_episode_is_well():
 
 # ---------------------------------------------------------------------------------------- imports
 
+@pytest.mark.long
 def test_robots_load_neither_gymnasium_nor_mujoco():
     code = "import sys, servotwin.robots; print({'gymnasium', 'mujoco'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -427,6 +451,7 @@ def test_without_gymnasium_one_line_says_what_to_install(monkeypatch):
         import servotwin.robots.gym  # noqa: F401
 
 
+@pytest.mark.long
 def test_options_that_nobody_reads_are_refused(own):
     env = actuated(own("Reacher-v5"))
     with pytest.raises(UnknownNameError, match="unknown option of reset 'angle': allowed: none"):
@@ -435,6 +460,7 @@ def test_options_that_nobody_reads_are_refused(own):
     ServoActuated(Arm(), SERVOS).reset(seed=1, options={"angle": 1.0})  # an own reset may read it
 
 
+@pytest.mark.long
 def test_info_has_what_the_servos_do():
     env = ServoActuated(Arm(), SERVOS)
     env.reset(seed=1)

@@ -114,6 +114,7 @@ def test_what_does_not_yield_is_told_and_does_not_count():
     assert free.touches == ()
 
 
+@pytest.mark.long
 def test_what_yields_counts():
     """A ball in free space that rests on the lever weighs on it."""
     resting = f"""<mujoco><option timestep="{DT}"/><worldbody>

@@ -26,6 +26,7 @@ def test_two_links_bend_as_the_closed_form_says():
     np.testing.assert_allclose(follow(arm, path).angles, np.stack([shoulder, elbow], axis=1), atol=1e-8)
 
 
+@pytest.mark.long(but="scara-circle")
 @pytest.mark.parametrize(("make", "task"), [
     (scara, "circle"), (scara, "pick-and-place"), (lambda: scara(third_link=False), "square"),
     (two_link, "pick-and-place")])
@@ -79,6 +80,7 @@ def test_without_the_extra_one_line_says_what_to_install(missing, monkeypatch):
 # --- redundancy -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("criterion", "task"), [
     (AwayFromLimits(), "circle"), (AwayFromLimits(), "square"), (LeastTorque(), "square")])
 def test_a_criterion_makes_small_what_it_says_and_leaves_the_tool(criterion, task):

@@ -40,6 +40,7 @@ def pose_of(data):
     return Pose(data.qpos[0], data.qpos[1], math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
 
 
+@pytest.mark.long
 def test_it_weighs_what_it_is_made_of_and_stands_on_three_points(robot):
     drive, data = robot
     assert float(drive.model.body_mass.sum()) == pytest.approx(MASS)
@@ -49,6 +50,7 @@ def test_it_weighs_what_it_is_made_of_and_stands_on_three_points(robot):
     assert st.robots.robot_model("mobile").ncam == 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("left", "right"), ERRORS)
 def test_wheels_neither_slip_nor_bounce(robot, left, right):
     # where odometry of the true angles of the wheels has the robot is where it is
@@ -71,6 +73,7 @@ def test_wheels_neither_slip_nor_bounce(robot, left, right):
     assert np.ptp(heights) < 2e-5
 
 
+@pytest.mark.long
 def test_constant_unequal_speeds_drive_the_arc_of_the_textbook(robot):
     drive, data = robot
     drive.command(data, {"left_wheel": NEW.neutral_pulse + 1e-4, "right_wheel": NEW.neutral_pulse - 5e-4})
@@ -86,6 +89,7 @@ def test_constant_unequal_speeds_drive_the_arc_of_the_textbook(robot):
     assert math.sqrt(c + a * a + b * b) == pytest.approx(radius, rel=2e-3)
 
 
+@pytest.mark.long
 def test_a_straight_line_with_equal_servos_is_straight():
     run = run_waypoints(waypoints=[(0.0, 0.0), (0.4, 0.0)], encoders=4096)
     assert run.off_path.max() < 1e-3
@@ -100,6 +104,7 @@ def test_a_straight_line_with_equal_servos_is_straight():
     assert run.record.time[-1] == pytest.approx(run.time[-1])
 
 
+@pytest.mark.long
 def test_unequal_servos_lead_a_robot_astray_that_believes_in_its_pulses():
     corner = [(0.0, 0.0), (0.3, 0.0), (0.3, 0.2)]
     equal, unequal = run_waypoints(None, corner), run_waypoints(unequal_servos(), corner)
@@ -111,6 +116,7 @@ def test_unequal_servos_lead_a_robot_astray_that_believes_in_its_pulses():
     assert abs(unequal.turned_astray) > 0.3 > 20.0 * abs(equal.turned_astray)
 
 
+@pytest.mark.long
 def test_encoders_bring_unequal_servos_there():
     run = run_waypoints(unequal_servos(), [(0.0, 0.0), (0.3, 0.0), (0.3, 0.2)], encoders=512)
     step = math.tau / 512 * WHEEL_RADIUS

@@ -70,6 +70,7 @@ def test_without_friction_the_droop_is_the_load_over_the_stiffness():
         assert recipe.friction_loss == pytest.approx(0.0, abs=1e-4)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", [
     name if name in ("LeRobot's", "towerpro-sg90") else pytest.param(name, marks=pytest.mark.slow) for name in EIGHT])
 def test_a_recipe_is_as_strong_as_its_servo(name):
@@ -87,6 +88,7 @@ def test_a_recipe_is_as_strong_as_its_servo(name):
     assert error.droops_at_half.up < error.droops.up
 
 
+@pytest.mark.long
 def test_the_recipe_of_lerobots_arm():
     """By hand kp 11.9, friction loss 0.686, range 3.53; the twin stands off 7.07 and 0.76 deg."""
     recipe = recipe_of(LEROBOT, load=0.85)
@@ -99,6 +101,7 @@ def test_the_recipe_of_lerobots_arm():
     assert any("load" in words for words in recipe.lacks)
 
 
+@pytest.mark.long
 def test_d_is_damping():
     """kv is what back-EMF takes, and k_d V K/R."""
     soft, hard = (recipe_of(st.DigitalServo(st.feetech_sts({"P_Coefficient": 16, "D_Coefficient": D},
@@ -109,6 +112,7 @@ def test_d_is_damping():
     assert hard.damping - soft.damping == pytest.approx(gain * 11.6 * K / R)
 
 
+@pytest.mark.long
 def test_a_joint_by_a_recipe_holds():
     """Where it has come up under its load; with MuJoCo's own `solimpfriction` it creeps to where none holds it."""
     recipe, crept = recipe_of(LEROBOT), []

@@ -23,6 +23,7 @@ def moved(servos, **more):
     return drive, data
 
 
+@pytest.mark.long
 def test_a_record_becomes_tables():
     pytest.importorskip("pandas")
     pytest.importorskip("xarray")
@@ -38,6 +39,7 @@ def test_a_record_becomes_tables():
     assert (cube["trip"].sel(joint="shoulder") == 0.0).all()
 
 
+@pytest.mark.long
 def test_temperatures_are_assumed_by_mass_and_that_is_said():
     drive, data = moved({"shoulder": DIGITAL, "elbow": ANALOG})
     assert (drive.look(data, "winding_temperature") > 298.15).all()
@@ -50,6 +52,7 @@ def test_temperatures_are_assumed_by_mass_and_that_is_said():
     np.testing.assert_allclose(other.qpos, data.qpos, atol=2e-4)  # a warm winding is a little weaker
 
 
+@pytest.mark.long
 def test_temperatures_that_are_not_known_are_said():
     nameless = st.PulseServo(st.servo_from_values("mine", {
         group: {name.partition(".")[2]: ANALOG.servo.get(name) for name in ANALOG.servo.names()
@@ -60,6 +63,7 @@ def test_temperatures_that_are_not_known_are_said():
     assert any(note.startswith("temperatures of shoulder are not known") for note in drive.check(data))
 
 
+@pytest.mark.long(but="dumps-<lambda>1")
 @pytest.mark.parametrize("make", [lambda: moved({"elbow": ANALOG, "shoulder": ANALOG})[0],
                                   lambda: st.VectorSimulator(ANALOG, 2)])
 @pytest.mark.parametrize("call", [pickle.dumps, copy.copy, copy.deepcopy])

@@ -13,6 +13,8 @@ from servotwin.robots import Motion, run_motion, validate_robot
 from servotwin.robots.gains import Gains, position_run
 from servotwin.robots.replay import ALL, IDEAL, LOADED, MOVING, RESTING, SERVOS
 
+pytestmark = pytest.mark.long
+
 mujoco = pytest.importorskip("mujoco", reason="the extra `robots` is not installed")
 RATE, JOINTS = 30.0, ("shoulder", "elbow")
 PLANT = mujoco.MjModel.from_xml_string(links(dt=2e-3))

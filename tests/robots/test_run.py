@@ -33,6 +33,7 @@ def run():
     return run_motion(model(links(dt=2e-3)), {"shoulder": SERVO, "elbow": SERVO}, waves("elbow"), settle=0.1)
 
 
+@pytest.mark.long
 def test_it_begins_at_the_first_goals_and_ends_after_the_last(run):
     assert run.time[0] == pytest.approx(-0.098)
     assert run.time[-1] == pytest.approx(0.5)
@@ -60,6 +61,7 @@ def test_tracking_is_that_of_the_record(run):
     assert 0.0 < found.delay < 0.3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("hold", "levels"), [("linear", 200), ("previous", 20)])
 def test_what_servos_are_told_between_samples(hold, levels):
     time = np.linspace(0.0, 0.4, 21)
@@ -71,6 +73,7 @@ def test_what_servos_are_told_between_samples(hold, levels):
     assert np.all((ramp.at("elbow", found.time[inside] - 2e-3) - told < 0.02) & (told <= 0.5 + found.time[inside]))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("goals", "said"), [
     ([0.2, 3.9], "goals of joint elbow go from 11.5 to 223 deg at the servo, beyond what it takes, -15 to 195 deg"),
     ([0.2, 1.2], "goals of joint elbow go from 11.5 to 68.8 deg, beyond its range in the model, -57.3 to 57.3 deg"),
@@ -83,12 +86,14 @@ def test_goals_that_cannot_be_reached_are_told(goals, said):
     assert not run_motion(model(xml), {"elbow": SERVO}, waves("elbow"), settle=0.0).notes
 
 
+@pytest.mark.long
 def test_the_given_model_stays_as_it_is():
     given = model(links())
     run_motion(given, {"elbow": SERVO}, waves("elbow"), settle=0.05)
     assert given.dof_armature.tolist() == [0.0, 0.0]
 
 
+@pytest.mark.long
 def test_more_than_one_run_in_a_process_and_their_progress():
     told = []
     for kind in (SERVO, BUS_SERVO):
@@ -108,6 +113,7 @@ def test_servos_on_one_supply_make_it_sag():
 
 # ------------------------------------------------------------------------------------------------------ heat
 
+@pytest.mark.long(but="BoundedServo")
 @pytest.mark.parametrize("kind", [st.BoundedServo, st.DigitalServo])
 def test_mean_heat_is_that_of_the_current(kind):
     """Of servos without pulses, whose currents samples tell."""
@@ -187,6 +193,7 @@ REFUSED = [
 ]
 
 
+@pytest.mark.long(but="changed12-InputError-supply voltage")
 @pytest.mark.parametrize(("changed", "error", "said"), REFUSED)
 def test_bad_input_is_refused(changed, error, said):
     given = {"model": model(links()), "servos": {"elbow": SERVO}, "motion": waves("elbow"), "settle": 0.05, **changed}

@@ -34,6 +34,7 @@ def sized(model, mount, values, duration=0.2, **options):
     return sizing_of(run_motion(model, {"a": mount}, motion, **options))["a"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("share", [0.2, 0.8, 1.3])
 @pytest.mark.parametrize(("model", "direction", "ratio"), [(SERVO, 1, 1.0), (SERVO, -1, 0.5), (BUS_SERVO, -1, 2.0)])
 def test_margin_of_a_weight_that_is_held(share, model, direction, ratio):
@@ -49,6 +50,7 @@ def test_margin_of_a_weight_that_is_held(share, model, direction, ratio):
     assert found.verdict.startswith("big enough: ") == found.big_enough
 
 
+@pytest.mark.long
 def test_a_rotor_behind_the_play_of_its_gear_has_to_be_turned_too():
     found = sized(lever(0.01, gravity="0 0 0"), Mount(BUS_SERVO), 0.2 * (1.0 - np.cos(np.linspace(0.0, 6.0, 61))), 0.6)
     rotor = BUS_SERVO.value("gear.gear_reduction") ** 2 * BUS_SERVO.value("motor.rotor_inertia")
@@ -57,12 +59,14 @@ def test_a_rotor_behind_the_play_of_its_gear_has_to_be_turned_too():
     assert np.abs(found.needed.torque[100:200]).max() == pytest.approx(J * fastest, rel=0.1)
 
 
+@pytest.mark.long
 def test_margin_of_a_rack():
     radius, mass = 0.01, 2.0
     found = sized(lever(mass, 'type="slide" axis="0 0 1"'), Mount(SERVO, zero=-radius, ratio=radius), [0.0, 0.0])
     assert found.margin == pytest.approx(DRIVES[SERVO].stall_torque / (mass * G * radius), rel=1e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("share", [0.5, 0.9, 1.1])
 @pytest.mark.parametrize(("model", "ratio"), [(SERVO, 1.0), (SERVO, 0.25), (BUS_SERVO, 1.0)])
 def test_a_motion_faster_than_the_servo_without_load_is_too_fast(share, model, ratio):
@@ -82,6 +86,7 @@ def test_a_motion_faster_than_the_servo_without_load_is_too_fast(share, model, r
             assert found.short == pytest.approx(least, abs=0.01)
 
 
+@pytest.mark.long
 def test_in_motion_the_curve_counts_at_its_speed():
     """Lifting at half the speed without load, once the motion is under way."""
     drive = DRIVES[SERVO]
@@ -97,6 +102,7 @@ def test_in_motion_the_curve_counts_at_its_speed():
     assert drive.torque(speed) / torque.max() == pytest.approx(1.0 / 0.9, rel=1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("goals", "driving"), [([-0.4, 0.4], True), ([0.4, -0.4], False)])
 def test_lowering_holds_back(goals, driving):
     found = sized(lever(0.3), Mount(SERVO, zero=-1.0), goals, 0.6)
@@ -120,6 +126,7 @@ def test_what_the_others_leave_of_the_supply_counts():
     assert found[0.6].margin < found[0.0].margin
 
 
+@pytest.mark.long
 def test_a_program_that_limits_duty_limits_the_speed():
     half = st.DigitalServo(st.feetech_sts({"Max_Torque_Limit": 500}, servo="feetech-sts3215-12v"))
     found = sized(lever(1e-3, gravity="0 0 0"), Mount(half), [0.0, 0.5], 0.2)
@@ -127,6 +134,7 @@ def test_a_program_that_limits_duty_limits_the_speed():
     assert found.top_speed < 0.6 * DRIVES[BUS_SERVO].no_load_speed
 
 
+@pytest.mark.long
 def test_a_servo_that_trips_is_not_big_enough():
     weak = st.DigitalServo(BUS_SERVO.servo.replace(
         {"firmware.overload_time": 0.1, "firmware.overload_duty": 0.05, "firmware.overload_output": 0.02}))
@@ -136,6 +144,7 @@ def test_a_servo_that_trips_is_not_big_enough():
     assert not found.big_enough
 
 
+@pytest.mark.long
 def test_what_holds_too_much_gets_too_hot():
     mass = 0.9 * DRIVES[SERVO].stall_torque / (G * LENGTH)
     found = sized(lever(mass), Mount(SERVO, zero=-1.0), [0.0, 0.0], 0.3)
@@ -154,6 +163,7 @@ def test_without_a_mass_nothing_is_said_of_heat():
     assert found.big_enough
 
 
+@pytest.mark.long
 def test_a_motion_that_takes_nothing_has_no_margin():
     found = sized(lever(0.1, gravity="0 0 0"), Mount(SERVO), [0.3, 0.3])
     assert math.isinf(found.margin)

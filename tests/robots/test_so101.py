@@ -172,6 +172,7 @@ def test_fingers_meet_at_the_tool_when_the_gripper_is_closed(arm):
     assert np.all(np.diff(gaps) > 0.01)
 
 
+@pytest.mark.long
 def test_the_camera_sees_the_whole_arm(arm):
     rng, (low, high) = np.random.default_rng(1), np.array(list(LIMITS.values())).T
     half = math.tan(0.5 * math.radians(arm.camera("side").fovy[0]))

@@ -30,6 +30,7 @@ def done(joints, model, steering=None, belief=None, **options):
                     **options)
 
 
+@pytest.mark.long
 def test_the_inverse_of_the_papers_servo_is_exact_at_its_joints(joints):
     """(40) as feedforward on the servo that (35)-(41) describe: nothing is left but the steps of the controller."""
     plain = done(joints, st.AveragedServo(SERVO))
@@ -41,6 +42,7 @@ def test_the_inverse_of_the_papers_servo_is_exact_at_its_joints(joints):
     assert plain.ideal_contour.largest < 1e-6
 
 
+@pytest.mark.long(but="feedforward")
 @pytest.mark.parametrize("name", ["feedforward", "pid", "computed-torque", "observer"])
 def test_every_controller_is_better_than_none(joints, name):
     plain = done(joints, st.PulseServo(SERVO)).metrics
@@ -51,6 +53,7 @@ def test_every_controller_is_better_than_none(joints, name):
     assert found.effort < 6.0  # V
 
 
+@pytest.mark.long
 def test_wrong_beliefs_cost_accuracy(joints):
     bare = STEERINGS["computed-torque"]()
     right = done(joints, st.PulseServo(SERVO), bare).metrics
@@ -92,6 +95,7 @@ def port(model, sensors=()):
     return DrivePort(drive, mounts, motion, settle=0.1, sensors=sensors), mounts
 
 
+@pytest.mark.long
 def test_a_port_measures_and_sends_angles_of_shafts():
     wired, mounts = port(st.PulseServo(SERVO), [Encoder(count=0.0)])
     zero = np.array([mount.zero for mount in mounts.values()])
@@ -104,6 +108,7 @@ def test_a_port_measures_and_sends_angles_of_shafts():
     np.testing.assert_allclose(wired.measure()["output_angle"], wired.data.qpos - zero, atol=1e-3)
 
 
+@pytest.mark.long
 def test_pulses_are_sent_in_steps():
     wired, mounts = port(st.PulseServo(SERVO))
     zero = mounts["shoulder"].zero
@@ -119,6 +124,7 @@ def test_pulses_are_sent_in_steps():
     assert zero < 0.0
 
 
+@pytest.mark.long
 def test_a_port_takes_one_kind_of_command():
     mixed = {"shoulder": st.PulseServo(SERVO), "elbow": st.control.bare_bridge(SERVO)}
     with pytest.raises(InputError, match="servos of one controller: got 'armature_voltage and command_angle'"):

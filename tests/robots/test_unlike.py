@@ -31,6 +31,7 @@ def moved(servos, bus):
     return np.array([run.record[joint]["joint_angle"] for joint in servos])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("servos", [
     {"shoulder": ("dynamixel-xl430-w250", {}), "elbow": ("dynamixel-xl330-m288", {})},
     {"shoulder": ("dynamixel-xl330-m288", {}), "elbow": ("dynamixel-xl430-w250", {})},

@@ -54,6 +54,7 @@ def test_a_wheel_that_is_to_stand_or_to_do_what_it_cannot(speeds):
         assert float(speeds.speed(speeds.pulse(most))) == pytest.approx(speeds.most, rel=1e-12)
 
 
+@pytest.mark.long
 def test_worn_servos_are_off_and_weak_as_said(speeds):
     off = wheel_speed_of(worn(NEW, neutral=8e-6))
     assert off.neutral - speeds.neutral == pytest.approx(8e-6, abs=1e-15)
@@ -113,6 +114,7 @@ def placed(servos, actuators="", **more):
     return drive, mujoco.MjData(drive.model)
 
 
+@pytest.mark.long
 def test_a_joint_is_told_pulses_and_turns_as_the_servo_alone():
     drive, data = placed({"a": Mount(NEW, direction=-1), "b": st.PulseServo(st.load_servo("hitec-hs-755hb"))})
     drive.record(data)
@@ -133,6 +135,7 @@ def test_a_joint_is_told_pulses_and_turns_as_the_servo_alone():
     assert record["b"]["joint_command"][-1] == pytest.approx(0.5)
 
 
+@pytest.mark.long
 def test_an_actuator_gives_the_pulse():
     told, data = placed({"a": NEW}, '<actuator><motor joint="a"/></actuator>')
     bare, other = placed({"a": NEW})
@@ -157,6 +160,7 @@ def test_on_a_shared_supply_and_across_save_and_restore():
     assert end[0] > 0.1 > -0.1 > end[1]
 
 
+@pytest.mark.long
 def test_a_servo_in_pwm_mode_is_told_its_duty():
     servo = st.DigitalServo(NEW.servo.replace({**ON_BUS, "potentiometer.fixed_angle": 0.0}))
     drive, data = placed({"a": Mount(servo, zero=0.7, direction=-1)})
@@ -167,6 +171,7 @@ def test_a_servo_in_pwm_mode_is_told_its_duty():
     assert drive.look(data, "duty")[0] == 0.5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("pulse", [0.5, 0.0, -1e-3, math.nan])
 def test_angles_are_no_pulses(pulse):
     drive, data = placed({"a": NEW})

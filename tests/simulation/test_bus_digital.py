@@ -54,6 +54,7 @@ def test_alone_on_a_bus_it_is_the_servo_alone(sort):
         (event.kind, pytest.approx(event.time, abs=1e-12)) for event in one.events]
 
 
+@pytest.mark.long(but="drops")
 @pytest.mark.parametrize("sort", SORTS)
 def test_twins_on_one_bus_are_one_servo_on_twice_the_resistance(sort):
     model, half = digital(SORTS[sort]), st.Supply(open_circuit_voltage=V_OC, internal_resistance=0.5 * R_B)
@@ -95,6 +96,7 @@ def test_unlike_servos_move_by_the_exponential_of_their_common_law(R_b):
     assert R_b == 0.0 or fleet.bus_voltage.min() < 0.8 * V_OC
 
 
+@pytest.mark.long
 def test_the_balance_of_all_closes_and_the_bus_sags_by_the_current_of_all():
     model, beside = digital(ROUGH | DROPS), digital({**ROUGH, "firmware.off_state": "diode"})
     later = st.signals.step(0.1, 1.0, at=0.05, unit="rad")
@@ -104,6 +106,7 @@ def test_the_balance_of_all_closes_and_the_bus_sags_by_the_current_of_all():
     assert fleet.bus_voltage.min() < V_OC - 1.0
 
 
+@pytest.mark.long
 def test_a_pulse_servo_stands_beside_a_digital_one():
     analog = st.PulseServo(st.load_servo("hitec-hs-755hb"))
     told, supply = st.signals.step(0.0, 60.0, at=0.05, unit="deg"), st.Supply(open_circuit_voltage=6.0,

@@ -55,6 +55,7 @@ def same(a, b):
     assert one.records.tobytes() == other.records.tobytes()
 
 
+@pytest.mark.long(but="stops-BoundedServo-float64")
 @pytest.mark.parametrize(("kind", "dtype"), [
     (st.PulseServo, "float64"), pytest.param(st.PulseServo, "float32", marks=pytest.mark.slow),
     (st.PulseServoInductive, "float64"), (st.BoundedServo, "float64")])
@@ -83,6 +84,7 @@ def test_it_is_python_bit_for_bit(servo, name, kind, dtype):
     assert np.ptp(python["output_angle"]) > 0.0
 
 
+@pytest.mark.long
 def test_programs_are_python_bit_for_bit():
     """Digital servos by the same ticks: their lanes go from tick to tick together, or in the middle of one alone."""
     model = digital({"proportional_gain": 6.0, "derivative_gain": 0.02, "angle_quantum": COUNT, "overload_duty": 0.5,
@@ -102,6 +104,7 @@ def test_programs_are_python_bit_for_bit():
     assert np.ptp(python["output_angle"]) > 0.0
 
 
+@pytest.mark.long
 def test_lanes_of_several_ways_side_by_side(servo):
     """Some run side by side, some one by one, one fails; parameters and a reset in Python come between."""
     parameters = {"load.spring.stiffness": [0.0, 0.1, 1e18, 0.0],
@@ -344,6 +347,7 @@ def test_the_header_says_what_python_says(servo, program):
         assert f" = {code}," in entry.header or f" = {code} " in entry.header
 
 
+@pytest.mark.long
 def test_two_threads_with_two_simulators(servo):
     """Nothing is shared: each goes as it would alone, though both are in compiled code at once."""
     models = (st.PulseServo(servo), model_of(servo, EVERYTHING))
@@ -383,6 +387,7 @@ def test_a_header_that_cannot_be_written(servo, tmp_path):
         entry.write_header(tmp_path / "missing")
 
 
+@pytest.mark.long(but="PulseServo")
 @pytest.mark.parametrize("kind", [st.PulseServo, st.DigitalServo])
 def test_buses_are_those_of_python(servo, kind):
     """Two lanes on one supply, one on another and one alone: in Python alone, and in Python and C by turns."""

@@ -127,6 +127,7 @@ def pairs(without=()):
     return [names for count in range(3) for names in combinations(own, count) if names != ("share", "locks")]
 
 
+@pytest.mark.long(but="float64")
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 def test_analog_servos_take_the_forms_that_they_took(servo, dtype):
     rng = np.random.default_rng(3)
@@ -141,6 +142,7 @@ def test_servos_without_pulses_take_the_forms_that_they_took(servo):
         assert combined(st.BoundedServo, servo.replace(MEAN), names, "float64", rng) == "plain_runs", names
 
 
+@pytest.mark.long
 def test_digital_servos_take_the_forms_that_they_took(servo):
     rng = np.random.default_rng(3)
     for names in pairs(OF_PULSES):

@@ -39,6 +39,7 @@ def test_compiled_equals_plain():
         assert compiled == pytest.approx(linear_segments.slide(NUMBERS, drive, 0.3, w, time), rel=1e-13, abs=1e-15)
 
 
+@pytest.mark.long
 def test_what_is_derived():
     text = derive(Recipe("run", ("servotwin.models.engine.runs:run",))).text
     assert "def terms_frame__decide(" in text
@@ -48,6 +49,7 @@ def test_what_is_derived():
     compile(text, "derived", "exec")
 
 
+@pytest.mark.long
 def test_the_vector_form_has_polynomials():
     text = derive(Recipe("tiles", ("servotwin.models.engine.batch.side_by_side:go_on",), vector=True)).text
     assert "motions_elementary__log1p(" in text
@@ -71,6 +73,7 @@ def reached(name, functions):
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ending", ["phases__phases", "windows__divide"])
 def test_float32_stays_float32(ending):
     functions = functions_of(printed(_BY_ARCS["float32"]).text.removeprefix(header()))
@@ -83,6 +86,7 @@ def test_float32_stays_float32(ending):
         assert not re.search(r"\b(?:exp|log|sqrt|fabs|floor|fma|sin|log1p|expm1|copysign)\(", functions[each]), each
 
 
+@pytest.mark.long
 def test_two_processes_at_once(tmp_path):
     if not compilers():
         pytest.skip("no C compiler")
@@ -98,6 +102,7 @@ def test_two_processes_at_once(tmp_path):
     assert not list(tmp_path.glob("*.tmp"))
 
 
+@pytest.mark.long
 def test_what_no_term_asks_for_is_left_out():
     plain, calm, loose, everything = (
         derive(one).text for one in (PLAIN_RUNS, parts_of(PLAIN_RUNS)[1][0], BY_LEGS, ALL_RUNS))

@@ -97,6 +97,7 @@ def crowded(seed: int) -> str:
     return ""
 
 
+@pytest.mark.long(but="10")
 @pytest.mark.parametrize("seed", range(40))
 def test_contacts_come_to_rest(seed):
     assert not crowded(seed)

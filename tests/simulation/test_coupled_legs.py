@@ -80,6 +80,7 @@ class Bus:
         return np.stack([[found[name][signal] for name in fleet] for signal in SIGNALS]).transpose(2, 0, 1)
 
 
+@pytest.mark.long(but="7")
 @pytest.mark.parametrize("seed", SEEDS)
 def test_lanes_on_a_supply_are_the_servos_of_simulate_bus(seed):
     bus = Bus(seed)
@@ -121,6 +122,7 @@ def test_a_supply_at_its_limit_goes_on_under_the_duties_that_programs_have_put(l
         np.testing.assert_allclose(found[cuts], found[1], rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_warm_lane_is_the_servo_alone(seed):
     model, load, _ = drawn(seed, without=ELSEWHERE)
@@ -143,6 +145,7 @@ def test_warm_lanes_and_lanes_with_a_limit_go_by_series():
         assert kind.recipe == BY_SERIES
 
 
+@pytest.mark.long
 def test_a_winding_that_rests_cools_by_its_two_exponentials():
     """The closed form of two thermal masses, against lanes of which nothing moves."""
     servo = st.load_servo("feetech-sts3215-12v").replace({**WARM, "thermal.ambient": 293.15})

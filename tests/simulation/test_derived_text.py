@@ -24,6 +24,7 @@ def leaves(node):
     return isinstance(node, ast.Return | ast.Break | ast.Continue)
 
 
+@pytest.mark.long(but="by_ticks")
 def test_every_statement_can_be_reached(functions):
     for function in functions:
         for node in ast.walk(function):

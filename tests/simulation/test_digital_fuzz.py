@@ -8,6 +8,8 @@ import pytest
 import servotwin as st
 from leg_extremes import Extreme, extreme
 
+pytestmark = pytest.mark.long
+
 BLOCK, BLOCKS = 50, 40
 WORK = 30.0  # s of this process; most take 0.01, those of which a step is integrated a few
 MOST_MOTIONS, MOST_EVENTS = 60_000, 5_000  # of a run of at most 40 ticks; stiff ones are integrated in small steps

@@ -7,6 +7,8 @@ import servotwin as st
 from leg_draws import Drawn, drawn, goals, spread
 from models.digital_servos import digital
 
+pytestmark = pytest.mark.long
+
 STEPS, EVERY, LANES = 6, 0.02, 9  # a goal every 20 ms
 TICKS, INSIDE = [1e-3] * 20, [0.3e-3, 4.1e-3, 0.9e-3, 5.55e-3, EVERY - 10.85e-3]
 SEEDS = [*range(24), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(24, 120))]

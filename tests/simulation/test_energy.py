@@ -25,6 +25,7 @@ EXTREMES = {  # what changes, and relative to what is turned over, how well it h
 }
 
 
+@pytest.mark.long(but="resistance of 1e-3 ohm-BoundedServo")
 @pytest.mark.parametrize("kind", [st.PulseServo, st.BoundedServo])
 @pytest.mark.parametrize("case", EXTREMES)
 def test_energy_ends_and_balances(case, kind):
@@ -54,6 +55,7 @@ def test_energy_ends_where_speed_does_not_tell_the_current(kind, resistance):
     assert result.energy.friction > 0.0
 
 
+@pytest.mark.long(but="0.00016")
 @pytest.mark.parametrize("inductance", [3e-7, 2e-6, 1.6e-4, 5e-3])
 def test_energy_balances_while_a_winding_warms(inductance):
     """However fast the current fades within a step that follows the warming."""

@@ -5,6 +5,8 @@ import pytest
 
 import servotwin as st
 
+pytestmark = pytest.mark.long
+
 LANES, DURATION = 24, 0.4
 TIMES = np.linspace(0.02, DURATION, 20)
 FADES = {"gear.output_inertia": 1e-3, "friction.breakaway_ratio": 1.3, "supply.internal_resistance": 0.2,

@@ -24,6 +24,7 @@ FORMS = {
 }
 
 
+@pytest.mark.long(but="side_by_side_float64")
 @pytest.mark.parametrize("name", FORMS)
 def test_each_compiled_form_moves_a_servo_as_it_should(servo, monkeypatch, name):
     changes, load, dtype, tolerance = FORMS[name]

@@ -60,6 +60,7 @@ def with_its_group(name):
     return SERVO.replace({part: ABSENT[part] for part in HEAT}) if name.startswith("thermal.") else SERVO
 
 
+@pytest.mark.long(but="PulseServo-friction.coulomb_torque_forward")
 @pytest.mark.filterwarnings("ignore:hitec-hs-755hb. at:UserWarning")
 @pytest.mark.parametrize(("model", "name"), [(model, name) for model in MODELS for name in names_of(model)])
 def test_every_parameter_may_be_a_column(model, name):
@@ -76,6 +77,7 @@ def test_every_parameter_may_be_a_column(model, name):
                                 seed=5) for x in column.tolist()])
 
 
+@pytest.mark.long(but="BoundedServo-load.viscous_friction")
 @pytest.mark.parametrize(("model", "name"), [(model, name) for model in MODELS for name in LOAD_NAMES
                                             if model.bears_flexible or ".flexible." not in name])
 def test_every_number_of_a_load_may_be_a_column(model, name):
@@ -179,6 +181,7 @@ def test_noise_is_that_of_the_seed():
     agree(own[1], st.simulate(st.PulseServo(servo), STEP, duration=0.3, seed=1)["output_angle"], "noise")
 
 
+@pytest.mark.long
 def test_single_precision():
     inertia = {"load.inertia": np.linspace(0.0, 2e-3, 9)}
     single, double = (st.simulate_many(st.PulseServo(SERVO), STEP, duration=0.5, parameters=inertia, dtype=dtype)

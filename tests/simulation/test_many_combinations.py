@@ -42,6 +42,7 @@ def lanes():
             for name, values in numbers.items()}
 
 
+@pytest.mark.long(but="rc")
 @pytest.mark.parametrize(("kind", "changes", "every"), [  # any three features meet in all eight ways
     (st.PulseServo, {}, 13), (st.PulseServo, {"electronics.stretcher_time_constant": 0.02}, 33),
     (st.PulseServoInductive, {"motor.armature_inductance": 6e-4}, 33)], ids=["linear", "rc", "inductance"])
@@ -89,6 +90,7 @@ def drawn_together(kind, name, rng):
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("kind", "changes"), [(st.PulseServo, {}), (st.DigitalServo, PROGRAM)],
                          ids=["pulse", "digital"])
 def test_whatever_terms_read(servo, kind, changes):
@@ -128,6 +130,7 @@ def test_a_timeout_of_one_frame_is_renewed_by_every_edge(servo):
         np.testing.assert_allclose(batch["output_angle"][0], plain["output_angle"], rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.long(but="BoundedServo-float32")
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 @pytest.mark.parametrize("model", [st.BoundedServo, st.PulseServo, st.PulseServoInductive])
 def test_results_do_not_depend_on_the_output_step(servo, model, dtype):

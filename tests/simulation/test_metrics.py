@@ -56,6 +56,7 @@ CASES = [(20.0, 0.1), (20.0, 0.3), (20.0, 0.7), (50.0, 0.9), (20.0, 1.5), (20.0,
 
 # ---------------------------------------------------------------------------------------- second order
 
+@pytest.mark.long(but="50.0-0.9")
 @pytest.mark.parametrize(("omega_n", "zeta"), CASES)
 def test_a_linear_servo_of_second_order(linear, omega_n, zeta):
     duration = 0.1 + 14.0 / (omega_n * min(zeta, 1.0 / (2.0 * zeta)))
@@ -91,6 +92,7 @@ def test_peak_current_is_the_first_one(linear):
     assert found.peak_current == pytest.approx(voltage / servo.motor.armature_resistance, rel=1e-12)
 
 
+@pytest.mark.long
 @settings(max_examples=15, deadline=None)
 @given(some.floats(5.0, 60.0), some.floats(0.1, 0.95), some.floats(-90.0, 90.0), some.floats(0.0, 0.5))
 def test_what_scales_and_what_does_not(linear, omega_n, zeta, way, at):
@@ -152,6 +154,7 @@ COMMANDS = {
 }
 
 
+@pytest.mark.long(but="BoundedServo-samples")
 @pytest.mark.parametrize(("name", "command"), [
     ("AveragedServo", "angle"), ("AveragedServoInductive", "voltage"), ("BoundedServo", "pulse"),
     ("BoundedServo", "samples")])
@@ -162,6 +165,7 @@ def test_the_output_step_changes_nothing(servo, name, command):
     assert coarse == fine == odd
 
 
+@pytest.mark.long
 def test_peaks_lie_between_samples(linear):
     """The top of a sine is found although no sample is on it."""
     model = st.AveragedServo(tuned(linear, 25.0, 0.1))
@@ -172,6 +176,7 @@ def test_peaks_lie_between_samples(linear):
     assert result.peak("output_angle") > 1.1 * np.abs(result["output_angle"]).max()
 
 
+@pytest.mark.long(but="armature_voltage")
 @pytest.mark.parametrize("signal", ["output_speed", "armature_current", "armature_voltage", "load_torque"])
 def test_peaks_are_those_of_a_dense_grid(servo, signal):
     model = st.BoundedServo(servo)
@@ -227,6 +232,7 @@ def test_a_small_step_that_moves_nothing_does_not_arrive(servo):
     assert math.isnan(found.arrival_time)
 
 
+@pytest.mark.long
 def test_lanes_and_runs_arrive_alike():
     """A deadband that differs from lane to lane decides for each; the third lane's is wider than the step."""
     model, command = st.PulseServo(st.load_servo("hitec-hs-755hb")), st.signals.step(0.0, 3.0, at=0.1, unit="deg")

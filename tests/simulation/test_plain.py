@@ -78,6 +78,7 @@ def run(text, *arguments):
     return json.loads(done.stdout)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("cases", "most"), [(CLOSED_FORM, 1e-12), (INTEGRATED, 1e-9)])
 def test_lanes_in_plain_python_are_the_engine(tmp_path, cases, most):
     out = tmp_path / "signals.npz"
@@ -92,6 +93,7 @@ def test_lanes_in_plain_python_are_the_engine(tmp_path, cases, most):
         np.testing.assert_allclose(values / size, plain / size, rtol=0.0, atol=most, err_msg=key)
 
 
+@pytest.mark.long
 def test_a_lane_beyond_floats_fails_alone():
     found = run(LOST)
     assert found["causes"] == [[1, found["cause"]]]
@@ -101,11 +103,13 @@ def test_a_lane_beyond_floats_fails_alone():
     assert found["off"] < 1e-12
 
 
+@pytest.mark.long
 def test_a_shared_supply():
     for name, (*fleet, a, b) in run(BUS).items():
         assert [a, b] == pytest.approx(fleet, rel=1e-12, abs=1e-12), name
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("servo", [0, 1])
 def test_a_tick_from_c(servo):
     found = run(FROM_C, str(servo))

@@ -8,6 +8,8 @@ from servotwin.models.terms.rooms import ACTS
 from servotwin.simulation.compile import reading, unread
 from servotwin.simulation.lanes.form_recipes import ALL_RUNS, side_by_side
 
+pytestmark = pytest.mark.long
+
 SILENT = ("shaft.b_out", "stops.restitution")
 BY_GAPS = side_by_side(5, "float64", False, False)
 find = unread.unread.__wrapped__  # without its own memory

@@ -4,8 +4,12 @@ import json
 import subprocess
 import sys
 
+import pytest
+
 from servotwin.simulation.lanes.form_recipes import parts_of
 from servotwin.simulation.recipes import all_recipes
+
+pytestmark = pytest.mark.long
 
 # Imports every module of the package; what cannot be imported here has no recipe that anybody could reach
 _EVERY_RECIPE = """

@@ -30,6 +30,7 @@ def test_all_sets_and_all_recipes_are_recorded():
     assert {recipe for one in TEXT["sets"].values() for recipe in one["recipes"]} == all_recipes()
 
 
+@pytest.mark.long(but="plain, longer: to 1e-09")
 @pytest.mark.parametrize(("name", "tolerance"), cases())
 def test_kernels_give_what_was_recorded(name, tolerance):
     if name in JOINTS:

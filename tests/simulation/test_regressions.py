@@ -10,6 +10,7 @@ from servotwin import loads
 from servotwin.errors import InputError
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("amplitude", "frequency"), [(0.3, 2.0), (0.2, 2.9)])
 def test_a_sine_is_followed_through_hundreds_of_stick_phases(servo, amplitude, frequency):
     """Releases and sticks alternated at one instant: the closed form lost the digits of a short motion."""

@@ -85,6 +85,7 @@ def test_what_is_said_of_a_run(case):
     assert all(f"{remark.time:g} s" in remark.words for remark in result.remarks)
 
 
+@pytest.mark.long(but="BoundedServo('hitec-hs-755hb')-float64")
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 @pytest.mark.parametrize("model", [PULSES, MEAN], ids=repr)
 def test_a_lane_has_the_remarks_of_the_run_alone(model, dtype):
@@ -97,6 +98,7 @@ def test_a_lane_has_the_remarks_of_the_run_alone(model, dtype):
     assert len(batch.remarks) > 2
 
 
+@pytest.mark.long(but="weak battery")
 @pytest.mark.parametrize("case", ["weak supply", "weak battery", "warm", "cold"])
 def test_a_lane_of_a_rare_servo_has_the_remarks_of_the_run_alone(case):
     model, command, load, expected = CASES[case]

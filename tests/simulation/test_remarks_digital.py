@@ -59,6 +59,7 @@ CASES = {
 }
 
 
+@pytest.mark.long(but="refused from a step on")
 @pytest.mark.parametrize("case", CASES)
 def test_what_is_said_of_a_run(case):
     model, command, load, expected = CASES[case]
@@ -88,6 +89,7 @@ def test_the_first_of_many_trips_is_named_with_its_tick():
     assert first == pytest.approx(2.0, abs=2e-3)
 
 
+@pytest.mark.long
 def test_a_lane_alone_has_the_remarks_that_its_batch_leaves_out():
     model, command, load, expected = CASES["just not lifted"]
     batch = st.simulate_many(model, [command, command], load=load, duration=END, output_times=[END],

@@ -21,6 +21,7 @@ def shown():
         "fleet": st.simulate_bus({"a": (MODEL, STEP)}, supply=BATTERY, duration=0.2)}
 
 
+@pytest.mark.long(but="state-State(time=0, output_angle=0, output_speed=0)")
 @pytest.mark.parametrize(("what", "text"), [
     ("servo", "Servo('hitec-hs-755hb', kind='analog', 34 values)"), ("signal", "Signal(angle, given in deg, 2 pieces)"),
     ("result", "Result(PulseServo('hitec-hs-755hb'), 1 s, COMPLETED, 1001 times)"),

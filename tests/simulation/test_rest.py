@@ -62,6 +62,7 @@ def lerobot(P, **changes):
     return st.DigitalServo(servo.replace({"friction.bearing_coulomb_torque": 0.0, **changes}))
 
 
+@pytest.mark.long(but="16-20.0-0.0")
 @pytest.mark.parametrize(("P", "way", "swing"), [(16, -3.0, 0.66), (16, 1.0, 0.66), (32, 20.0, 0.71), (16, 20.0, 0.0)])
 def test_a_free_output_shaft_without_friction_floats_from_tooth_to_tooth(P, way, swing):
     """shared/cases/digital-servo-never-rests: swings as measured there; at P 16 not after 20 deg."""
@@ -77,6 +78,7 @@ def test_a_free_output_shaft_without_friction_floats_from_tooth_to_tooth(P, way,
         assert result.remarks == ()
 
 
+@pytest.mark.long
 def test_a_shaft_that_swings_has_no_settling_time():
     command = st.signals.step(-3.0, 0.0, at=0.1, unit="deg")
     swings, rests = (st.simulate(lerobot(32, **changes), command, duration=2.5).step_metrics() for changes in (

@@ -132,6 +132,7 @@ def test_the_file_is_plain(result, tmp_path):
     assert text.count(b"\n") == len(result.time) + 1
 
 
+@pytest.mark.long(but="averaged")
 def test_what_was_commanded_can_be_commanded_again(result, tmp_path):
     result.save(tmp_path / "run.csv")
     columns = [column for column, (name, _) in COLUMNS.items()
@@ -175,6 +176,7 @@ def test_what_cannot_be_written_is_one_line_and_leaves_nothing(result, tmp_path,
     assert (tmp_path / "file").read_text() == "old"
 
 
+@pytest.mark.long(but="averaged-inductive")
 def test_a_full_disc_leaves_what_was_there(result, tmp_path, monkeypatch):
     path = tmp_path / "run.csv"
     path.write_text("precious")
@@ -229,6 +231,7 @@ def test_a_missing_package_is_named_in_one_line(result, monkeypatch, package, ca
         getattr(result, call)()
 
 
+@pytest.mark.long
 def test_saving_loads_neither(tmp_path):
     import subprocess
 

@@ -61,6 +61,7 @@ def test_bad_numbers_change_nothing():
     assert sims._numbers.columns.firmware.tobytes() == before
 
 
+@pytest.mark.long
 def test_elsewhere_they_are_laid_out_anew():
     sims = simulator()
     assert not sims._numbers.retuned(np.arange(3), {"firmware.speed_limit": 1.0})

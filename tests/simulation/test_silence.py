@@ -73,6 +73,7 @@ def test_each_stretch_is_that_of_a_servo_with_that_off_state(off, silence, featu
         np.testing.assert_allclose(state.values, whole.values, rtol=1e-8 if feature == "heat" else 1e-10, atol=1e-10)
 
 
+@pytest.mark.long(but="brake-coast-plain")
 @pytest.mark.parametrize("feature", FEATURES)
 @pytest.mark.parametrize(("off", "silence"), PAIRS)
 def test_plain_lanes_ticks_and_bus_are_one(off, silence, feature):

@@ -9,6 +9,7 @@ import servotwin as st
 PENDULUM = st.loads.Pendulum(mass=0.05, length=0.1) + st.loads.Constant(0.2)
 
 
+@pytest.mark.long(but="PulseServo")
 @pytest.mark.parametrize("model", [st.PulseServo, st.PulseServoInductive])
 def test_a_run_may_stop_wherever_its_bridge_switches(model):
     command = st.signals.step(60.0, 90.0, at=0.1, unit="deg")

@@ -148,6 +148,7 @@ def test_a_bad_state_names_its_lane():
             lambda: many(None, MASSES, initial={"winding_temperature": [300.0, float("nan")]}))
 
 
+@pytest.mark.long
 def test_every_state_can_be_a_start():
     """By signal name, and the first sample of that signal gives it back."""
     N = SERVO.gear.gear_reduction

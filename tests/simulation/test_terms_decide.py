@@ -48,6 +48,7 @@ def strings(folder):
                 yield file.relative_to(PACKAGE).as_posix(), node.value
 
 
+@pytest.mark.long
 def test_nobody_else_names_a_term():
     numbers = {path for path, _, _ in paths()}
     found = {(file, text) for folder in ("simulation", "models/engine") for file, text in strings(folder)
@@ -88,6 +89,7 @@ CASES = {  # numbers that ask for something
 }
 
 
+@pytest.mark.long(but="True")
 @pytest.mark.parametrize("behind", [True, False])
 def test_motions_of_a_kind_come_up_only_where_it_is_said(servo, behind):
     """`begin` in every mode that a servo with these terms may be in, where something of that is to be followed."""

@@ -9,6 +9,8 @@ import servotwin as st
 from reference.drivetrain_cases import TERMS, command_of, load_of, random_case, servo_of
 from reference.drivetrain_laws import make_plant
 
+pytestmark = pytest.mark.long
+
 DURATION = 0.15
 TIMES = np.linspace(0.0, DURATION, 16)
 ANGLES, ERRORS = (-0.5, 0.5, 1.5, 2.5, 3.5), (0.01, -0.01, 0.015, 0.0, -0.02)  # one table for all lanes

@@ -28,6 +28,7 @@ def one(model, load, seed, cuts, widths, torques=None):
 NO_TORQUE = st.loads.Recorded([0.0, 99.0], [0.0, 0.0])  # recorded: lanes go one by one
 
 
+@pytest.mark.long(but="PulseServo-coasting, with noise")
 @pytest.mark.parametrize(("kind", "name"), [
     *((st.PulseServo, name) for name in CASES), *((st.PulseServoInductive, name) for name in INDUCTIVE)])
 def test_it_is_many_simulators(servo, kind, name):
@@ -56,6 +57,7 @@ def test_it_is_many_simulators(servo, kind, name):
         np.testing.assert_allclose(sims[signal], expected, rtol=1e-9, atol=1e-10, err_msg=signal)
 
 
+@pytest.mark.long(but="worn potentiometer-PulseServo-float64")
 @pytest.mark.parametrize(("kind", "dtype"), [(st.PulseServo, "float64"), (st.PulseServo, "float32"),
                                              (st.PulseServoInductive, "float64"), (st.BoundedServo, "float64")])
 @pytest.mark.parametrize("name", CASES)
@@ -97,6 +99,7 @@ def test_a_thousand_cuts(servo, name):
             np.testing.assert_allclose(sims["output_speed"], state["output_speed"], rtol=1e-10, atol=1e-10)
 
 
+@pytest.mark.long(but="BoundedServo")
 @pytest.mark.parametrize("kind", [st.PulseServoInductive, st.BoundedServo])
 def test_the_other_models(servo, kind):
     model = model_of(servo, {}, kind)
@@ -156,6 +159,7 @@ def test_a_million_ticks(servo, kind):
     np.testing.assert_allclose(sims.time, 1000.0, rtol=1e-13)
 
 
+@pytest.mark.long(but="PulseServo-changes0")
 @pytest.mark.parametrize(("kind", "changes"), [(st.PulseServo, {}), (st.PulseServo, EVERYTHING),
                                                (st.PulseServoInductive, {})])
 def test_it_goes_on_from_what_was_saved(servo, kind, changes):
@@ -197,6 +201,7 @@ def test_lanes_are_reset_on_their_own(servo):
     assert not np.array_equal(*noise)
 
 
+@pytest.mark.long(but="PulseServo")
 @pytest.mark.parametrize("kind", [st.PulseServo, st.PulseServoInductive])
 def test_threads_and_neighbours_change_nothing(servo, kind):
     model = model_of(servo, {}, kind)
@@ -215,6 +220,7 @@ def test_threads_and_neighbours_change_nothing(servo, kind):
     np.testing.assert_array_equal(ends[0][1000:1003], few["output_angle"])
 
 
+@pytest.mark.long
 def test_float32_follows(servo):
     model = st.PulseServo(servo)
     ends = []
@@ -230,6 +236,7 @@ def test_float32_follows(servo):
 # --- what is imposed --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long(but="rigid")
 @pytest.mark.parametrize("changes", [{}, {"gear.backlash": 0.02, "gear.output_inertia": 1e-3}], ids=["rigid", "play"])
 def test_a_speed_that_is_set_is_an_impulse(servo, changes):
     model = model_of(servo, changes)
@@ -296,6 +303,7 @@ def test_a_bus_voltage_limits_a_servo_of_mean_voltage(servo):
     assert not imposed.status.any()
 
 
+@pytest.mark.long(but="limp after a while")
 @pytest.mark.parametrize("name", CASES)
 def test_a_memory_under_other_numbers_goes_on_from_where_it_stood(servo, name):
     """A motion that had begun with another inertia is not taken up again: the shaft would jump."""
@@ -313,6 +321,7 @@ def test_a_memory_under_other_numbers_goes_on_from_where_it_stood(servo, name):
         assert np.abs(one["output_speed"] - speed)[1] < 0.02
 
 
+@pytest.mark.long(but="frames as short as pulses")
 @pytest.mark.parametrize("name", CASES)
 def test_what_is_imposed_in_place_is_what_a_new_start_would_take(servo, name):
     """Inertias and voltages of some lanes at every tick, as another simulator would; a parameter builds all anew."""
@@ -390,6 +399,7 @@ def test_frames_change_their_length_while_memory_goes_on(servo, load, period):
     assert sims["error_time"][0] != sims["error_time"][1]
 
 
+@pytest.mark.long(but="plain")
 @pytest.mark.parametrize("more", [{}, {"gear.backlash": 0.01, "gear.output_inertia": 1e-3}], ids=["plain", "play"])
 def test_numbers_change_while_memory_goes_on(servo, more):
     changes = {"electronics.deadband": 20e-6, "load.torque": 0.2, "electronics.stretcher_gain": 90.0}
@@ -492,6 +502,7 @@ def test_motors_and_what_is_no_model_are_refused(servo):
             st.VectorSimulator(model, 2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", [st.AveragedServo, st.AveragedServoInductive])
 def test_averaged_servos_are_many_simulators_too(servo, kind):
     model = kind(servo.replace({"motor.armature_inductance": 5e-4}))

@@ -227,6 +227,7 @@ def test_what_a_bus_refuses(servo):
     assert math.isclose(float(sims["bus_voltage"][0]), 5.0)
 
 
+@pytest.mark.long
 def test_ticks_of_a_program_come_once_when_times_count_anew():
     """Calls as long as its ticks, over the instant from which times count anew: as without a shared supply."""
     model = st.DigitalServo(st.load_servo("feetech-sts3215-12v").replace({"gear.backlash": None}))

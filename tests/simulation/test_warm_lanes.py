@@ -96,6 +96,7 @@ def stop_and_go(one: Case, seed: int) -> None:
     np.testing.assert_allclose(found[0], found[1], rtol=0.0, atol=ACCURACY, err_msg=f"{seed} {one.said}")
 
 
+@pytest.mark.long(but="by_strides-49")
 @pytest.mark.parametrize(("kernels", "seed"), [(name, seed) for name, seeds in SEEDS.items() for seed in seeds])
 def test_some_servos(kernels, seed):
     one = case(seed)

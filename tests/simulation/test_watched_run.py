@@ -30,6 +30,7 @@ CASES = {
 }
 
 
+@pytest.mark.long(but="bounded")
 @pytest.mark.parametrize("case", CASES)
 def test_it_shows_what_a_whole_run_shows(case):
     model, load = CASES[case]

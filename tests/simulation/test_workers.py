@@ -80,6 +80,7 @@ def test_no_more_is_handed_in_than_is_done_soon():
     assert taken == [0, 1]
 
 
+@pytest.mark.long
 def test_a_killed_worker_of_a_pool_loses_nothing(tmp_path):
     with ProcessPoolExecutor(2, mp_context=SPAWN) as pool, Crew(pool) as crew:
         pieces = [(str(tmp_path / "killed"), k) for k in range(20)]
@@ -88,6 +89,7 @@ def test_a_killed_worker_of_a_pool_loses_nothing(tmp_path):
     assert (tmp_path / "killed").exists()
 
 
+@pytest.mark.long
 def test_work_that_kills_every_worker_is_said():
     said = r"executor: got 'BrokenProcessPool: .*, allowed: one that finishes every job"
     with ProcessPoolExecutor(1, mp_context=SPAWN) as pool, Crew(pool) as crew, pytest.raises(InputError, match=said):

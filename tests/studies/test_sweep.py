@@ -41,6 +41,7 @@ def lane(study, k):
                        load=st.loads.Inertia(values["load.inertia"]), seed=int(study.plan.seeds[k]))
 
 
+@pytest.mark.long
 def test_metrics_are_those_of_the_continuous_solution(study):
     exact = [lane(study, k) for k in range(12)]
     metrics = [result.step_metrics() for result in exact]
@@ -55,6 +56,7 @@ def test_metrics_are_those_of_the_continuous_solution(study):
     np.testing.assert_allclose(study.table["end_bus_voltage"][:12], [r["bus_voltage"][-1] for r in exact], atol=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("vary", [VARY, {**VARY, "electronics.one_shot_slope": "normal:1%"}])
 def test_the_peak_of_the_current_of_a_braked_servo(model, vary):
     study = st.sweep(model, STEP, duration=0.6, lanes=12, vary=vary)
@@ -204,6 +206,7 @@ def test_quantiles_are_values_of_lanes(study):
         study.quantiles([1.5])
 
 
+@pytest.mark.long
 def test_the_tornado_moves_one_parameter_at_a_time(model):
     study = st.sweep(model, STEP, duration=1.0, lanes=500, vary=VARY, load=st.loads.Inertia(2e-3))
     tornado = study.tornado("rise_time")
@@ -252,6 +255,7 @@ def test_draws_from_elsewhere(model, study):
         st.sweep(model, STEP, duration=1.0, draws=draws, vary={"motor.torque_constant": "normal:1%"})
 
 
+@pytest.mark.long
 def test_failed_lanes_are_named_and_have_no_metrics(model):
     draws = {"load.spring.stiffness": [0.1, 1e27, 0.2]}
     study = st.sweep(model, STEP, duration=1.0, draws=draws, load=st.loads.Spring(0.1))

@@ -194,6 +194,7 @@ FULL = """
 """
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not hasattr(resource, "RLIMIT_FSIZE"), reason="no limit of file sizes here")
 def test_a_file_that_cannot_be_written_is_one_line(model, tmp_path):
     done = subprocess.run([sys.executable, "-c", textwrap.dedent(FULL), "20000"], cwd=tmp_path, capture_output=True,

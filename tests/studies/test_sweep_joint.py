@@ -67,6 +67,7 @@ def test_of_the_nominal_numbers_the_file_follows(kind):
         assert set(found) == together.covers & given
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore:.*contradicts itself")  # the sheet of the Geekservo
 @pytest.mark.parametrize("name", ["hitec-hs-485hb", "geekservo-2kg", "hitec-hs-422"])
 def test_each_lane_has_the_speed_and_the_torque_that_were_drawn(name):
@@ -89,6 +90,7 @@ def test_each_lane_has_the_speed_and_the_torque_that_were_drawn(name):
     assert np.all(at_the_end("output_speed", torque=torque * (1.0 + 1e-4)) <= 0.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("servo", [st.load_servo("hitec-hs-485hb"), without_sheet("hitec-hs-485hb")],
                          ids=["sheet", "hand"])
 def test_the_gear_reduction_alone_moves_nothing_at_the_output(servo):
@@ -112,6 +114,7 @@ def test_the_gear_reduction_alone_moves_nothing_at_the_output(servo):
         np.testing.assert_allclose(lanes[name] * reduction**power, lanes[name][0] * reduction[0]**power, rtol=1e-12)
 
 
+@pytest.mark.long(but="755-PulseServo")
 @pytest.mark.parametrize("kind", MODELS)
 @pytest.mark.parametrize("servo", [st.load_servo("hitec-hs-755hb"), st.load_servo("hitec-hs-485hb"),
                                    without_sheet("hitec-hs-485hb")], ids=["755", "485", "hand"])
@@ -141,6 +144,7 @@ def test_what_the_averaged_models_have_of_the_chip_is_the_mean_of_its_pulses():
         assert gains[0] == pytest.approx(gains[1], rel=1e-5)
 
 
+@pytest.mark.long(but="hitec-hs-755hb-180.0")
 @pytest.mark.parametrize(("name", "degrees"), [
     ("hitec-hs-485hb", 90.0), ("hitec-hs-755hb", 180.0), ("towerpro-sg90", 85.0), ("hitec-hs-55", 85.0),
     ("miuzei-ms18", 60.0)])
@@ -166,6 +170,7 @@ def test_a_servo_made_by_hand_draws_what_acts_at_the_output():
     assert not set(MOTOR) & set(found)
 
 
+@pytest.mark.long
 def test_the_torque_constant_is_held_where_the_gear_reduction_alone_is_uncertain():
     exact = {name: replace(st.load_servo("hitec-hs-485hb").source(name), lower=None, upper=None)
              for name in ("motor.torque_constant", "motor.back_emf_constant")}
@@ -176,6 +181,7 @@ def test_the_torque_constant_is_held_where_the_gear_reduction_alone_is_uncertain
                                rtol=1e-12)
 
 
+@pytest.mark.long
 def test_different_friction_both_ways_stays_so():
     other = Quantity(value=9e-4, unit="N m", origin="measured", source="me", std=1e-5)
     servo = without_sheet("hitec-hs-485hb").replace({"friction.coulomb_torque_backward": 9e-4})
@@ -206,6 +212,7 @@ def test_what_is_varied_by_name_is_varied_alone():
     assert np.all(study.table["motor.torque_constant"] != study.table["motor.back_emf_constant"])
 
 
+@pytest.mark.long
 def test_a_single_number_of_the_sheet_can_be_varied():
     model = st.PulseServo(st.load_servo("hitec-hs-485hb"))
     study = st.sweep(model, STEP, duration=0.02, lanes=8, metrics=["peak_current"],
@@ -309,6 +316,7 @@ def test_the_slew_rate_of_a_fleet_is_that_of_its_sheet():
     assert {"gear.gear_reduction", "electronics.command_pulse_offset", "stops.restitution"} <= set(tornado.still)
 
 
+@pytest.mark.long
 def test_a_study_of_what_a_file_states_goes_on_to_the_last_bit(tmp_path):
     model = st.PulseServo(st.load_servo("hitec-hs-485hb"))
     options = {"duration": 0.1, "vary": stated(model), "lanes": 32, "chunk": 8, "directory": tmp_path / "study"}

@@ -152,6 +152,7 @@ def test_a_study_that_says_more_is_another_one(model, folder):
                  metrics=["end_output_angle"], directory=folder, resume=True)
 
 
+@pytest.mark.long
 def test_failures_keep_their_lanes_in_every_chunk(model):
     stiffness = np.full(9, 0.1)
     stiffness[[2, 7]] = 1e27

@@ -31,6 +31,7 @@ def of(load, command, seed):
                        command=command)
 
 
+@pytest.mark.long(but="free-step")
 @pytest.mark.parametrize(("load", "command"), PAIRS)
 def test_bounded_servo(load, command):
     bounded_agrees(of(load, command, 0))
@@ -50,6 +51,7 @@ def bounded_agrees(case):
     np.testing.assert_allclose(result["output_speed"], exact.w, rtol=0.0, atol=100 * tolerance)
 
 
+@pytest.mark.long(but="constant-chirp")
 @pytest.mark.parametrize(("load", "command"), FIRST)
 def test_averaged_servo(load, command):
     case = of(load, command, 1000)
@@ -58,6 +60,7 @@ def test_averaged_servo(load, command):
     np.testing.assert_allclose(result["output_angle"], exact.q, rtol=0.0, atol=1e-9)
 
 
+@pytest.mark.long(but="spring-step")
 @pytest.mark.parametrize(("load", "command"), FIRST)
 def test_averaged_servo_with_inductance(load, command):
     case = of(load, command, 2000)

@@ -169,6 +169,7 @@ def check_bus(one: Fleet) -> None:
             assert getattr(own.energy, part) == pytest.approx(trace.energy[part], rel=1e-8, abs=near)
 
 
+@pytest.mark.long(but="two, calls of 1 ms")
 @pytest.mark.parametrize("name", QUICK)
 def test_few_servos_on_one_supply_are_those_of_the_reference(name):
     one, call = QUICK[name]
@@ -182,6 +183,7 @@ def test_few_servos_on_one_supply_are_those_of_the_reference(name):
         assert "limit" in dict(zone[::-1] for zone in found.traces.zones)
 
 
+@pytest.mark.long(but="a regulator")
 @pytest.mark.parametrize("name", ["a brown-out", "a regulator"])
 def test_a_fleet_goes_and_spends_as_the_reference(name):
     check_bus(QUICK[name][0])
@@ -235,6 +237,7 @@ def test_servos_that_are_told_the_same_do_the_same(n, goal, torque, R_b, call, l
         assert np.abs(getattr(here, name) - getattr(alone, name)).max() / scale <= ANGLE
 
 
+@pytest.mark.long
 def test_one_servo_on_a_bus_is_the_servo_alone():
     one = fleet(31, 1, 0.5, changes=FREE, unlike=False, duration=0.1)
     on, alone = fleets.lanes(one, 2e-3), fleets.lanes(one, 2e-3, alone=(0,))
@@ -260,6 +263,7 @@ def test_the_order_of_servos_changes_nothing(unlike):
     assert np.abs(here.output_angle[:, turned] - other.output_angle).max() <= 1e-12
 
 
+@pytest.mark.long
 def test_one_that_is_taken_off_the_bus_leaves_the_others_alone():
     one = fleet(33, 3, 0.5, changes=FREE, duration=0.06)
     here = fleets.lanes(one, 2e-3, alone=(1,))

@@ -16,6 +16,8 @@ from leg_cases import GOALS, INERTIAS, SERVOS, TORQUES, goals_of, values_of, wri
 from reference import digital
 from validation.test_drivetrain_stops import around
 
+pytestmark = pytest.mark.long
+
 DURATION = 1.0  # s
 TIMES = np.arange(1000) * 1e-3 + 3.7e-4  # s, none at a tick
 RUNS, QUICK = 48, (2, 12)

@@ -52,6 +52,7 @@ def servos() -> list[tuple[Case, Trace]]:
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [18, 31])
 def test_events_and_kinks_within_a_step_cost_no_accuracy(seed: int) -> None:
     """With states of events from the interpolation it is 2e-9 and 2e-11 rad; with kinks within steps 5e-12 for one."""

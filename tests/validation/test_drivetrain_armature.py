@@ -52,6 +52,7 @@ SMOOTH = {
 }
 
 
+@pytest.mark.long(but="drops")
 @pytest.mark.parametrize("name", SMOOTH)
 def test_without_inductance_is_the_limit_of_a_small_one(name):
     """One drive without switching, where the start of the shaft is as late as the current: order 1 in L_a."""

@@ -30,6 +30,7 @@ def check(result):
     assert energy.stops >= -1e-13 * turnover  # of rounding, of times too
 
 
+@pytest.mark.long(but="None-coast-sine")
 @pytest.mark.parametrize("command", [STEP, SINE], ids=["step", "sine"])
 @pytest.mark.parametrize("off", ["brake", "coast"])
 @pytest.mark.parametrize("inductance", [None, 4e-4])
@@ -41,6 +42,7 @@ def test_with_every_term_on(servo, command, off, inductance):
     check(st.simulate(model, command, duration=0.2, load=LOAD, seed=3).raise_if_failed())
 
 
+@pytest.mark.long(but="coast+inductance+stops")
 @pytest.mark.parametrize("terms", [*MIXTURES, {"backlash"}, {"backlash", "coast", "coulomb", "limit", "stops"}],
                          ids=lambda terms: "+".join(sorted(terms)))
 def test_in_mixtures(terms):
@@ -71,6 +73,7 @@ def test_it_is_the_energy_of_the_reference():
 # --- angle and speed --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long(but="heat")
 @pytest.mark.parametrize("terms", [{"stribeck"}, {"m6", "stribeck"}, {"heat"}, {"backlash"}, {"pendulum"},
                                    {"inductance", "backlash", "heat"}], ids=lambda terms: "+".join(sorted(terms)))
 def test_the_angle_is_the_integral_of_the_speed(terms):

@@ -46,6 +46,7 @@ def gaps(law, case, steps):
     return [float(np.max(np.abs(creep(R, law, voltage, END, h, start=angle[0])[0] - angle[1:]))) for h in steps]
 
 
+@pytest.mark.long(but="False-21-M3")
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize(("inductance", "seed"), [(False, 21), (True, 24)])
 def test_small_steps_come_to_the_same_angle(law, inductance, seed):

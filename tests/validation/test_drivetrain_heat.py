@@ -46,6 +46,7 @@ def drive_begin(values):
     return next(event.time for event in result.events if event.kind == "drive forward")
 
 
+@pytest.mark.long
 def test_current_that_has_to_rise_first_warms_as_much():
     """With inductance the same, but for the rise: L/R_a of 0.1 ms in some 100 ms of each mass."""
     times = np.array([0.05, 0.2, 0.6])
@@ -67,6 +68,7 @@ def test_a_stalled_motor_ends_at_the_steady_temperatures():
     assert T_h == pytest.approx(want.housing, rel=1e-5)
 
 
+@pytest.mark.long(but="None")
 @pytest.mark.parametrize("inductance", [None, 3e-4])
 def test_it_cools_by_two_exponentials_when_the_drive_ends(inductance):
     """One pulse's drive of 100 ms; from the last of the current on, the closed form without power."""
@@ -82,6 +84,7 @@ def test_it_cools_by_two_exponentials_when_the_drive_ends(inductance):
     np.testing.assert_allclose(T_h, want.housing, rtol=0.0, atol=1e-8)
 
 
+@pytest.mark.long(but="heat")
 @pytest.mark.parametrize("terms", [{"heat"}, {"heat", "coast", "inductance"}, {"heat", "backlash", "limit"}],
                          ids=lambda terms: "+".join(sorted(terms)))
 def test_what_the_copper_loses_is_what_warms(terms):

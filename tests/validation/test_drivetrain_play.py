@@ -23,6 +23,7 @@ LOOSE = {"gear.backlash": PLAY, "gear.output_inertia": OUTPUT}
 # --- impact -----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long(but="backlash+coast+inductance")
 @pytest.mark.parametrize("terms", [{"backlash"}, {"backlash", "inductance", "coast"},
                                    {"backlash", "stribeck", "m6", "heat"}], ids=lambda terms: "+".join(sorted(terms)))
 def test_momentum_is_kept_where_the_flanks_meet(terms):
@@ -114,6 +115,7 @@ def test_dead_time_of_a_full_drive_across_the_play(way):
     assert result.at("output_speed", [meets - 1e-9])[0] == 0.0
 
 
+@pytest.mark.long
 def test_each_reversal_of_a_sine_costs_the_play():
     """The load's own friction stops the output; the motor crosses alone, as long as the play takes at its speed."""
     dry = {"friction.coulomb_torque_forward": 0.05 / N, "friction.coulomb_torque_backward": 0.05 / N}

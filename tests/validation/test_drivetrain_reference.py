@@ -92,6 +92,7 @@ def tolerance_of(terms: set[str]) -> float:
     return ANGLE[not terms & INTEGRATED]
 
 
+@pytest.mark.long(but="spring")
 @pytest.mark.parametrize("term", sorted(TERMS))
 def test_each_effect(term):
     cases = [random_case(seed, frozenset({term})) for seed in range(FEW)]
@@ -104,6 +105,7 @@ def test_each_effect_in_many_servos(term):
     assert left_out([random_case(seed, frozenset({term})) for seed in range(FEW, MANY)], tolerance_of({term})) <= 1
 
 
+@pytest.mark.long(but="backlash+heat+limit+m6+pendulum+stribeck")
 @pytest.mark.parametrize("terms", MIXTURES, ids=lambda terms: "+".join(sorted(terms)))
 def test_effects_mixed(terms):
     case = replace(random_case(100, frozenset(terms)), duration=SHORT)
@@ -125,6 +127,7 @@ def test_any_half_of_the_effects(seed):
     assert left_out([replace(random_case(seed, terms), duration=SHORT)], tolerance_of({"backlash"})) == 0
 
 
+@pytest.mark.long(but="16")
 @pytest.mark.parametrize("seed", [11, 16])
 def test_a_step_that_is_tried_far_too_long_is_only_tried(seed):
     """After a rest the integrator tries a hundred times L/R; current, heat and angle then leave all numbers behind."""
@@ -132,6 +135,7 @@ def test_a_step_that_is_tried_far_too_long_is_only_tried(seed):
     assert left_out([replace(random_case(seed, frozenset(terms)), duration=0.1)], tolerance_of(terms)) == 0
 
 
+@pytest.mark.long
 def test_an_output_that_goes_to_and_fro_between_motor_and_stop_comes_to_rest():
     """Its blows, ever smaller, came one after the other without time between, so that the run ended there."""
     terms = {"backlash", "heat", "inductance", "m6", "spring", "stops", "stribeck", "table", "wiper"}

@@ -13,6 +13,8 @@ from reference.drivetrain import simulate_case
 from reference.drivetrain_cases import random_case
 from validation.test_drivetrain_reference import COARSE, on_a_knife_edge, simulate
 
+pytestmark = pytest.mark.long
+
 LAWS = ({"stribeck"}, {"stribeck", "m4"}, {"stribeck", "m6"}, {"stribeck", "limit"}, {"stribeck", "m5", "coast"})
 ACCURACIES = (1e-7, 1e-9, 1e-11)
 FEW, MANY = 20, 100

@@ -17,6 +17,8 @@ from reference.drivetrain import simulate_case
 from reference.drivetrain_cases import random_case
 from validation.test_drivetrain_reference import COARSE, on_a_knife_edge, simulate
 
+pytestmark = pytest.mark.long
+
 ALL = {"inductance", "heat", "m6", "stribeck", "backlash", "limit", "coast", "wiper"}
 LAWS = ({"heat"}, {"inductance", "heat"}, {"inductance", "m5"}, {"inductance", "heat", "m5", "coast"}, ALL)
 ACCURACIES = (1e-7, 1e-9, 1e-11)

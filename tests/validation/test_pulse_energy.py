@@ -10,6 +10,7 @@ from validation.test_pulse_reference import simulate
 pytestmark = pytest.mark.filterwarnings("ignore:.*comes at", "ignore:.*faster than any servo")
 
 
+@pytest.mark.long(but="1022")
 @pytest.mark.parametrize("seed", range(1000, 1040))
 def test_energy_balances(seed):
     case = random_pulse_case(seed)

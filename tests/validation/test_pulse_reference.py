@@ -87,6 +87,7 @@ def knife_edge(case: PulseCase, exact: PulseRun, times: np.ndarray, closed: bool
     return f"margin {exact.margin:.3g} s, rounding moves the angle {spread:.3g} rad"
 
 
+@pytest.mark.long(but="87")
 @pytest.mark.parametrize("seed", range(DEFAULT))
 def test_random_case(seed: int) -> None:
     compare(random_pulse_case(seed))
@@ -98,6 +99,7 @@ def test_random_case_more(seed: int) -> None:
     compare(random_pulse_case(seed))
 
 
+@pytest.mark.long
 def test_hardly_any_case_may_be_skipped() -> None:
     """At most 2 % of the cases are so sensitive that rounding alone could move them by the tolerance."""
     times = [0.5, 0.75, 1.0]

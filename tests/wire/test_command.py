@@ -32,6 +32,7 @@ def files(folder):
     (folder / "torn.csv").write_text("time_s,1_deg\n0,1\n1\n", "utf-8")
 
 
+@pytest.mark.long(but="words7-Dynamixel MX")
 @pytest.mark.parametrize(("words", "said"), [
     ([], "no servos"),
     (["so202"], "so202"),
@@ -91,6 +92,7 @@ def test_without_pseudo_terminals(monkeypatch, capfd):
     assert "out of pty devices" in capfd.readouterr().err
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals here")
 def test_a_link_comes_and_goes(tmp_path, capfd):
     link = tmp_path / "arm"

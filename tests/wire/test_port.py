@@ -68,6 +68,7 @@ def test_a_servo_answers_at_its_own_speed_alone(feetech_sdk, code, rate):
     assert packets.ping(port, 2) == (777, 0, 0)
 
 
+@pytest.mark.long
 def test_dynamixel_sdk(koch):
     sdk = pytest.importorskip("dynamixel_sdk", reason="dynamixel-sdk is not installed")
     port, packets = sdk.PortHandler(koch["port"]), sdk.PacketHandler(2.0)
@@ -112,6 +113,7 @@ def test_ten_openings_a_killed_client_and_two_at_once(so101):
     assert so101["process"].poll() is None
 
 
+@pytest.mark.long
 def test_what_is_stored_outlives_the_process(tmp_path):
     for offset, found in ((321, 0), (None, 321)):
         with served("--servo", "1=feetech-sts3215-12v", "--keep", tmp_path / "kept.json") as facts, \
@@ -125,6 +127,7 @@ def test_what_is_stored_outlives_the_process(tmp_path):
     assert not [name for name in os.listdir(tmp_path) if name.startswith(".")]
 
 
+@pytest.mark.long
 def test_tcp(tmp_path):
     with served("--servo", "7=feetech-sts3215-12v", "--tcp", "0") as facts:
         host, port = facts["port"].removeprefix("socket://").split(":")

@@ -12,6 +12,8 @@ from servotwin.bench.bus.ticks import Ticks
 from servotwin.bench.recording import About, Limits, experiments, record
 from wire_talk import STS
 
+pytestmark = pytest.mark.long
+
 pytest.importorskip("scservo_sdk", reason="feetech-servo-sdk is not installed")
 FREE = ["output_torque_constant", "output_coulomb_torque", "output_inertia"]
 LIMITS = Limits(kind="angle", low=-1.0, high=1.0, voltage=12.0, current=3.0)

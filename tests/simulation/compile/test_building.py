@@ -89,6 +89,7 @@ def folder(filled, tmp_path):
     return shutil.copytree(filled, tmp_path / "cache")
 
 
+@pytest.mark.long
 def test_what_has_been_made_is_found_again(folder):
     before = sorted((path.name, path.stat().st_mtime_ns) for path in folder.iterdir())
     assert run(folder) == ("compiled", [])
@@ -112,6 +113,7 @@ BAD = {
 }
 
 
+@pytest.mark.long(but="fails without a word")
 @pytest.mark.parametrize("name", BAD)
 def test_a_compiler_of_no_use_is_said_and_kernels_run_in_plain_python(name, tmp_path):
     lines, why = BAD[name]
@@ -201,6 +203,7 @@ def test_a_library_that_cannot_be_loaded_is_made_anew(here, name, monkeypatch, c
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.long
 def test_a_library_without_the_kernel_is_made_anew_for_the_next_process(folder):
     without_the_kernel(only(folder))
     way, errors = run(folder)  # the system gives what it has loaded from there once more
@@ -350,6 +353,7 @@ def test_an_index_of_others_is_not_read(here, capsys):
     assert index.stat().st_mode & 0o777 == 0o600
 
 
+@pytest.mark.long
 @pytest.mark.skipif(os.name == "nt" or os.geteuid() != 0 or shutil.which("setpriv") is None, reason="two users")
 def test_another_user_gets_nothing_of_a_folder_that_all_may_write(tmp_path, monkeypatch):
     """Who comes first makes the folder, for itself alone; who comes second is told and makes its own kernels."""
@@ -380,6 +384,7 @@ def as_nobody(path):
     return path
 
 
+@pytest.mark.long
 def test_a_cache_is_made_for_its_user_alone(tmp_path):
     old = os.umask(0o002)
     try:
@@ -450,6 +455,7 @@ def test_a_library_for_a_newer_c_library_is_made_anew(here, monkeypatch):
 # --- what is made once ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_of_four_processes_at_once_one_compiles(tmp_path):
     compiler, notes = counting(tmp_path)
     cache = tmp_path / "cache"
@@ -459,6 +465,7 @@ def test_of_four_processes_at_once_one_compiles(tmp_path):
     assert sorted(path.suffix for path in cache.iterdir()) == [".json", ".lock", ".so"]
 
 
+@pytest.mark.long
 def test_an_edited_docstring_compiles_nothing_and_edited_code_does(tmp_path):
     package = tmp_path / "package" / "servotwin"
     shutil.copytree(Path(servotwin.__file__).parent, package,
@@ -492,6 +499,7 @@ def count(n: int):
 """
 
 
+@pytest.mark.long
 def test_threads_run_kernels_at_the_same_time(tmp_path):
     """While a kernel counts, Python goes on in another thread."""
     from simulation.compile.by_hand import Both

@@ -50,6 +50,7 @@ def alike(ours, theirs):
         assert ours == (pytest.approx(theirs, rel=1e-12) if isinstance(theirs, float) else theirs)
 
 
+@pytest.mark.long(but="angles")
 @pytest.mark.parametrize("kind", SERVOS)
 def test_a_table_is_read_and_laid_over_its_twin_as_by_the_server(folder, tmp_path, kind):
     text, scene_text = table_of(kind, tmp_path)

@@ -30,6 +30,7 @@ def numbers_in(record, path=""):
             yield f"{path}{name}", record[name].item()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", SERVO_MODELS)
 def test_a_servo_is_what_its_model_makes_of_it(kind):
     looked = 0

@@ -37,6 +37,7 @@ def exported(*options):
     return CliRunner().invoke(app, ["web", "--export", *map(str, options)])
 
 
+@pytest.mark.long
 def test_what_cannot_be_written_is_said_in_a_line(tmp_path, monkeypatch):
     there = tmp_path / "there.html"
     there.write_text("mine")
@@ -53,6 +54,7 @@ def test_what_cannot_be_written_is_said_in_a_line(tmp_path, monkeypatch):
     assert [path.name for path in tmp_path.iterdir()] == ["there.html"]
 
 
+@pytest.mark.long
 def test_a_bench_as_a_file_is_small_and_asks_for_nothing(tmp_path):
     name = "</script><script>document.title = 'planted'</script>"
     (tmp_path / "scene.toml").write_text(f'format = 1\nname = "{name}"\n[[servo]]\nid = "hitec-hs-755hb"\n')

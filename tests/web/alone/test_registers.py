@@ -24,6 +24,7 @@ def at(table, value):
             for one, slope in zip(*made, strict=True)]
 
 
+@pytest.mark.long(but="dynamixel-ax-12a")
 @pytest.mark.parametrize("name", SERVOS)
 def test_tables_of_registers_are_the_laws(name):
     servo, rng = st.load_servo(name), random.Random(name)

@@ -11,12 +11,14 @@ from bench_scenes import ON_A_SUPPLY, by_python, drawn
 from servotwin.web.live import LiveBench, read_scene
 
 
+@pytest.mark.long
 def test_some_benches(folder):
     refused, moved = compare(partial(benches, folder), range(12))
     assert refused > 3
     assert moved > 5
 
 
+@pytest.mark.long
 def test_benches_with_a_control_circuit(folder):
     seeds = [seed for seed in range(60) if "[control]" in drawn(seed)["scene"]]
     _, moved = compare(partial(benches, folder), seeds)
@@ -24,6 +26,7 @@ def test_benches_with_a_control_circuit(folder):
     assert moved > 2
 
 
+@pytest.mark.long
 def test_programs_and_chips_share_a_supply(folder):
     draw = partial(drawn, servos=3, kinds=ON_A_SUPPLY)
     seeds = [seed for seed in range(150) if "[supply]" in draw(seed)["scene"] and "DigitalServo" in draw(seed)["scene"]

@@ -19,6 +19,7 @@ def scene_of(text):
     return f"format = 1\n[[servo]]\nfile = {json.dumps(text, ensure_ascii=False)}\n[load]\ninertia = 1e-4\n"
 
 
+@pytest.mark.long
 def test_the_file_of_every_catalog_servo_is_the_packages(folder):
     scenes, servos = [], []
     for name in catalog_names():
@@ -57,6 +58,7 @@ def test_a_file_with_other_numbers_in_other_units_is_read(folder):
     assert made.motor.rotor_inertia == servo.motor.rotor_inertia
 
 
+@pytest.mark.long(but="<lambda>-no electronics")
 @pytest.mark.parametrize(("mistake", "words"), [
     (lambda text: text.replace('name = "hitec-hs-755hb"', 'name = "mine"'), "'mine'"),
     (lambda text: text.replace("\ndeadband = ", "\ndead_band = "), "'electronics.dead_band'"),

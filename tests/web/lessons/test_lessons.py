@@ -65,6 +65,7 @@ def test_vibration_ends_when_the_knob_has_its_own_supply():
     assert np.ptp(still) < 0.5
 
 
+@pytest.mark.long
 def test_brown_out_comes_where_two_start_at_once():
     run = run_of("brown-out", 7.5)
     alone, both, mended = ([degrees(run, k, *span).mean() for k in (0, 1)] for span in
@@ -85,6 +86,7 @@ def test_play_lets_the_horn_move_while_the_motor_stands():
     assert 1.2 < np.ptp(degrees(run, 1, 1.0, 5.0)) < 3.0  # 2 degrees of play, and what the servo makes of it
 
 
+@pytest.mark.long
 def test_p_is_a_stiffness():
     run = run_of("p-gain", 4.0)
     soft, stiff = (-degrees(run, k, 3.5, 4.0).mean() for k in (0, 1))

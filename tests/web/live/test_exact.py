@@ -52,6 +52,7 @@ def simulated(servo: str, model: str, parameters: dict, times: list[float]) -> l
     return found
 
 
+@pytest.mark.long(but="hitec-hs-755hb-PulseServo-parameters0")
 @pytest.mark.parametrize(("servo", "model", "parameters"), CASES)
 def test_the_trace_is_that_of_a_simulator_whatever_the_pace(servo, model, parameters):
     bench, pace = LiveBench(read_scene(scene_text(servo, model, parameters))), random.Random(3)
@@ -65,6 +66,7 @@ def test_the_trace_is_that_of_a_simulator_whatever_the_pace(servo, model, parame
     assert max(abs(angle - other) for (_, angle), other in zip(shown, expected, strict=True)) < 1e-9
 
 
+@pytest.mark.long(but="hitec-hs-755hb-PulseServo-parameters1")
 @pytest.mark.parametrize(("servo", "model", "parameters"), CASES)
 def test_a_text_repeats_the_bench_to_the_last_bit(servo, model, parameters):
     text = scene_text(servo, model, parameters)

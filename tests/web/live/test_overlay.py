@@ -27,6 +27,7 @@ def of_a_bench(tmp_path, load: dict, rate: float = 50.0) -> tuple[st.Log, LiveBe
     return st.read_logs(file)[0], bench
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("load", "rate"), [({}, 50.0), ({"inertia": 1e-3, "mass": 0.05}, 50.0), ({}, 80.0)])
 def test_the_table_of_a_bench_lies_on_its_twin(tmp_path, load, rate):
     log, bench = of_a_bench(tmp_path, load, rate)
@@ -43,6 +44,7 @@ def load_now(bench):
     return load_of(bench.scene())
 
 
+@pytest.mark.long
 def test_a_rig_is_fitted_and_never_makes_it_worse(tmp_path):
     log, bench = of_a_bench(tmp_path, {})
     servo = bench.now_models[0].servo
@@ -84,6 +86,7 @@ def test_a_table_holds_the_pulse_of_a_frame_from_its_edge_on(tmp_path):
     assert log.time[log.changes].tolist() == [0.5]
 
 
+@pytest.mark.long
 def test_a_fitted_servo_stands_beside_or_instead_with_load_and_command_of_now():
     scene = Scene(servos=(SceneServo(id=ID, model="PulseServo"), SceneServo(id=ID, model="BoundedServo")), seed=4)
     bench = LiveBench(scene)

@@ -22,6 +22,7 @@ def said(bench: LiveBench, until: float) -> list[tuple[float, str]]:
     return found
 
 
+@pytest.mark.long
 def test_a_bus_servo_without_friction_behind_its_play_is_told_once_and_again_after_an_action():
     """shared/cases/digital-servo-never-rests: about 0.7 deg at P 32."""
     swinging = bench(0.0)

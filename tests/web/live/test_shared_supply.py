@@ -42,6 +42,7 @@ def angles(bench: LiveBench) -> list[float]:
     return [row[names.index("output_angle")] for row, names in zip(bench.rows, bench.columns, strict=True)]
 
 
+@pytest.mark.long(but="servos0-more0")
 @pytest.mark.parametrize(("servos", "more"), CASES)
 def test_they_do_what_a_fleet_does(servos, more):
     supply = SUPPLY | more
@@ -106,6 +107,7 @@ def test_numbers_pushes_and_the_supply_change_as_time_goes_on():
     assert [one.servo.get("supply.internal_resistance") for one in bench.now_models] == [3.0, 3.0]
 
 
+@pytest.mark.long
 def test_how_time_is_cut_changes_nothing():
     def run(pace: random.Random) -> list[float]:
         bench = LiveBench(read_scene(scene_text([(ANALOG, "PulseServo", "")] * 3, SUPPLY)))

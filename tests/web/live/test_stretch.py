@@ -42,6 +42,7 @@ def rows_of(kind, servo, values, load, rate, switches):
     return result, dict(zip(COLUMNS, np.array(screen.rows.rows).T, strict=True)), names_of(model, sim.load)
 
 
+@pytest.mark.long(but="AveragedServoInductive-hitec-hs-755hb-0-7")
 @pytest.mark.parametrize(("kind", "servo", "values", "load"), CASES, ids=IDS)
 def test_all_signals_are_those_of_a_result(kind, servo, values, load):
     result, rows, names = rows_of(kind, servo, values, load, 97.3, 0)

@@ -61,6 +61,7 @@ def test_forty_watch_one_stream_and_the_next_is_told(school):
     assert comes_in(address, code)
 
 
+@pytest.mark.long
 def test_codes_are_not_tried_out_one_after_the_other(school):
     address, teacher, code = school
     said = []

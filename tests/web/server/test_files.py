@@ -40,6 +40,7 @@ def test_every_module_that_a_module_wants_is_there(server):
         assert {name.rpartition("/")[0] + "/" + one for one in wanted} <= links, name
 
 
+@pytest.mark.long(but="/page/")
 @pytest.mark.parametrize("path", ["/page/../server/app.py", "/page/%2e%2e/server/app.py", "/page/js/../../__init__.py",
                                   "/page//etc/passwd", "/page/", "/page/js", "/page/js/main.js%00", "/page/C:\\x"])
 def test_what_is_no_file_of_the_page_is_not_found(server, path):

@@ -88,6 +88,7 @@ def test_what_is_no_message_is_refused_in_a_line(server, text):
         assert page.until("refused")["message"]
 
 
+@pytest.mark.long
 def test_the_ninth_visitor_is_told_and_a_place_gets_free():
     with running() as (address, _):
         pages = [Page(address) for _ in range(8)]
@@ -139,6 +140,7 @@ def test_answers_say_what_a_browser_may_do(server):
     assert headers["x-content-type-options"] == "nosniff"
 
 
+@pytest.mark.long
 def test_the_catalog_and_its_curves(server):
     catalog = json.loads(opened(server + "api/catalog")[2])
     curves = json.loads(opened(server + "api/curves/hitec-hs-755hb")[2])
