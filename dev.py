@@ -26,6 +26,7 @@ TASKS = {
     "test": "set up, then run the quick tests (4 minutes, two more in a fresh clone); --long: the longer ones as well",
     "validation": "set up, then run the slow tests: validation and coverage, browser (20 minutes more)",
     "explore": "set up, then run the random tests from another seed on, which is printed or given",
+    "mutate": "set up, then plant so many bugs, one at a time, and note in tests/mutants.json which tests see them",
     "sanitize": "set up, then run kernels with what gcc checks of memory and arithmetic (or the tests that are named)",
     "check": "set up, then lint, types, import rules",
     "examples": "set up, then run every script of examples/",
@@ -77,22 +78,26 @@ def kernels(arguments: list[str]) -> None:
     run("python", "tests/kernels.py", *arguments)
 
 
-def test(arguments: list[str], marks: str = "not slow and not long", budgets: str = "quick") -> None:
-    """Run tests on two processes: the quick ones, with `--long` those that are longer too, or what is named."""
-    if "--long" in arguments:
-        arguments, marks, budgets = [a for a in arguments if a != "--long"], "not slow", "long"
+def pytest(arguments: list[str], marks: str, budgets: str) -> None:
+    """Run tests on two processes: those with marks, or what is named."""
+    command = ["python", "-m", "pytest", "-n", "2", "--dist", "worksteal"]
     if any(a == "-m" or not a.startswith("-") for a in arguments):
-        run("python", "-m", "pytest", "-n", "2", "--dist", "worksteal", *arguments)
-        return
-    kernels(["--for", budgets])
-    run("python", "-m", "pytest", "-n", "2", "--dist", "worksteal", "-m", marks, "--budgets", budgets, *arguments)
+        run(*command, *arguments)
+    else:
+        kernels(["--for", budgets])
+        run(*command, "-m", marks, "--budgets", budgets, *arguments)
+
+
+def test(arguments: list[str]) -> None:
+    """Run the quick tests, with `--long` those that are longer too."""
+    rest = [a for a in arguments if a != "--long"]
+    pytest(rest, *(("not slow", "long") if "--long" in arguments else ("not slow and not long", "quick")))
 
 
 def validation(arguments: list[str]) -> None:
-    """Run the slow tests on two processes; with `--long` those that `test` leaves to itself with that, too."""
-    longer = "--long" in arguments
+    """Run the slow tests, with `--long` those that `test` without that leaves out, too."""
     rest = [a for a in arguments if a != "--long"]
-    test(rest, "slow or long", "rest") if longer else test(rest, "slow", "slow")
+    pytest(rest, *(("slow or long", "rest") if "--long" in arguments else ("slow", "slow")))
 
 
 def explore(arguments: list[str]) -> None:
@@ -102,6 +107,11 @@ def explore(arguments: list[str]) -> None:
         sys.exit(f"dev.py: got {seed}, allowed: explore [SEED], a whole number")
     print(f"seed {seed}", flush=True)
     run("python", "-m", "pytest", "-n", "2", "--dist", "worksteal", "-m", "", "--seed", seed, *rest)
+
+
+def mutate(arguments: list[str]) -> None:
+    """Plant bugs, and note which tests see them."""
+    run("python", "tests/mutate.py", *arguments)
 
 
 def sanitize(arguments: list[str]) -> None:
@@ -169,8 +179,8 @@ def main(arguments: list[str]) -> None:
         for script in sorted((ROOT / "benchmarks").glob("*/run.py")):
             run("python", str(script), *rest)
     elif task != "setup":
-        {"kernels": kernels, "test": test, "validation": validation, "explore": explore, "sanitize": sanitize,
-         "check": check, "examples": examples, "page": page, "wheel": wheel}[task](rest)
+        {"kernels": kernels, "test": test, "validation": validation, "explore": explore, "mutate": mutate,
+         "sanitize": sanitize, "check": check, "examples": examples, "page": page, "wheel": wheel}[task](rest)
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ from .drivetrain_circuit import Armature, Source
 from .drivetrain_frame import Frames, make_chip, make_potentiometer
 from .drivetrain_laws import Plant, make_plant
 from .drivetrain_motion import T_H, T_W, I, Mode, Q, V, W, X, decide, guards, happen, joined, motion
+from .recorded import recorded
 
 Array = NDArray[np.float64]
 
@@ -335,6 +336,7 @@ def _unit(case: Case, shifts: Callable[[int], float]) -> tuple[_Unit, list[float
     return _Unit(P, Frames(chip, pot, case.command.width, case.edges, shifts), q), y
 
 
+@recorded
 def simulate_bus(
     cases: Sequence[Case], source: Source, times: Sequence[float] | Array, *, rtol: float = 1e-12, atol: float = 1e-14,
     max_step: float = 2e-3, samples: int = 8, shifts: Callable[[int], float] = lambda frame: 0.0,

@@ -11,7 +11,9 @@
 #define EXPORTED __attribute__((visibility("default")))
 #endif
 #define SMALL static inline __attribute__((unused))
+#ifndef INLINED  /* checks of memory leave it to the compiler */
 #define INLINED static inline __attribute__((always_inline, unused))
+#endif
 #define ASIDE static __attribute__((noinline, unused))
 #define PACKED __attribute__((packed))
 #if defined(__x86_64__) && !defined(__FMA__)
