@@ -22,6 +22,7 @@ from .digital_firmware import Firmware, Sensed, Tick
 from .digital_motion import ENERGIES, Shaft
 from .digital_plant import make_plant
 from .digital_train import Meeting, Train
+from .recorded import recorded
 
 Array = NDArray[np.float64]
 Values = Mapping[str, Mapping[str, Any]]
@@ -116,6 +117,7 @@ class _Run:
         return (shaft.q, shaft.w, *shaft.now(), shaft.T_w, shaft.T_h)
 
 
+@recorded
 def run(values: Values, command: Mapping[str, Any], load: Mapping[str, Any], duration: float,
         times: Sequence[float] | NDArray[np.floating[Any]], seed: int = 0, initial_angle: float | None = None) -> Trace:
     """Motion of a digital servo that rests at an angle at t = 0.
