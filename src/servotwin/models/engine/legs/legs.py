@@ -26,7 +26,6 @@ MOST_LEGS = 400  # under one drive; a servo that needs more is left to the gener
 MOST_SHORT = 8  # legs within next to no time: then motor and output stay together
 SHORT, _AT_END = 1e-9, 1e-6  # of a time, of the play
 IN_FLOATS = {"SHORT": 1e-4}
-CALLED = ("ending",)  # where a leg does end: with copies it takes a third longer to compile
 
 
 class Gone(NamedTuple):

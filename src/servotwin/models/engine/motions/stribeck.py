@@ -39,7 +39,6 @@ from servotwin.physics.load_friction import torque_on_gear
 from servotwin.physics.motor import back_emf
 
 PLAIN = True  # the compiler takes it for False
-CALLED = ("creep",)  # one lane, for a long time: with copies it takes twice as long to compile
 _POINTS, _COUNT = 21, 24  # a multiple of what a processor takes at once: the last three count nothing
 _NODES = (
     0.002171418487095955, 0.013046735741414128, 0.03492125432214588, 0.06746831665550773, 0.10959113670679155,
