@@ -32,6 +32,7 @@ def test_emulated_rows_are_as_near_to_table_ii_as_those_of_the_bench_in_software
     assert (ours <= theirs.max(axis=0) + np.array([1e-5, 1e-6, 1e-12, 0.0, 0.0])).all()
 
 
+@pytest.mark.long
 def test_emulated_rows_are_those_of_the_bench_in_software(chain, software):
     for ours, theirs in zip(chain, software, strict=True):
         for side in ("from_below", "from_above", "reading"):

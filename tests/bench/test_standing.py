@@ -1,6 +1,8 @@
 """How a shaft stands: swings are counted, creeping is not."""
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -27,17 +29,17 @@ def test_creep_and_ripple_are_no_swings():
     assert turning_points([1.0], 0.1) == []
 
 
+@dataclass(frozen=True)
 class Recorded:
     """Stands for a result whose angle is known."""
 
+    angle: Callable
+    time: np.ndarray = ()
     names = ("output_angle", "armature_current")
     ended = 3.0
 
-    def __init__(self, angle):
-        self.angle = angle
-
-    def at(self, name, time):
-        return np.radians(self.angle(time)) if name == "output_angle" else np.full_like(time, 0.5)
+    def __getitem__(self, name):
+        return np.radians(self.angle(self.time)) if name == "output_angle" else np.full_like(self.time, 0.5)
 
 
 def test_a_vibration_on_a_drift_is_counted():

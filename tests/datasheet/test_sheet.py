@@ -34,6 +34,7 @@ def test_curves_run_from_standing_to_turning_freely(sheet):
             assert point.efficiency == pytest.approx(curve.efficiency[40], rel=1e-9)
 
 
+@pytest.mark.long
 def test_what_is_hot_is_weaker_and_draws_less(sheet):
     for part in sheet.voltages:
         assert part.hot.stall_torque < part.cold.stall_torque

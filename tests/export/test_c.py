@@ -86,6 +86,7 @@ def test_c_is_python_for_random_servos_of_all_structures(name, compiled):
         assert signal <= 1e3 * STRUCTURES[name].off, draw
 
 
+@pytest.mark.long
 def test_names_of_signals_are_those_of_the_model(compiled):
     for name in FEW:
         available = [signal for signal in model_of(name, 0).available

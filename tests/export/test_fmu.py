@@ -127,7 +127,7 @@ def test_a_name_is_no_code(tmp_path, monkeypatch):
             fmu(st.BoundedServo(servo), name=taken)
 
 
-@pytest.mark.long(but="0.001-pendulum-3.0")
+@pytest.mark.long
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("kind", SERVOS)
 @pytest.mark.parametrize("step", [1e-4, 1e-3, 7e-3, 20e-3])
@@ -148,6 +148,7 @@ def test_steps_of_any_length_are_those_of_a_simulator(made, tmp_path, kind, vers
     assert tool.get("armature_current") == pytest.approx(lanes["armature_current"][0], abs=1e-7)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("version", VERSIONS)
 def test_parameters_are_those_of_the_servo_until_it_begins(made, tmp_path, version):
     changes = {"motor.armature_resistance": 4.0, "supply.open_circuit_voltage": 5.0, "electronics.frame_period": 0.015}
@@ -208,6 +209,7 @@ def test_frames_begin_when_they_shall(made, tmp_path, version):
     assert tool.get("output_angle") == pytest.approx(lanes["output_angle"][0], abs=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("kind", ["pulse", "bus"])
 def test_a_state_goes_on_alike(made, tmp_path, kind, version):

@@ -23,6 +23,8 @@ from servotwin.identification.fitting.uncertainty import Rows
 from servotwin.identification.fitting.words import Unidentifiable
 from servotwin.robots import Motion, Mount, run_motion
 
+pytestmark = pytest.mark.long
+
 mujoco = pytest.importorskip("mujoco", reason="the extra `robots` is not installed")
 JOINTS, RATE, COUNT = ("shoulder", "elbow"), 30.0, 2.0 * math.pi / 4096.0
 PLANT = mujoco.MjModel.from_xml_string(links(dt=2e-3))
@@ -72,7 +74,6 @@ def fit():
     return fitted([recorded(seed) for seed in range(3)])
 
 
-@pytest.mark.long
 def test_an_arm_is_found_and_unseen_episodes_are_predicted(fit):
     assert fit.holdout.rms() < math.radians(0.12)
     assert fit.before_holdout.rms() > 3.0 * fit.holdout.rms()
@@ -96,7 +97,6 @@ def test_what_cannot_be_told_apart_is_named(fit):
     assert fit.intervals()[next(name for name in fit.undetermined if "mass" in name)].method == BELIEFS
 
 
-@pytest.mark.long
 def test_the_same_fit_twice_is_the_same_and_one_episode_says_so():
     motion = recorded(5, 6.0)
     one, other = (fitted([motion]) for _ in range(2))
@@ -107,14 +107,12 @@ def test_the_same_fit_twice_is_the_same_and_one_episode_says_so():
     assert any("nothing was held out" in text for text in one.warnings)
 
 
-@pytest.mark.long
 def test_without_intervals_none_are_sought():
     found = fitted([recorded(5, 6.0)], intervals=False)
     assert {interval.method for interval in found.intervals().values()} == {"not sought"}
     assert found.unknown == ()
 
 
-@pytest.mark.long
 def test_a_wrong_gain_is_named_first():
     found = fitted([recorded(7, 8.0, gain=0.5)], intervals=False)
     assert found.causes[0].name == "proportional gain"
@@ -126,7 +124,6 @@ def test_a_wrong_gain_is_named_first():
     assert found.training.rms() < 0.3 * found.before.rms()
 
 
-@pytest.mark.long
 def test_a_payload_is_named_and_none_where_only_single_joints_look_like_one():
     found = fitted([recorded(seed, 12.0, payload=2.0) for seed in range(2)])
     assert found.causes[0].name == "masses"
@@ -141,7 +138,6 @@ def test_a_payload_is_named_and_none_where_only_single_joints_look_like_one():
                      slopes) == ()
 
 
-@pytest.mark.long
 def test_what_a_hand_did_is_left_out():
     found = fitted([recorded(8, 8.0, hand=4.0)], intervals=False)
     window = next(one for one in found.left_out if one.joint == "elbow")
@@ -151,7 +147,6 @@ def test_what_a_hand_did_is_left_out():
     assert not fitted([recorded(8, 8.0)], intervals=False).left_out
 
 
-@pytest.mark.long
 def test_without_a_robot_each_joint_gets_a_pendulum():
     found = st.identify([recorded(9, 6.0)], SERVO, robot="unknown", bus=BUS, intervals=False)
     assert {f"mass.{joint}_{part}" for joint in JOINTS for part in ("weight", "inertia")} <= set(found.names)
@@ -206,7 +201,6 @@ def test_derivatives_that_are_noise_count_for_nothing():
     assert clean @ [1.0, 1.0] == pytest.approx(slopes @ [1.0, 1.0], rel=0.1, abs=3.0)
 
 
-@pytest.mark.long
 def test_derivatives_are_of_steps_that_an_arm_answers_by_about_its_noise():
     """An arm that its servos hardly lift answers a tenth more resistance otherwise than ten times a hundredth more."""
     low = st.parameters.Supply(open_circuit_voltage=2.0, internal_resistance=None)
@@ -246,7 +240,6 @@ def test_report(fit, tmp_path):
     assert str(fit).startswith("the simulated joints are")
 
 
-@pytest.mark.long
 def test_turns_take_longer_than_stamps_that_count_them():
     """A clock of 3 % on stamps that are 3 % too short is the run itself; where rows are stamped, none is searched."""
     real = recorded(0, 8.0)

@@ -23,6 +23,7 @@ def test_exact_logs_give_the_truth(kind):
     assert isinstance(found.model, model)
 
 
+@pytest.mark.long
 def test_random_starts_find_the_truth_from_afar():
     far = TRUTH.replace({"motor.rotor_inertia": 2.5 * TRUTH.motor.rotor_inertia,
                          "electronics.stretcher_gain": 0.4 * TRUTH.electronics.stretcher_gain,

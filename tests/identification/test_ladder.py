@@ -96,6 +96,7 @@ def test_the_criterion_chooses_the_same_here():
         assert all(math.isnan(rung.holdout) for rung in ladder.rungs)
 
 
+@pytest.mark.long
 def test_more_terms_fit_what_is_fitted_at_least_as_well(plain, loaded):
     for ladder in (plain, loaded):
         assert ladder["M3"].training < 1.001 * ladder["M1"].training

@@ -75,6 +75,7 @@ def test_the_page_is_whole_and_needs_nothing_else(page):
     assert all(image["alt"] for image in found.images)
 
 
+@pytest.mark.long
 def test_names_are_escaped(page):
     assert "step <b>0</b>" not in page
     assert "step &lt;b&gt;0&lt;/b&gt; &amp; more" in page

@@ -310,7 +310,7 @@ def test_a_fleet_is_as_accurate_as_asked(name, accuracy):
     np.testing.assert_array_equal(np.sign(batch["output_speed"]), np.sign(exact["output_speed"]))
 
 
-@pytest.mark.long(but="heat, pendulum")
+@pytest.mark.long
 @pytest.mark.parametrize("name", [name for name in FLEETS if len(signals_of(name)) > 3])
 def test_signals_of_a_warm_fleet(name):
     batch, exact = many(name, np.arange(COUNT), accuracy=1e-11), alone(name)

@@ -68,6 +68,7 @@ def test_progress_rises_to_one(report):
     assert report[1][-1] == 1.0
 
 
+@pytest.mark.long
 def test_every_figure_is_there(report):
     names = {path.name for path in report[0].figures}
     for number in NUMBERS:
@@ -84,6 +85,7 @@ def test_robots_are_done_here_where_there_is_no_other_process(monkeypatch):
         assert "mujoco" in robots_part().left_out
 
 
+@pytest.mark.long
 def test_every_plot_has_its_numbers(report):
     names = {path.name for path in report[0].data}
     assert {f"figure-{number}.csv" for number in NUMBERS if number > 8} <= names
@@ -94,6 +96,7 @@ def test_every_plot_has_its_numbers(report):
         assert {len(row) for row in rows} == {len(rows[0])}
 
 
+@pytest.mark.long
 def test_the_vibration_and_its_cure(report, page):
     numbers = report[0].numbers
     assert numbers["common_supply_swing_deg"] > 2.0
@@ -113,6 +116,7 @@ def test_the_vibration_and_its_cure(report, page):
     assert max(seen["common"]) == 6.0
 
 
+@pytest.mark.long
 def test_the_robots_do_their_tasks(report, page):
     numbers = report[0].numbers
     for name in ("figure_28", "figure_29"):
@@ -131,16 +135,19 @@ def test_without_mujoco_the_robots_are_left_out(monkeypatch):
     assert robots_page.headline(left_out) == {}
 
 
+@pytest.mark.long
 def test_nothing_else_is_left(report):
     assert sorted(path.name for path in report[0].folder.iterdir()) == ["data", "figures", "report.html"]
 
 
+@pytest.mark.long
 def test_page_is_well_formed(page):
     assert page.errors == []
     assert page.open == []
     assert len(set(page.ids)) == len(page.ids)
 
 
+@pytest.mark.long
 def test_page_loads_nothing(report, page):
     assert all(value.startswith("data:") for value in page.loads)
     assert all(link.startswith("#") and link[1:] in page.ids for link in page.links)
@@ -149,6 +156,7 @@ def test_page_loads_nothing(report, page):
     assert not re.search(r"url\(", text)
 
 
+@pytest.mark.long
 def test_page_says_what_matters(page):
     words = re.sub(r"\s+", " ", "".join(page.words))
     for part in ("publishes no parameter values", "61.035", "times the supply", "identified from Table II",
@@ -158,6 +166,7 @@ def test_page_says_what_matters(page):
     assert not re.search(r"\b(nan|inf|None)\b", words)
 
 
+@pytest.mark.long
 def test_headline_numbers(report):
     numbers = report[0].numbers
     for model in MODELS:
@@ -171,6 +180,7 @@ def test_headline_numbers(report):
     assert numbers["pulse_top_speed_deg_per_s"] == pytest.approx(numbers["bounded_top_speed_deg_per_s"], rel=1e-3)
 
 
+@pytest.mark.long
 def test_pulses_narrow_the_standing_band(report):
     numbers = report[0].numbers
     assert numbers["bounded_widest_standing_band_deg"] == pytest.approx(2.10, abs=0.01)
@@ -178,6 +188,7 @@ def test_pulses_narrow_the_standing_band(report):
     assert numbers["bounded_widest_friction_band_deg"] > 20.0 * numbers["pulse_widest_friction_band_deg"]
 
 
+@pytest.mark.long
 def test_every_model_is_in_the_numbers_of_the_figures(report):
     for path in report[0].data:
         with path.open(encoding="utf-8", newline="") as file:
@@ -187,6 +198,7 @@ def test_every_model_is_in_the_numbers_of_the_figures(report):
             assert named == set(MODELS), path.name
 
 
+@pytest.mark.long
 def test_a_report_that_is_there_is_kept(report):
     before = report[0].page.read_bytes()
     with pytest.raises(OutputExistsError):

@@ -42,6 +42,7 @@ def test_it_begins_at_the_first_goals_and_ends_after_the_last(run):
     np.testing.assert_allclose(run.ideal.poses[0], [0.0, 0.4], atol=1e-12)
 
 
+@pytest.mark.long
 def test_a_joint_without_a_motion_is_told_to_stay(run):
     assert set(run.record["shoulder"]["joint_command"]) == {0.0}
     assert math.isnan(run.tracking["shoulder"].delay)

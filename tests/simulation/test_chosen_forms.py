@@ -127,7 +127,7 @@ def pairs(without=()):
     return [names for count in range(3) for names in combinations(own, count) if names != ("share", "locks")]
 
 
-@pytest.mark.long(but="float64")
+@pytest.mark.long
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 def test_analog_servos_take_the_forms_that_they_took(servo, dtype):
     rng = np.random.default_rng(3)
@@ -159,6 +159,7 @@ def test_servos_of_the_catalog_take_the_forms_that_they_took():
         assert found == known.get(name, "runs" if analog else "digital_runs"), name
 
 
+@pytest.mark.long
 def test_no_servo_of_today_needs_kernels_that_are_not_made_beforehand(servo):
     """They are there for terms to come that the others do not know."""
     rng = np.random.default_rng(4)

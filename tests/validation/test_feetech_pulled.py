@@ -4,6 +4,8 @@ import pytest
 
 from validation import feetech_pulled
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def told(data_folder):
@@ -11,7 +13,6 @@ def told(data_folder):
     return feetech_pulled.told(feetech_pulled.read(file), feetech_pulled.servo())
 
 
-@pytest.mark.long
 def test_moves_are_predicted(told):
     """100 counts at 1000 counts/s and acceleration 20: to 3.4 counts, 0.3 degrees."""
     assert 1.0 < told.moving < 4.0

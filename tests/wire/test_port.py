@@ -93,6 +93,7 @@ def test_dynamixel_sdk(koch):
     port.closePort()
 
 
+@pytest.mark.long
 def test_ten_openings_a_killed_client_and_two_at_once(so101):
     for _ in range(10):
         with serial.Serial(so101["link"], 1_000_000, timeout=2.0) as port:

@@ -14,6 +14,8 @@ from servotwin.web.live.beginning import load_of, models_of
 from servotwin.web.live.overlay import compared, of_the_bench
 from servotwin.web.server.own import reading
 
+pytestmark = pytest.mark.long
+
 SCENE = ('format = 1\n[[servo]]\nid = "{id}"\nmodel = "{model}"\n[servo.parameters]\n"{name}" = {value}\n'
          '[load]\ninertia = 1e-4\n')
 SERVOS = {
@@ -50,7 +52,6 @@ def alike(ours, theirs):
         assert ours == (pytest.approx(theirs, rel=1e-12) if isinstance(theirs, float) else theirs)
 
 
-@pytest.mark.long(but="angles")
 @pytest.mark.parametrize("kind", SERVOS)
 def test_a_table_is_read_and_laid_over_its_twin_as_by_the_server(folder, tmp_path, kind):
     text, scene_text = table_of(kind, tmp_path)

@@ -39,6 +39,7 @@ def test_without_the_code_nobody_gets_in(school, query):
         assert "code" in page.until("full")["full"]
 
 
+@pytest.mark.long
 def test_forty_watch_one_stream_and_the_next_is_told(school):
     address, teacher, code = school
     with ExitStack() as stack:

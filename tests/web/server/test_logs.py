@@ -160,7 +160,7 @@ def test_logs_come_no_faster_than_they_are_read(server, page):
     assert 429 in found
 
 
-@pytest.mark.long(but="message3")
+@pytest.mark.long
 @pytest.mark.parametrize("message", [
     {"log": {"show": True}}, {"log": {"play": True}}, {"log": {"columns": "time=t:ms"}}, {"log": {}},
     {"log": "run.csv"}, {"log": {"open": "/etc/passwd"}}, {"fit": {"servo": 0}}, {"fit": {"take": "beside"}},

@@ -134,6 +134,7 @@ def test_no_path_reaches_a_file(server, path):
     assert opened(server + path)[0] in (404, 405)
 
 
+@pytest.mark.long
 def test_answers_say_what_a_browser_may_do(server):
     _, headers, _ = opened(server)
     assert "default-src 'none'" in headers["content-security-policy"]
