@@ -23,7 +23,7 @@ TASKS = {
     "setup": "make .venv and install servotwin with all tools",
     "paper": "set up what it needs, then write the report of the paper to paper-report/ (main job)",
     "kernels": "set up, then compile the kernels that are named, or all, before somebody waits for them",
-    "test": "set up, then run the quick tests (4 minutes on two quiet cores, 2 more in a fresh clone); --long: longer ones too",
+    "test": "set up, then run the quick tests (4 minutes, two more in a fresh clone); --long: the longer ones as well",
     "validation": "set up, then run the slow tests: validation and coverage, browser; --long: all that test leaves out",
     "explore": "set up, then run the random tests from another seed on, which is printed or given",
     "mutate": "set up, then plant so many bugs, one at a time, and note in tests/mutants.json which tests see them",
