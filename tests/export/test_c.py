@@ -94,6 +94,7 @@ def test_names_of_signals_are_those_of_the_model(compiled):
         assert compiled(name).names == available
 
 
+@pytest.mark.long
 def test_events_are_those_of_a_result(compiled):
     for name in FEW:
         c, model = compiled(name), model_of(name, 0)

@@ -150,6 +150,7 @@ def test_digital_servos_take_the_forms_that_they_took(servo):
         assert combined(st.DigitalServo, servo.replace(PROGRAM), names, "float64", rng) == form, names
 
 
+@pytest.mark.long
 def test_servos_of_the_catalog_take_the_forms_that_they_took():
     known = {name: form for form, names in OF_CATALOG.items() for name in names.split()}
     for name in st.catalog_names():

@@ -43,6 +43,7 @@ def test_eighty_benches(folder):
     assert moved > 60
 
 
+@pytest.mark.long
 def test_texts_are_refused_in_the_same_words(folder):
     """Each text is that of a scene with one mistake."""
     good = 'format = 1\nservo = [{id = "hitec-hs-755hb"}]\n'
