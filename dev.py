@@ -79,9 +79,9 @@ def kernels(arguments: list[str]) -> None:
 
 
 def pytest(arguments: list[str], marks: str, budgets: str) -> None:
-    """Run tests on two processes: those with marks, or what is named."""
+    """Run tests on two processes: those with marks, or what is named by a path, `-k` or `-m`."""
     command = ["python", "-m", "pytest", "-n", "2", "--dist", "worksteal"]
-    if any(a == "-m" or not a.startswith("-") for a in arguments):
+    if any(a in ("-k", "-m") or (ROOT / a.split("::")[0]).exists() for a in arguments):
         run(*command, *arguments)
     else:
         kernels(["--for", budgets])

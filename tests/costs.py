@@ -24,7 +24,7 @@ from servotwin.simulation.recipes import all_recipes
 
 BUDGETS = tomllib.loads(Path(__file__).with_name("budgets.toml").read_text(encoding="utf-8"))
 RECIPES = {recipe.name for recipe in all_recipes()}
-_LOOP = 200_000  # turns, about 30 ms
+_LOOP = 200_000  # turns, about 11 ms
 _EVERY = 10.0  # s of processor time between two calibrations
 
 

@@ -48,3 +48,14 @@ def test_ci_fails_beyond_twice_the_budget_of_a_folder(monkeypatch, ci, took, cod
 
 def test_a_loop_takes_time():
     assert 0.0 < costs.calibration() < 10.0
+
+
+@pytest.mark.long(but="short")
+@pytest.mark.parametrize("case", ["short", "as long as the others"])
+def test_the_case_that_a_family_names_stays_among_the_quick_ones(case, request):
+    assert (request.node.get_closest_marker("long") is None) == (case == "short")
+
+
+@pytest.mark.parametrize("seed", [3])
+def test_explore_goes_on_to_other_seeds(seed, request):
+    assert seed == 3 + 1000 * (request.config.getoption("--seed") or 0)
