@@ -76,10 +76,14 @@ def test_every_figure_is_there(report):
     assert all(path.stat().st_size > 1000 for path in report[0].figures)
 
 
-def test_robots_are_done_here_where_there_is_no_other_process(monkeypatch):
+@pytest.mark.parametrize("other", ["none", "one that fails"])
+def test_robots_are_done_here_where_no_other_process_does_it(monkeypatch, other):
     def none(*command, **named):
         raise OSError("no more processes")
-    monkeypatch.setattr(paper.subprocess, "Popen", none)
+    if other == "none":
+        monkeypatch.setattr(paper.subprocess, "Popen", none)
+    else:
+        monkeypatch.setattr(paper, "_ROBOTS", "raise SystemExit(1)")
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with paper._robots_aside(("png",)) as robots_part:
         assert "mujoco" in robots_part().left_out
