@@ -52,7 +52,7 @@ class Booking:
         self.calibrated = time.process_time()
         self.made: list[tuple[str, float]] = []  # kernels: name and s
         self.used: set[str] = set()
-        self.now = spent()
+        self.now, self.collected = spent(), 0.0
         self._watch()
 
     def _watch(self) -> None:
@@ -80,7 +80,7 @@ class Booking:
     @pytest.hookimpl(wrapper=True, tryfirst=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
         limit = self.config.getoption("--cpu-limit")
-        if limit is not None and sum(spent()) > limit:
+        if limit is not None and sum(spent()) - self.collected > limit:
             item.session.shouldstop = f"{limit:g} s of processor time are used up"
         if time.process_time() - self.calibrated > _EVERY:
             self.loop = calibration()
@@ -102,6 +102,7 @@ class Booking:
         """Book what it took to import all tests, as nobody's cost; nobody looks for garbage among them any more."""
         gc.collect()
         gc.freeze()
+        self.collected = sum(spent())
         if hasattr(self.config, "workeroutput"):
             self.config.workeroutput["collecting"] = sum(spent())
         else:
@@ -200,7 +201,7 @@ def _folder(name: str) -> str:
 def add_options(parser: pytest.Parser) -> None:
     group = parser.getgroup("costs")
     group.addoption("--costs", metavar="FILE", help="write the cost of each item to a file (JSON)")
-    group.addoption("--cpu-limit", type=float, metavar="SECONDS", help="stop when a process has used up so much time")
+    group.addoption("--cpu-limit", type=float, metavar="SECONDS", help="stop when items have used up so much time")
     group.addoption("--budgets", metavar="NAME", help="hold folders against these budgets of tests/budgets.toml")
 
 

@@ -157,7 +157,8 @@ def imports() -> dict[str, set[str]]:
 
 
 def tests_of(file: str) -> list[str]:
-    """Return the test files that lead to a file, those with the fewest imports between first."""
+    """Return the test files that lead to a file: those of its own room first, then by the imports between."""
+    room = f"tests/{Path(file).parts[2]}/"
     back: dict[str, set[str]] = {}
     for one, others in imports().items():
         for other in others:
@@ -170,7 +171,8 @@ def tests_of(file: str) -> list[str]:
                 far[other] = far[here] + 1
                 waiting.append(other)
     tests = [one for one in far if "/tests/" in one and Path(one).name.startswith("test_")]
-    return [str(Path(one).relative_to(ROOT)) for one in sorted(tests, key=lambda one: (far[one], one))]
+    return [str(Path(one).relative_to(ROOT)) for one in sorted(
+        tests, key=lambda one: (room not in one, far[one], one))]
 
 
 # --- running ----------------------------------------------------------------------------------------------------------
