@@ -1,5 +1,6 @@
 """What the tests of the page ask of it."""
 
+import math
 import tomllib
 
 
@@ -16,6 +17,14 @@ def angle(page, servo: int = 0) -> float:
 def go_on(page, seconds: float) -> None:
     """Wait until the bench, not the wall, has gone on for a time [s]."""
     page.wait_for_function(f"bench.time > {page.evaluate('bench.time') + seconds}")
+
+
+def come_to_rest(page, servo: int = 0) -> None:
+    """Wait until a horn stands: a hand or a frame may come late on a busy machine."""
+    before = math.inf
+    while abs(angle(page, servo) - before) > 0.2:
+        before = angle(page, servo)
+        go_on(page, 0.3)
 
 
 def until(page, time: float) -> None:

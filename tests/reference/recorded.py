@@ -47,7 +47,8 @@ def encoded(x: Any) -> Any:
     if isinstance(x, list):
         return [encoded(one) for one in x]
     if isinstance(x, dict):
-        return {"dict": [[encoded(key), encoded(value)] for key, value in x.items()]}
+        # In one order: a case that is made of a set has another one in each process.
+        return {"dict": [[encoded(key), encoded(x[key])] for key in sorted(x, key=str)]}
     raise TypeError(type(x).__name__)
 
 

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from page_talk import angle, beside, go_on, latest, opened_panel, scene
+from page_talk import angle, beside, come_to_rest, go_on, latest, opened_panel, scene
 
 pytestmark = pytest.mark.slow
 
@@ -19,7 +19,8 @@ def test_a_horn_gives_way_to_the_mouse_and_says_the_force(page):
     page.mouse.move(x, y - reach)
     page.mouse.down()
     page.mouse.move(x - reach, y, steps=8)  # a quarter turn, towards larger angles
-    go_on(page, 0.7)
+    go_on(page, 0.4)
+    come_to_rest(page)
     said = page.locator(".force").inner_text()
     pushed = angle(page)
     assert pushed > before + 5.0

@@ -142,7 +142,7 @@ BOMB = "#" * 17_000_000
 
 
 @pytest.mark.parametrize(("message", "said"), [
-    ({"scene": DOTTED}, "more than 3 s"), ({"scene": "a = " + "[" * 100_000}, "nested"),
+    ({"scene": DOTTED}, "nested"), ({"scene": "a = " + "[" * 100_000}, "nested"),
     ({"fragment": urlsafe_b64encode(zlib.compress(BOMB.encode(), 9)).decode()}, "too long"),
     ({"scene": SERVO.format("actions = [" + '[0, "command", {shape = "step", unit = "us", low = 1400, high = 1500, '
                             'period = 0.01}],' * 9000 + "]\n")}, "more than 3 s"),
