@@ -14,19 +14,19 @@ def told(data_folder):
 
 
 def test_moves_are_predicted(told):
-    """100 counts at 1000 counts/s and acceleration 20: to 3.4 counts, 0.3 degrees."""
-    assert 1.0 < told.moving < 4.0
+    """100 counts at 1000 counts/s and acceleration 20: to 3.4 counts rms, 0.3 degrees."""
+    assert told.moving < 3.5
     assert all(0.03 <= late <= 0.12 for late in told.late)
 
 
 def test_rest_is_predicted(told):
-    assert 1.0 < told.resting < 3.5
+    assert told.resting < 3.0
 
 
 def test_play_shows_where_the_pull_changes_sides(told):
     """Left alone after a pull 7 counts apart, predicted 8.4: the play of 0.87 degrees less what the loop corrects."""
     assert told.play(told.measured, pulled=False) == pytest.approx(7.0, abs=0.1)
-    assert told.play(told.predicted, pulled=False) == pytest.approx(7.0, abs=2.0)
+    assert told.play(told.predicted, pulled=False) == pytest.approx(7.0, abs=1.6)
 
 
 def test_duties_are_not_those_of_a_bridge_that_brakes(told):
@@ -38,9 +38,12 @@ def test_duties_are_not_those_of_a_bridge_that_brakes(told):
     assert told.duties.pulled[0] > 1.2 * told.duties.pulled[1]
 
 
-def test_droop_under_a_pull_is_underestimated(told):
-    """14.8 counts apart, predicted 7.8: small duties of a bridge that brakes are worth twice what this servo's are."""
+def test_droop_under_a_pull_is_predicted(told):
+    """14.8 counts apart, predicted 7.8: small duties of a bridge that brakes are worth twice what this servo's are.
+
+    So much may be missing, not more; more torque at small duties comes nearer.
+    """
     assert told.play(told.measured) == pytest.approx(14.8, abs=0.1)
-    assert 6.0 < told.play(told.predicted) < told.play(told.measured)
-    for word in ("pulled up", "pulled down", "after up", "after down"):
-        assert told.predicted[word] == pytest.approx(told.measured[word], abs=4.5)
+    assert told.play(told.predicted) == pytest.approx(told.play(told.measured), abs=7.5)
+    for word, off in (("pulled up", 4.2), ("pulled down", 3.2), ("after up", 0.5), ("after down", 1.3)):
+        assert told.predicted[word] == pytest.approx(told.measured[word], abs=off), word
