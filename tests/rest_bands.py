@@ -1,4 +1,4 @@
-"""How far from its goal friction may hold a servo, in closed form: where the motor's torque is below Coulomb friction."""
+"""How far from its goal Coulomb friction may hold a servo, in closed form."""
 
 
 def averaged(servo) -> float:
@@ -9,8 +9,7 @@ def averaged(servo) -> float:
 
 
 def proportional(servo) -> float:
-    """Return half the band of a `DigitalServo` with P and D alone [rad]: its deadband, and P e V_oc - V_ce0 = F R / k_a.
-    """
+    """Return half the band of a `DigitalServo` with P and D [rad]: its deadband, and P e V_oc - V_ce0 = F R / k_a."""
     voltage = _holding_voltage(servo) + servo.supply.bridge_drop_voltage
     gain = servo.firmware.proportional_gain * servo.supply.open_circuit_voltage
     return (servo.firmware.deadband_angle or 0.0) + voltage / gain

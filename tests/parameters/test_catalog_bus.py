@@ -37,9 +37,9 @@ PLANTS = {
 OF_LITERATURE = ("dynamixel-xl-320",)  # published, and not checked by logs
 # Speed at full duty over the sheet's: of plants that were identified (BAM's XL-320 turns half as fast, as its notes
 # say), and of sheets whose numbers no motor has all together
-FULL_SPEED = {"dynamixel-mx-106": 1.1323, "dynamixel-mx-28": 0.9870, "dynamixel-mx-64": 1.0914, "dynamixel-xl-320": 0.5023,
-              "dynamixel-xl330-m077": 0.9936, "dynamixel-xl330-m288": 1.0725, "dynamixel-xl430-w250": 1.0121,
-              "feetech-sts3215-7v4": 0.9920}
+FULL_SPEED = {"dynamixel-mx-106": 1.1323, "dynamixel-mx-28": 0.9870, "dynamixel-mx-64": 1.0914,
+              "dynamixel-xl-320": 0.5023, "dynamixel-xl330-m077": 0.9936, "dynamixel-xl330-m288": 1.0725,
+              "dynamixel-xl430-w250": 1.0121, "feetech-sts3215-7v4": 0.9920}
 TOLD_BY_LOGS = {  # and nothing else: the rest of a file that was fitted is assumed, or said of the rig
     "motor.armature_resistance", "motor.torque_constant", "motor.back_emf_constant", "motor.rotor_inertia",
     "friction.coulomb_torque_forward", "friction.coulomb_torque_backward", "friction.load_friction_external",

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+import compiled_run
 import servotwin as st
 from leg_cases import GOALS, INERTIAS, SERVOS, TORQUES, goals_of, values_of, written
 from reference import digital
@@ -61,8 +62,8 @@ def more(seed: int) -> dict[str, Any]:
     return {name: value for k in chosen for name, value in terms[k].items()}
 
 
-def both(run: Run, number: int) -> tuple[st.Result, digital.Trace, st.Batch]:
-    """Return a run by `simulate`, by the reference, and as lanes."""
+def both(run: Run, number: int, plain: bool = False) -> tuple[st.Result, digital.Trace, st.Batch]:
+    """Return a run by `simulate`, compiled and if asked plain too, by the reference, and as lanes."""
     servo = SERVOS[run.name].replace(run.changes)
     model, (at, goals) = st.DigitalServo(servo), goals_of(run.goals, number)
     if run.changes.get("stops.upper_angle"):
@@ -70,7 +71,9 @@ def both(run: Run, number: int) -> tuple[st.Result, digital.Trace, st.Batch]:
     load = st.loads.Inertia(run.inertia) + st.loads.Constant(run.torque)
     asked = {"duration": DURATION, "load": load, "output_times": TIMES, "initial": {"output_angle": 0.1},
              "accuracy": 1e-12}
-    result = st.simulate(model, written(at, goals), **asked).raise_if_failed()
+    result = compiled_run.simulate(model, written(at, goals), **asked).raise_if_failed()
+    if plain:
+        compiled_run.is_the_same(result, st.simulate(model, written(at, goals), **asked).raise_if_failed())
     pieces = [(float(t), float(goal), 0.0) for t, goal in zip(at, goals, strict=True)]
     trace = digital.run(values_of(servo), {"kind": "goal", "pieces": pieces},
                         {"inertia": run.inertia, "torque": run.torque}, DURATION, TIMES, initial_angle=0.1)
@@ -95,9 +98,9 @@ def grazing(trace: digital.Trace) -> list[tuple[float, float]]:
     return sorted([*slow, *((t, 0.0) for (t, one), (u, other) in pairs if one != other and u - t < 1e-9)])
 
 
-def check(number: int) -> None:
+def check(number: int, plain: bool = False) -> None:
     run = case(number)
-    result, trace, lanes = both(run, number)
+    result, trace, lanes = both(run, number, plain)
     if trace.least_tie < TIE:
         pytest.skip("a count at its edge")
     sure = min((t for t, _ in grazing(trace)), default=DURATION) > TIMES
@@ -147,7 +150,7 @@ def check_meetings(result: st.Result, trace: digital.Trace) -> None:
 
 @pytest.mark.parametrize("number", QUICK)
 def test_a_few_runs_are_those_of_the_reference(number):
-    check(number)
+    check(number, plain=True)
 
 
 @pytest.mark.slow

@@ -5,11 +5,13 @@ with inductance, 5e-15 where the reference takes shorter steps), and by 1e-10 ra
 """
 
 import warnings
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import compiled_run
 import servotwin as st
 from reference.drivetrain import Trace, simulate_case
 from reference.drivetrain_cases import TERMS, Case, command_of, load_of, random_case, servo_of
@@ -37,12 +39,12 @@ MIXTURES = [
 ]
 
 
-def simulate(case: Case, times: np.ndarray, **options: object) -> st.Result:
+def simulate(case: Case, times: np.ndarray, by: Callable[..., st.Result] = st.simulate, **options: object) -> st.Result:
     """A case of the reference, run by the package; one without edges gets its first pulse after its end."""
     model = (st.PulseServoInductive if case.inductive else st.PulseServo)(servo_of(case))
     late = st.signals.pulse_train([case.duration + 1.0], [case.command.before], unit="s")
-    return st.simulate(model, late if case.edges == () else command_of(case), duration=case.duration,
-                       load=load_of(case), output_times=times, initial=dict(case.initial), **options).raise_if_failed()
+    return by(model, late if case.edges == () else command_of(case), duration=case.duration, load=load_of(case),
+              output_times=times, initial=dict(case.initial), **options).raise_if_failed()
 
 
 def on_a_knife_edge(trace: Trace) -> bool:
@@ -71,14 +73,16 @@ def deviations(case: Case, result: st.Result, trace: Trace) -> dict[str, float]:
     return found
 
 
-def left_out(cases: list[Case], tolerance: float) -> int:
-    """Compare the cases; return how many knife edges there were among them."""
+def left_out(cases: list[Case], tolerance: float, *, plain: bool = False) -> int:
+    """Compare the cases, in plain Python too; return how many knife edges there were among them."""
     skipped = 0
     for case in cases:
         times = np.linspace(0.0, case.duration, 41)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # random calibrations differ by design
-            result = simulate(case, times)
+            result = simulate(case, times, by=compiled_run.simulate)
+            if plain:
+                compiled_run.is_the_same(result, simulate(case, times))
         trace = simulate_case(case, times, **COARSE)
         if on_a_knife_edge(trace):
             skipped += 1
@@ -96,7 +100,7 @@ def tolerance_of(terms: set[str]) -> float:
 @pytest.mark.parametrize("term", sorted(TERMS))
 def test_each_effect(term):
     cases = [random_case(seed, frozenset({term})) for seed in range(FEW)]
-    assert left_out([replace(case, duration=SHORT) for case in cases], tolerance_of({term})) == 0
+    assert left_out([replace(case, duration=SHORT) for case in cases], tolerance_of({term}), plain=True) == 0
 
 
 @pytest.mark.slow
@@ -109,7 +113,7 @@ def test_each_effect_in_many_servos(term):
 @pytest.mark.parametrize("terms", MIXTURES, ids=lambda terms: "+".join(sorted(terms)))
 def test_effects_mixed(terms):
     case = replace(random_case(100, frozenset(terms)), duration=SHORT)
-    assert left_out([case], tolerance_of(terms)) == 0
+    assert left_out([case], tolerance_of(terms), plain=True) == 0
 
 
 @pytest.mark.slow
