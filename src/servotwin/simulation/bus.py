@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -13,15 +12,12 @@ import numpy as np
 from servotwin.errors import InputError, SimulationError, UnknownNameError
 from servotwin.models import Model
 from servotwin.models.outputs import SIGNALS
-from servotwin.models.samples import Samples
-from servotwin.models.state.modes import Vector
 from servotwin.models.terms.source import Source
 from servotwin.parameters.groups import Supply
 from servotwin.signals import Signal
 from servotwin.simulation import bus_run, files, frames
 from servotwin.simulation.bus_rows import events_of, segments_of
 from servotwin.simulation.bus_supply import MODEL_NAMES, MODELS, check_rigid, check_supply, on_supply, source_of
-from servotwin.simulation.bus_voltage import BusVoltage
 from servotwin.simulation.energy import Energy
 from servotwin.simulation.engine import Plan
 from servotwin.simulation.oddities import warn_of
@@ -293,16 +289,4 @@ class _AllAlong:
     trajectories: Sequence[Trajectory]
 
     def __call__(self, time: Array) -> Array:
-        samples = [trajectory.at(time) for trajectory in self.trajectories]
-        bus = BusVoltage(self.source, len(self.plans))
-        return np.array([self._at(bus, samples, k) for k in range(len(time))])
-
-    def _at(self, bus: BusVoltage, samples: Sequence[Samples], k: int) -> float:
-        bus.begin()
-        for plan, s in zip(self.plans, samples, strict=True):
-            y = Vector(s.angle[k], s.speed[k], s.current[k], s.winding[k], s.housing[k], s.motor_angle[k],
-                       s.motor_speed[k])
-            if not np.isfinite(y.q):  # after the run has ended
-                return math.nan
-            bus.connect(plan, y, float(s.drive[k]), 0.0 if s.duty is None else float(s.duty[k]), int(s.silent[k]))
-        return bus.volts()
+        return bus_run.voltages(self.plans, self.source, [trajectory.at(time) for trajectory in self.trajectories])

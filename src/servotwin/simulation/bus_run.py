@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from servotwin.models.engine import controller
 from servotwin.models.engine.batch.tiles import Lanes
-from servotwin.models.engine.bus import bus_unit, event_log, event_queue
+from servotwin.models.engine.bus import bus_batch, bus_unit, event_log, event_queue
 from servotwin.models.engine.bus.bus_batch import Buses
 from servotwin.models.engine.bus.bus_inputs import Tables
 from servotwin.models.engine.bus.bus_records import ROOM, Mate, Seat, Shared, put_shared
@@ -21,6 +21,7 @@ from servotwin.models.engine.bus.event_log import Tape
 from servotwin.models.engine.demands import demanded
 from servotwin.models.engine.memory import Memories, Memory, forgotten, resumed
 from servotwin.models.engine.step import DIVERGED
+from servotwin.models.samples import Samples
 from servotwin.models.state.records import TILE, numbers_in, object_of, put_fields, record_of, room, rows_of
 from servotwin.models.terms import control
 from servotwin.models.terms.chip import NO_CHIP, Chip
@@ -37,7 +38,7 @@ from servotwin.simulation.lanes.packed import programs_of
 
 Array = NDArray[np.float64]
 
-_ENTRIES = tuple(f"servotwin.models.engine.bus.bus_batch:{name}" for name in ("go_on", "look"))
+_ENTRIES = tuple(f"servotwin.models.engine.bus.bus_batch:{name}" for name in ("go_on", "look", "voltages"))
 BUSES = Recipe("buses", _ENTRIES, knows=~SPRING)
 """All servos but those with a spring between two bodies; they take hardly longer for what others lack."""
 _PLAINLY = PLAIN_RUNS.knows & ~CURVED_Q
@@ -45,6 +46,7 @@ SHARED, SEAT, MATE = record_of(Shared), record_of(Seat), record_of(Mate)
 UNIT, COUPLING = record_of(Unit), record_of(Coupling)
 
 LOADS_FROM, COMPILES_FROM = 1e2, 1.5e4  # frames of servos in one process: what it takes, and more, in plain Python
+_AS_FRAMES = 0.05  # of its frames a servo's share in finding the voltage at an instant takes as long
 _INTEGRATED = 8  # a servo that does not move by plain laws takes so many times as long
 _ROWS, _NUMBERS = 4096, 1 << 17  # of a tape
 _frames_run: dict[str, float] = {}  # in plain Python, of what a recipe would do
@@ -62,17 +64,35 @@ class Rows(NamedTuple):
 
 def run(plans: Sequence[Plan], states: Sequence[State], source: Source, duration: float) -> Rows:
     """Run servos on one source from t = 0 to `duration` [s]."""
-    digital = {plan.digital for plan in plans}
     frames = duration * sum(
         _weight(plan) / (plan.firmware.T_c if plan.digital else plan.chip.frame_period) for plan in plans)
-    compiled = len(digital) == 1 and _worth_it(frames)  # servos with a program beside others have no room of one shape
-    way = _Compiled(plans, states, source) if compiled else Plainly(plans, states, source)
+    way = (_Compiled if _worth_it(plans, frames) else Plainly)(plans, states, source)
     return taped(way, duration, tape_of(len(plans)))
 
 
 def run_alone(plan: Plan, state: State, source: Source, duration: float) -> Rows:
     """Run one servo on its own source from t = 0 to `duration` [s], compiled: its way as rows, and what happened."""
     return taped(_Compiled([plan], [state], source), duration, tape_of(1))
+
+
+def voltages(plans: Sequence[Plan], source: Source, samples: Sequence[Samples]) -> Array:
+    """Return the voltage of a source at some instants, from the states of all its servos there [V]; nan after a run."""
+    states = np.array([np.broadcast_arrays(
+        s.angle, s.speed, s.current, s.winding, s.housing, s.motor_angle, s.motor_speed, s.drive,
+        0.0 if s.duty is None else s.duty, s.silent) for s in samples], np.float64).transpose(2, 0, 1)
+    found = np.full(len(states), math.nan)
+    runs = np.isfinite(states[:, :, 0]).all(axis=1)
+    known, rows = np.zeros(int(runs.sum())), states[runs].reshape(-1, 10)
+    if known.size:
+        if _worth_it(plans, _AS_FRAMES * len(rows)):
+            kernels(BUSES).voltages(_lanes_of(plans), shared_of([source]), room_of(len(plans))[1], rows, known)
+        else:
+            shared = object_of(Shared)
+            put_shared(shared, at_start(source))
+            mates = [object_of(Mate) for _ in range(2 * len(plans))]
+            bus_batch.voltages(_lanes_of(plans), [shared], mates, rows, known)
+    found[runs] = known
+    return found
 
 
 def taped(way: _Compiled | Plainly, until: float, written: Tape,
@@ -112,9 +132,12 @@ def _weight(plan: Plan) -> float:
     return 1.0 if plainly else _INTEGRATED
 
 
-def _worth_it(frames: float) -> bool:
-    """Tell whether so many frames of servos, with those before, are worth compiled kernels."""
-    if is_plain():
+def _worth_it(plans: Sequence[Plan], frames: float) -> bool:
+    """Tell whether so many frames of servos, with those before, are worth compiled kernels.
+
+    Servos with a program have no room of one shape with others.
+    """
+    if is_plain() or len({plan.digital for plan in plans}) > 1:
         return False
     done = _frames_run.get(BUSES.name, 0.0) + frames
     if done >= COMPILES_FROM or (done >= LOADS_FROM and is_compiled(BUSES)):

@@ -108,7 +108,8 @@ def _of_buses() -> Mapping[str, tuple[Kind, ...]]:
     own = (_LANES, tables, _tuple(Buses, _INDICES, memories=_MEMORIES, shared=shared, ended=_FLOATS))
     tape = _tuple(Tape, _TABLE, numbers=_FLOATS, used=_INDICES)
     return {"bus_batch:go_on": (*own, INT64, INT64, FLOAT64, FLOAT64, *room, *units, tape),
-            "bus_batch:look": (*own, *room, _TABLE), "cosim_lanes:break_up": (_INDICES, shared, _ROWS)}
+            "bus_batch:look": (*own, *room, _TABLE),
+            "bus_batch:voltages": (_LANES, shared, room[1], _TABLE, _FLOATS), "cosim_lanes:break_up": (_INDICES, shared, _ROWS)}
 
 
 @cache
@@ -145,7 +146,8 @@ _OF_BENCH = ("make", "begin", "begin_at", "heed", "change", "take", "count", "dr
 _ELSEWHERE: Mapping[str, Callable[[], Mapping[str, tuple[Kind, ...]]]] = {  # where kinds take more than lanes have
     "digital_batch:go_on": _of_ticks, "leg_runs:go_on": _of_ticks, "leg_runs:go_on_nearly": _of_ticks,
     "coupled_runs:go_on": _of_ticks, **{f"bench:{name}": _of_the_bench for name in _OF_BENCH},
-    "bus_batch:go_on": _of_buses, "bus_batch:look": _of_buses, "cosim_lanes:break_up": _of_buses}
+    "bus_batch:go_on": _of_buses, "bus_batch:look": _of_buses, "bus_batch:voltages": _of_buses,
+    "cosim_lanes:break_up": _of_buses}
 
 
 def _on_tiles(rows: Array, plans: Array, real: Kind) -> dict[str, tuple[Kind, ...]]:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from servotwin.models.engine import controller, step
 from servotwin.models.engine.batch.tiles import chip_of
 from servotwin.models.engine.batch.tiles import numbers_of as numbers_at
-from servotwin.models.engine.bus import bus_unit, coupled_ticks, event_queue
+from servotwin.models.engine.bus import bus_unit, coupled_ticks, event_queue, shared_source
 from servotwin.models.engine.bus.bus_inputs import Tables, Told, inputs_at
-from servotwin.models.engine.bus.bus_records import drive_of, numbers_of, put_point, source_of
+from servotwin.models.engine.bus.bus_records import drive_of, numbers_of, put_numbers, put_point, put_vector, source_of
 from servotwin.models.engine.bus.coupled_motion import APART
 from servotwin.models.engine.bus.coupled_units import put_unit_numbers, unit_state
 from servotwin.models.engine.bus.event_log import Tape, runs
@@ -33,7 +33,7 @@ from servotwin.models.engine.memory import (
 )
 from servotwin.models.engine.observe import observed, on_bus, told_by
 from servotwin.models.engine.step import COMPLETED
-from servotwin.models.state.modes import Mode
+from servotwin.models.state.modes import Mode, Vector
 from servotwin.models.terms import duty, firmware
 from servotwin.models.terms.numbers import warm
 from servotwin.physics.pieces import Piece, piece_value
@@ -189,3 +189,33 @@ def _look(told: Told, buses: Buses, k: int, count: int, seats: Any, mates: Any, 
         if firmware.present(told.lanes.firmware[0]):
             shown = told_by(numbers.bridge, memory.firm[0], shown)
         put(seen, seat.lane, shown)
+
+
+def voltages(lanes: Lanes, shared: Any, mates: Any, states: Floats, found: Floats) -> None:
+    """Put in `found` the voltage of one bus at each of some instants, from where its servos stand there [V].
+
+    `states` has a row for each servo at each instant: state, drive, duty, and 1 while pulses stay away from it. There
+    have to be twice as many mates as servos.
+    """
+    source, count = source_of(shared[0].source), len(states) // len(found)
+    for k in range(count):
+        put_numbers(mates[count + k].numbers, numbers_at(lanes, k))
+    for n in range(len(found)):
+        connected = 0
+        for k in range(count):
+            r = n * count + k
+            y = Vector(states[r, 0], states[r, 1], states[r, 2], states[r, 3], states[r, 4], states[r, 5], states[r, 6])
+            drive, now = states[r, 7], states[r, 8]
+            numbers = numbers_of(mates[count + k].numbers)
+            if firmware.present(lanes.firmware[0]):
+                numbers = duty.at_duty(numbers, now)
+            else:
+                numbers = step.at_pulses(numbers, int(states[r, 9]))
+            if shared_source.is_connected(numbers, drive, y):
+                mate = mates[connected]
+                put_numbers(mate.numbers, shared_source.on_stiff_source(numbers, drive == 0.0))
+                put_vector(mate.y, y)
+                mate.sign = shared_source.part_on_bus(drive, numbers.bridge, now, y)
+                mate.returns = 1 if drive == 0.0 else 0
+                connected += 1
+        found[n] = shared_source.put_in_zones(source, mates, connected, source.V)[1]

@@ -16,7 +16,7 @@ from servotwin.models.engine.dynamics import currents
 from servotwin.models.state.modes import NO_CURRENT, Vector, sign_of
 from servotwin.models.terms import duty
 from servotwin.models.terms import source as source_term
-from servotwin.models.terms.bridge import Bridge
+from servotwin.models.terms.bridge import Bridge, coasts
 from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.models.terms.source import Source
 from servotwin.physics import bridge, motor, supply
@@ -53,6 +53,11 @@ def blocked(numbers: Numbers) -> Numbers:
         numbers.motor, Bridge(_BLOCKS, path.R_drive, path.off, path.silence, path.V_br, path.pwm, path.one_way),
         numbers.source, numbers.follower, numbers.shaft, numbers.friction, numbers.load, numbers.stops, numbers.play,
         numbers.sensor, numbers.heat, numbers.elastic)
+
+
+def is_connected(numbers: Numbers, drive: float, y: Vector) -> bool:
+    """Tell whether a motor is connected to the bus: driven, or through the diodes of a bridge that coasts."""
+    return drive != 0.0 or (coasts(numbers.bridge) and (y.i != 0.0 or y.w_m != 0.0))
 
 
 def sign_on_bus(drive: float, y: Vector) -> float:
