@@ -216,12 +216,13 @@ def result(bug: Bug, limit: float, engine: bool) -> dict[str, object] | None:
     with tempfile.TemporaryDirectory(prefix="servotwin-mutant-") as name:
         folder = Path(name)
         tree = tree_with(bug, folder)
+        recorded: list[str] = []
         if engine:
-            failed, _ = seen(pytest(tree, folder / "kernels", 600.0, RECORDED))
-            if not failed:
+            recorded, _ = seen(pytest(tree, folder / "kernels", 600.0, "-m", "", RECORDED))
+            if not recorded:
                 return None
         failed, ran = seen(pytest(tree, folder / "kernels", limit, "-m", "", *tests_of(bug.file)))
-    return {"bug": bug.name, "engine": engine, "ran": ran, "seen_by": failed}
+    return {"bug": bug.name, "engine": engine, "ran": ran, "seen_by": sorted({*recorded, *failed})}
 
 
 def main() -> None:
