@@ -11,7 +11,7 @@ from servotwin.models.state.modes import Vector
 from servotwin.models.terms import heat
 from servotwin.models.terms.numbers import Numbers
 
-CALLED = ("alone",)  # one lane: with copies it takes four times as long to compile
+CALLED = ("gone",)  # one lane: with copies it takes four times as long to compile
 
 def phase(size: int, tile: Any, plan: Any) -> None:
     """Move all lanes through a time with or without drive."""
