@@ -109,7 +109,8 @@ def _of_buses() -> Mapping[str, tuple[Kind, ...]]:
     tape = _tuple(Tape, _TABLE, numbers=_FLOATS, used=_INDICES)
     return {"bus_batch:go_on": (*own, INT64, INT64, FLOAT64, FLOAT64, *room, *units, tape),
             "bus_batch:look": (*own, *room, _TABLE),
-            "bus_batch:voltages": (_LANES, shared, room[1], _TABLE, _FLOATS), "cosim_lanes:break_up": (_INDICES, shared, _ROWS)}
+            "bus_batch:voltages": (_LANES, shared, room[1], _TABLE, _FLOATS),
+            "cosim_lanes:break_up": (_INDICES, shared, _ROWS)}
 
 
 @cache
