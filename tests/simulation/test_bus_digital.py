@@ -132,12 +132,26 @@ def test_a_neighbour_that_stalls_starves_a_servo_with_undervoltage():
     assert not alone["holds"]["trip"].any()
 
 
+@pytest.mark.parametrize("order", ["coasts, winds, digital", "digital, coasts, winds"])
+def test_servos_of_all_kinds_share_what_the_source_gives(servo, order):
+    """V_bus = V_oc - R_b sum(i) at every instant, and energy is kept."""
+    models = {"coasts": st.PulseServo(servo.replace({"electronics.off_state": "coast"})), "digital": digital(DROPS),
+              "winds": st.PulseServoInductive(servo.replace({"motor.armature_inductance": 1e-3}))}
+    fleet = st.simulate_bus({name: (models[name], STEP, LOAD) for name in order.split(", ")}, supply=BATTERY,
+                            duration=0.2)
+    drawn = sum(result["supply_current"] for result in fleet.values())
+    np.testing.assert_allclose(fleet.bus_voltage, V_OC - R_B * drawn, rtol=0.0, atol=1e-9)
+    assert abs(fleet.energy.residual) <= 1e-9 * fleet.energy.supply
+    assert fleet.bus_voltage.min() < V_OC - 0.5
+
+
 @pytest.mark.slow
 def test_compiled_it_is_the_same(monkeypatch):
     models = [digital(SORTS[sort]) for sort in ("everything", "drops", "slow PWM")]
     servos = {str(k): (model, st.signals.step(0.1, 1.0 - 0.3 * k, at=0.02 * k, unit="rad"), LOAD)
               for k, model in enumerate(models)}
     plain = st.simulate_bus(servos, supply=BATTERY, duration=0.3)
+    assert np.isfinite(plain.bus_voltage).all()  # found now, and kept
     for name in ("LOADS_FROM", "COMPILES_FROM"):
         monkeypatch.setattr(bus_run, name, 0)
     compiled = st.simulate_bus(servos, supply=BATTERY, duration=0.3)

@@ -50,6 +50,7 @@ def test_compiled_a_fleet_is_what_it_is_in_plain_python(servo, monkeypatch, name
     monkeypatch.setattr(bus_run, "COMPILES_FROM", 1e99)
     monkeypatch.setattr(bus_run, "LOADS_FROM", 1e99)
     plain = fleet_of(servo, name)
+    assert np.isfinite(plain.bus_voltage).all()  # found now, and kept
     monkeypatch.setattr(bus_run, "COMPILES_FROM", 0.0)
     compiled = fleet_of(servo, name)
     same(compiled, plain, 1e-12 if name == "plain" else 1e-10)

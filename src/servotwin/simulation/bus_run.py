@@ -262,7 +262,7 @@ def _lanes_of(plans: Sequence[Plan]) -> Lanes:
 
 def _programs_of(plans: Sequence[Plan]) -> NDArray[Any]:
     """Return the records of the programs of servos that all have one, or none."""
-    if not plans[0].digital:
+    if not all(plan.digital for plan in plans):
         return programs_of(None, 1)
     columns: Any = (np.array(column) for column in zip(*(plan.firmware for plan in plans), strict=True))
     return programs_of(Firmware(*columns), len(plans))

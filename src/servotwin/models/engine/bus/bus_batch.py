@@ -207,7 +207,7 @@ def voltages(lanes: Lanes, shared: Any, mates: Any, states: Floats, found: Float
             y = Vector(states[r, 0], states[r, 1], states[r, 2], states[r, 3], states[r, 4], states[r, 5], states[r, 6])
             drive, now = states[r, 7], states[r, 8]
             numbers = numbers_of(mates[count + k].numbers)
-            if firmware.present(lanes.firmware[0]):
+            if duty.present(numbers.bridge):
                 numbers = duty.at_duty(numbers, now)
             else:
                 numbers = step.at_pulses(numbers, int(states[r, 9]))
