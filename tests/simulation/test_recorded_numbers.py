@@ -9,6 +9,7 @@ import warnings
 
 import pytest
 
+from costs import BUDGETS
 from simulation.recorded.machine import installed
 from simulation.recorded.populations import JOINTS, SETS
 from simulation.recorded.recipes import all_recipes
@@ -16,12 +17,14 @@ from simulation.recorded.record import differences, loaded, same_machine, tolera
 
 TEXT, PLACES, VALUES = loaded()
 EXACT = same_machine(TEXT)
+QUICK = set(BUDGETS["kernels"]["quick"])
 
 
 def cases():
-    """Return a case for each set, whose name says what is compared."""
+    """Return a case for each set, whose name says what is compared; those that need other kernels are long."""
     tolerances = {name: tolerance_of(name, one, EXACT) for name, one in TEXT["sets"].items()}
-    return [pytest.param(name, tolerance, id=f"{name}: {f'to {tolerance:.0e}' if tolerance else 'all bits'}")
+    return [pytest.param(name, tolerance, id=f"{name}: {f'to {tolerance:.0e}' if tolerance else 'all bits'}",
+                         marks=() if set(TEXT["sets"][name]["recipes"]) <= QUICK else pytest.mark.long)
             for name, tolerance in tolerances.items()]
 
 
@@ -30,7 +33,6 @@ def test_all_sets_and_all_recipes_are_recorded():
     assert {recipe for one in TEXT["sets"].values() for recipe in one["recipes"]} == all_recipes()
 
 
-@pytest.mark.long(but="plain, longer: to 1e-09")
 @pytest.mark.parametrize(("name", "tolerance"), cases())
 def test_kernels_give_what_was_recorded(name, tolerance):
     if name in JOINTS:
