@@ -211,8 +211,8 @@ def seen(said: str) -> tuple[list[str], int]:
     return sorted({*failed, *broken, *open_one}), len(verdicts)
 
 
-def result(bug: Bug, limit: float, engine: bool) -> dict[str, object] | None:
-    """Return what sees a bug; None where it is in the engine and changes nothing that is recorded."""
+def result(bug: Bug, limit: float, engine: bool) -> dict[str, object]:
+    """Return what sees a bug; nothing ran where it is in the engine and changes nothing that is recorded."""
     with tempfile.TemporaryDirectory(prefix="servotwin-mutant-") as name:
         folder = Path(name)
         tree = tree_with(bug, folder)
@@ -220,7 +220,7 @@ def result(bug: Bug, limit: float, engine: bool) -> dict[str, object] | None:
         if engine:
             recorded, _ = seen(pytest(tree, folder / "kernels", 600.0, "-m", "", RECORDED))
             if not recorded:
-                return None
+                return {"bug": bug.name, "engine": True, "ran": 0, "seen_by": []}
         failed, ran = seen(pytest(tree, folder / "kernels", limit, "-m", "", *tests_of(bug.file)))
     return {"bug": bug.name, "engine": engine, "ran": ran, "seen_by": sorted({*recorded, *failed})}
 
@@ -239,17 +239,16 @@ def main() -> None:
             draws, missing = drawn(given.seed, engine), number
             while missing > 0:
                 batch = list(islice(draws, missing))
-                names = {one["bug"] for one in kept}
-                missing -= sum(bug.name in names for bug in batch)
-                fresh = [bug for bug in batch if bug.name not in names]
+                ran = {one["bug"]: one["ran"] for one in kept}
+                missing -= sum(ran.get(bug.name, 0) > 0 for bug in batch)
+                fresh = [bug for bug in batch if bug.name not in ran]
                 rows = pool.map(partial(result, limit=given.limit, engine=engine), fresh)
                 for bug, row in zip(fresh, rows, strict=True):
-                    print(f"{bug.name}: " + ("changes nothing" if row is None else
-                                             f"{len(row['seen_by'])} of {row['ran']} see it"), flush=True)
-                    if row is not None:
-                        missing -= 1
-                        kept.append(row)
-                        KEPT.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+                    print(f"{bug.name}: {len(row['seen_by'])} of {row['ran']} see it" if row["ran"] else
+                          f"{bug.name}: changes nothing that is recorded", flush=True)
+                    missing -= row["ran"] > 0
+                    kept.append(row)
+                    KEPT.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
