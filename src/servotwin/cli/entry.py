@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from typing import TextIO
 
+    from typer import Typer
     from typer.core import TyperGroup
 
 TRACEBACK = "SERVOTWIN_TRACEBACK"
@@ -69,11 +70,9 @@ def _ran(words: Sequence[str]) -> int:
 
 
 @cache
-def _command() -> TyperGroup:
+def _command(app: Typer) -> TyperGroup:
     """Return all commands with their options, which takes as long as to import them."""
     from typer.main import get_command
-
-    from servotwin.cli.app import app
 
     return get_command(app)  # type: ignore[return-value]
 
@@ -81,7 +80,9 @@ def _command() -> TyperGroup:
 def _run(words: Sequence[str]) -> int:
     import typer
 
-    command = _command()
+    from servotwin.cli import app
+
+    command = _command(app.app)
     try:
         # Not command(...): that would print errors in its own way, and treat a broken pipe as one of ours.
         with command.make_context("servotwin", list(words)) as context:
