@@ -239,14 +239,15 @@ def main() -> None:
             draws, missing = drawn(given.seed, engine), number
             while missing > 0:
                 batch = list(islice(draws, missing))
-                ran = {one["bug"]: one["ran"] for one in kept}
-                missing -= sum(ran.get(bug.name, 0) > 0 for bug in batch)
-                fresh = [bug for bug in batch if bug.name not in ran]
+                counts = {one["bug"]: one["ran"] > 0 or not one["engine"] for one in kept}
+                missing -= sum(counts.get(bug.name, False) for bug in batch)
+                fresh = [bug for bug in batch if bug.name not in counts]
                 rows = pool.map(partial(result, limit=given.limit, engine=engine), fresh)
                 for bug, row in zip(fresh, rows, strict=True):
-                    print(f"{bug.name}: {len(row['seen_by'])} of {row['ran']} see it" if row["ran"] else
-                          f"{bug.name}: changes nothing that is recorded", flush=True)
-                    missing -= row["ran"] > 0
+                    unseen = engine and row["ran"] == 0
+                    print(f"{bug.name}: " + ("changes nothing that is recorded" if unseen else
+                                             f"{len(row['seen_by'])} of {row['ran']} see it"), flush=True)
+                    missing -= not unseen
                     kept.append(row)
                     KEPT.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
 
