@@ -43,6 +43,10 @@ def test_files(cli, tmp_path):
     assert list(rows[0]) == ["frequency_Hz", "mean_gain", "mean_phase_deg", "simulated_20deg_gain",
                              "simulated_20deg_phase_deg", "described_20deg_gain", "described_20deg_phase_deg"]
     assert "exists" in cli("linear", SERVO, "--csv", str(names[2])).error
+    cli("linear", SERVO, "--frame", "20ms,10ms", "--csv", str(tmp_path / "b.csv"))
+    header = (tmp_path / "b.csv").read_text().splitlines()[0].split(",")
+    assert [name for name in header if name.startswith("sampled")] == [
+        f"sampled_{period}ms_{what}" for period in (20, 10) for what in ("gain", "phase_deg")]
 
 
 @pytest.mark.slow
