@@ -138,7 +138,7 @@ def test_servos_of_all_kinds_share_what_the_source_gives(servo, order):
     models = {"coasts": st.PulseServo(servo.replace({"electronics.off_state": "coast"})), "digital": digital(DROPS),
               "winds": st.PulseServoInductive(servo.replace({"motor.armature_inductance": 1e-3}))}
     fleet = st.simulate_bus({name: (models[name], STEP, LOAD) for name in order.split(", ")}, supply=BATTERY,
-                            duration=0.2)
+                            duration=0.04)
     drawn = sum(result["supply_current"] for result in fleet.values())
     np.testing.assert_allclose(fleet.bus_voltage, V_OC - R_B * drawn, rtol=0.0, atol=1e-9)
     assert abs(fleet.energy.residual) <= 1e-9 * fleet.energy.supply
