@@ -250,3 +250,36 @@ def test_a_joint_that_mimics_another_gets_no_servo(robot, tmp_path):
     ended = robot(*words, "--servo", "grip2=towerpro-mg996r", "--force")
     assert ended.code == 2
     assert "servo of joint grip2: got 'one of its own', allowed: none: grip2 follows grip" in ended.err
+
+
+LYING = """<robot name="arm"><link name="base"><collision><geometry><box size=".06 .06 .09"/></geometry>
+  </collision></link>
+  <link name="column">{0}</link><link name="arm">{0}<collision><origin xyz="0 0 .05"/><geometry><box size=".03 .03 .1"/>
+  </geometry></collision></link><joint name="pan" type="revolute"><parent link="base"/><child link="column"/>
+  <origin xyz="0 0 .025"/><axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="2" velocity="5"/></joint>
+  <joint name="lift" type="revolute"><parent link="column"/><child link="arm"/><axis xyz="0 1 0"/>
+  <limit lower="-2" upper="2" effort="2" velocity="5"/></joint></robot>""".format(
+    '<inertial><mass value=".05"/><inertia ixx="3e-5" iyy="3e-5" izz="3e-5" ixy="0" ixz="0" iyz="0"/></inertial>')
+
+
+def test_what_lies_in_what_is_said_and_nothing_judged(robot, cli, tmp_path):
+    """An arm's box reaches 20 mm into a base to which no joint joins it."""
+    (tmp_path / "lying.urdf").write_text(LYING)
+    (tmp_path / "m.csv").write_text("time_s,pan_deg\n0,0\n0.2,10\n0.4,0\n")
+    words = ("lying.urdf", "--servo", "*=feetech-sts3215-7v4", "--json")
+    kept = json.loads(robot(*quick(*words, motion="m.csv")).out)
+    assert (kept["judged"], kept["big_enough"]) == (False, None)
+    assert kept["notes"][0] == "arm lies 20 mm in what is fixed where the motion begins"
+    assert kept["reason"] == f"{kept['notes'][0]} (overlap=ignore leaves such contacts out)"
+    sizing = kept["joints"]["pan"]["sizing"]
+    assert (sizing["verdict"], sizing["judged"]) == (f"not judged: {kept['reason']}", False)
+    assert "The servos are not judged" in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    free = json.loads(robot(*quick(*words, "--contact", "overlap=ignore", motion="m.csv", out="free")).out)
+    assert (free["judged"], free["reason"], free["big_enough"]) == (True, None, True)
+    refused = robot(*quick(*words, "--contact", "all", motion="m.csv", out="none"))
+    assert (refused.code, refused.err) == (2, "servotwin: error: --contact: got 'all', allowed: overlap=ignore\n")
+    assert not (tmp_path / "none").exists()
+    which = ("catalog", "which", "--robot", "lying.urdf", "--motion", "m.csv", "--among", "feetech-sts3215-7v4",
+             "--voltage", "7.4")
+    assert "not judged" in cli(*which, "--why").out
+    assert "not judged" not in cli(*which, "--contact", "overlap=ignore", "--why").out

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
+from servotwin.cli.robot_options import ContactOption
 from servotwin.cli.terminal import emit_json, pairs, patience, show, table
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ class _Asked:
     bus: Supply | None
     limits: Limits
     named: bool
+    overlap: str
 
     @property
     def words(self) -> str:
@@ -77,6 +79,7 @@ def which(
     robot: Annotated[str | None, typer.Option(
         metavar="MODEL.xml", help="Robot whose joints follow --motion: MJCF or URDF file, or so101. Each candidate is "
         "put at all of its hinges.", rich_help_panel=_TASK)] = None,
+    contact: ContactOption = None,
     joint: Annotated[list[str] | None, typer.Option(
         metavar="NAME", help="Joint of the motion that counts, repeatable (default: all).", rich_help_panel=_TASK)]
     = None,
@@ -103,6 +106,7 @@ def which(
 ) -> None:
     """List the servos that do a task within limits, side by side, and say why the others do not."""
     from servotwin.cli.lift_words import asked_lift
+    from servotwin.cli.robot_words import overlap_of
     from servotwin.cli.which_words import limits_of, prices_of
 
     bounds, shop = limits_of(limit or [], time), None if prices is None else prices_of(prices)
@@ -113,7 +117,7 @@ def which(
         raise _nothing()
     plant, followed = _motion(motion, robot, joint or [], weight)
     asked = _Asked(lift=weight, motion=followed, plant=plant, robot=robot, joints=tuple(joint or ()), at=at, bus=bus,
-                   limits=bounds, named=bool(named))
+                   limits=bounds, named=bool(named), overlap=overlap_of(contact))
     servos = _servos(named, shop, prices, bounds, register or [])
     found = _judged(servos, asked, shop)
     if as_json:
@@ -244,7 +248,7 @@ def _tried(each: Judged, asked: _Asked) -> Judged:
     if asked.motion is None or each.candidate.model is None or (each.candidate.reasons and not asked.named):
         return each
     tried = try_motion(each.candidate, asked.plant, asked.motion, joints=asked.joints, bus=asked.bus,
-                       limits=asked.limits)
+                       limits=asked.limits, overlap=asked.overlap)
     return each._replace(candidate=tried.candidate, tried=tried)
 
 

@@ -23,7 +23,8 @@ def facts(run: RobotRun, sized: dict[str, Sizing], robot: str) -> dict[str, Any]
         "timestep": float(run.model.opt.timestep), "blend_window": run.ideal.window,
         "supply": None if run.bus is None else {
             "open_circuit_voltage": run.bus.open_circuit_voltage, "internal_resistance": run.bus.internal_resistance},
-        "big_enough": all(each.big_enough for each in sized.values()),
+        "judged": not run.unjudged, "reason": run.unjudged or None,
+        "big_enough": None if run.unjudged else all(each.big_enough for each in sized.values()),
         "notes": list(run.notes),
         "joints": {joint: _of_joint(run, sized[joint]) for joint in run.mounts},
     }
@@ -38,7 +39,8 @@ def _of_joint(run: RobotRun, sized: Sizing) -> dict[str, Any]:
         "mount": {"zero": mount.zero, "direction": mount.direction, "ratio": mount.ratio},
         "slides": run.slides(sized.joint), "tracking": shown, "measured_rms": run.measured_error(sized.joint),
         "sizing": {
-            "big_enough": sized.big_enough, "verdict": sized.verdict, "margin": sized.margin, "short": sized.short,
+            "judged": not sized.unjudged, "big_enough": None if sized.unjudged else sized.big_enough,
+            "verdict": sized.verdict, "margin": sized.margin, "short": sized.short,
             "worst": sized.worst._asdict(), "supply_voltage": sized.voltage, "left_voltage": sized.left_voltage,
             "stall_torque": sized.curve.stall_torque, "top_speed": sized.top_speed, "rms_torque": sized.rms_torque,
             "rms_delivered": sized.rms_delivered, "lasting_torque": sized.lasting_torque,

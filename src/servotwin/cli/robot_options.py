@@ -42,6 +42,9 @@ SupplyOption = Annotated[str | None, typer.Option(
 FrictionOption = Annotated[str, typer.Option(
     metavar="HOW", help="What to do with damping and friction that the model's joints have themselves: refuse, "
     "clear (the servo has its own) or keep.", rich_help_panel=ROBOT)]
+ContactOption = Annotated[str | None, typer.Option(
+    metavar="overlap=ignore", help="Leave out contacts of shapes that lie in each other in the first pose or where the "
+    "motion begins (default: they count, and the servos are not judged).", rich_help_panel=ROBOT)]
 CalibrationOption = Annotated[Path | None, typer.Option(
     metavar="FILE.json", help="LeRobot's calibration of the robot.", rich_help_panel=MOTION)]
 EpisodesOption = Annotated[list[int] | None, typer.Option(
@@ -81,11 +84,12 @@ def asked_robot(model_file: str, dataset: Path, *, servo: Sequence[str], mount: 
 
     from servotwin.cli.robot_words import as_options, chosen_servos, models_of, mounts_of, supply_of, units_of
     from servotwin.cli.terminal import patience
-    from servotwin.robots import joint_names, joint_ranges, read_motion, robot_model
+    from servotwin.robots import joint_names, joint_ranges, read_motion
     from servotwin.robots.coupling import couplings_of
     from servotwin.robots.episode import episodes_of
+    from servotwin.robots.model_file import Plant, plant_of
 
-    plant = robot_model(model_file) if plant is None else plant
+    plant, read = plant_of(model_file) if plant is None else Plant(plant)
     joints = joint_names(plant)
     chosen = chosen_servos(model_file, servo, joints, followers=couplings_of(plant))
     mounts = mounts_of(models_of(chosen, model, change, register), mount, joints)
@@ -97,4 +101,4 @@ def asked_robot(model_file: str, dataset: Path, *, servo: Sequence[str], mount: 
         motions = [replace(one, robot="") for one in motions]
     own = sorted({name for each in chosen.values() for name in each.registers}) if not register else []
     said = (f"registers assumed as LeRobot writes them for {model_file} (sets {', '.join(own)})",) if own else ()
-    return Asked(plant=plant, mounts=mounts, bus=supply_of(supply), motions=motions, said=said)
+    return Asked(plant=plant, mounts=mounts, bus=supply_of(supply), motions=motions, said=(*read, *said))

@@ -64,6 +64,9 @@ def _notes(run: RobotRun) -> str:
 
 
 def _answer(sized: Mapping[str, Sizing]) -> str:
+    unjudged = next((each.unjudged for each in sized.values() if each.unjudged), "")
+    if unjudged:
+        return f'<div class="no"><p>The servos are not judged: {escape(signed(unjudged))}.</p></div>\n'
     wrong = [each for each in sized.values() if not each.big_enough]
     if not wrong:
         return '<div class="yes"><p>All servos are big enough for this motion.</p></div>\n'

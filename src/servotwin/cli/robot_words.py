@@ -194,6 +194,19 @@ def supply_of(text: str | None) -> Supply | None:
     return None if text is None else Supply.of(text, what="--supply")
 
 
+def overlap_of(text: str | None) -> str:
+    """Return what to do with shapes that overlap, of the words of `--contact`.
+
+    Raises
+    ------
+    InputError
+        If it is anything but ``"overlap=ignore"``.
+    """
+    if text not in (None, "overlap=ignore"):
+        raise InputError("--contact", got=text, allowed="overlap=ignore")
+    return "keep" if text is None else "ignore"
+
+
 def units_of(words: Sequence[str]) -> str | dict[str, str] | None:
     """Return the unit of a dataset's goals, by joint where a word names one.
 

@@ -108,7 +108,7 @@ def moved_joints(plant: Any, motion: Motion, joints: Sequence[str] = ()) -> tupl
 
 
 def try_motion(candidate: Candidate, plant: Any, motion: Motion, *, joints: Sequence[str] = (),
-               bus: Supply | None = None, limits: Limits | None = None) -> Tried:
+               bus: Supply | None = None, limits: Limits | None = None, overlap: str = "keep") -> Tried:
     """Let a candidate at all joints follow a motion, and say what speaks against it at those that are asked about.
 
     The middle of the way of each joint is the middle of the servo's travel.
@@ -125,6 +125,8 @@ def try_motion(candidate: Candidate, plant: Any, motion: Motion, *, joints: Sequ
         That the joints share.
     limits : Limits, optional
         Of which the current is that of the run.
+    overlap : str
+        As of `run_motion`; a candidate that cannot be judged has that as its reason.
     """
     at, asked = moved_joints(plant, motion, joints), joints or motion.joints
     model = candidate.model
@@ -137,7 +139,7 @@ def try_motion(candidate: Candidate, plant: Any, motion: Motion, *, joints: Sequ
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
-            run = run_motion(plant, mounts, motion, bus=bus, joint_friction="clear")
+            run = run_motion(plant, mounts, motion, bus=bus, joint_friction="clear", overlap=overlap)
             sizing = sizing_of(run)
     except (InputError, SimulationError) as error:
         return Tried(_with(candidate, [Reason("motion", str(error))]), None, {})

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, SimulationError
+from servotwin.robots.contacts import body_name, joints_between
 from servotwin.robots.linkage import Linkage
 from servotwin.robots.motion import Motion
 from servotwin.robots.places import load_mujoco
@@ -46,12 +47,16 @@ class Course(NamedTuple):
 
 
 class Touch(NamedTuple):
-    """Two bodies of which neither yields, that run into each other: names, first time [s], and for how long [s]."""
+    """Two bodies of which neither yields, that run into each other.
+
+    Their names, first time [s], for how long [s], and the joints between them, which press them together.
+    """
 
     first: str
     second: str
     time: float
     duration: float
+    joints: tuple[str, ...] = ()
 
     @property
     def words(self) -> str:
@@ -242,12 +247,9 @@ class _Firm:
     def touches(self, time: Array) -> tuple[Touch, ...]:
         """Return all that have met, the first ones first."""
         step = float(time[1] - time[0]) if len(time) > 1 else 0.0
-        found = [Touch(self._name(second), self._name(first), times[0], step * len(times))
-                 for (first, second), times in self._met.items()]
+        found = [Touch(body_name(self._model, second), body_name(self._model, first), times[0], step * len(times),
+                       joints_between(self._model, first, second)) for (first, second), times in self._met.items()]
         return tuple(sorted(found, key=lambda touch: touch.time))
-
-    def _name(self, body: int) -> str:
-        return "what is fixed" if body == 0 else self._model.body(body).name or f"body {body}"
 
 
 def _standing(angle: float, count: int) -> Course:

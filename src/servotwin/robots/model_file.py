@@ -7,9 +7,11 @@ import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
+from xml.etree import ElementTree as Xml
 
 from servotwin.errors import InputError, UnknownNameError
+from servotwin.robots.contacts import part_neighbours
 from servotwin.robots.mobile_robot import mobile_robot
 from servotwin.robots.places import load_mujoco
 from servotwin.robots.so101 import so101
@@ -22,12 +24,22 @@ _SKY = {"rgb1": (0.66, 0.75, 0.86), "rgb2": (0.93, 0.95, 0.97), "width": 64, "he
 _LIGHT = ((0.4, 0.4, 0.4), (0.6, 0.6, 0.6))  # ambient and diffuse, of a robot that has none
 
 
+class Plant(NamedTuple):
+    """A robot's MjModel, and in sentences what was done about its file; functions that take a model take it too."""
+
+    model: Any
+    said: tuple[str, ...] = ()
+
+
 def robot_model(source: Any) -> Any:
     """Return an MjModel of its own, which may be changed.
 
+    Links that a joint joins do not touch each other in it: of a URDF none do, and of an MJCF, whose own choice stands,
+    those that do not overlap by over 1 mm in the first pose.
+
     Parameters
     ----------
-    source : MjModel, MjSpec, str or Path
+    source : MjModel, MjSpec, Plant, str or Path
         A path is of an MJCF or URDF file; a string may be the name of a robot that comes with the package. What is
         read from a file gets a sky and light where it has none: pictures would be black.
 
@@ -43,19 +55,27 @@ def robot_model(source: Any) -> Any:
     >>> robot_model("so101").njnt
     6
     """
+    return plant_of(source).model
+
+
+def plant_of(source: Any) -> Plant:
+    """Return an MjModel of its own, as `robot_model` does, and what was done about its file."""
     mujoco = load_mujoco()
+    if isinstance(source, Plant):
+        return source._replace(model=copy.copy(source.model))
     if isinstance(source, mujoco.MjModel):
-        return copy.copy(source)
+        own = copy.copy(source)
+        return Plant(own, part_neighbours(own))
     if isinstance(source, mujoco.MjSpec):
-        return source.copy().compile()
+        return _compiled(source.copy(), {})
     if not isinstance(source, str | Path) or not str(source):
         raise InputError("model of a robot", got=source, allowed="an MjModel, an MjSpec or the path of an MJCF file")
     if str(source) in BUILT_IN:
-        return mujoco.MjModel.from_xml_string(BUILT_IN[str(source)]())
+        return Plant(mujoco.MjModel.from_xml_string(BUILT_IN[str(source)]()))
     return _read(mujoco, Path(source))
 
 
-def _read(mujoco: Any, path: Path) -> Any:
+def _read(mujoco: Any, path: Path) -> Plant:
     try:
         is_file = path.is_file()
     except (OSError, ValueError):  # a name that no file can have
@@ -73,14 +93,36 @@ def _read(mujoco: Any, path: Path) -> Any:
         if not spec.lights:
             light = spec.visual.headlight
             light.ambient, light.diffuse = _LIGHT
-        model = spec.compile()
+        plant = _compiled(spec, _parents(path))
+    except InputError:
+        raise
     except Exception as error:  # MuJoCo raises ValueError, its own FatalError and what its plugins raise
         raise InputError(f"{path} is no model that MuJoCo reads ({' '.join(str(error).split())})") from None
+    model = plant.model
     names = bytes(model.names).decode("utf-8", "surrogateescape")  # of the robot, its joints and all else
     for name in names.split("\0"):
         if fault_of(name, math.inf):
             checked_name(f"{path}: name{_of_what(model, names, name)}", name, math.inf)
-    return model
+    return plant
+
+
+def _parents(path: Path) -> dict[str, str]:
+    """Return the links of a URDF by those that its joints hang on them; nothing of another file."""
+    try:
+        root = Xml.parse(path).getroot()
+    except (Xml.ParseError, OSError):
+        return {}
+    ends = ((joint.find("child"), joint.find("parent")) for joint in root.iter("joint") if root.tag == "robot")
+    return {child.get("link", ""): parent.get("link", "") for child, parent in ends
+            if child is not None and parent is not None}
+
+
+def _compiled(spec: Any, parents: Mapping[str, str]) -> Plant:
+    """Return the model of a spec whose neighbours do not touch; `parents` are links of a URDF by their children."""
+    scene = len(spec.worldbody.geoms)
+    model = spec.compile()
+    merged = range(scene, int(model.body_geomnum[0]))  # into the world, whose own shapes come first
+    return Plant(model, part_neighbours(model, fixed=merged, always=bool(parents), parents=parents))
 
 
 def _of_what(model: Any, names: str, name: str) -> str:

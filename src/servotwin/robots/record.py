@@ -37,6 +37,8 @@ _SHOWN = {"rad": (math.degrees(1.0), "deg"), "m": (1e3, "mm"), "s": (1e6, "us")}
 CLIPPED = "commands clipped"
 _ROUNDING = 1e-6  # of a command: what clips it by less tells nothing
 FROM_NOWHERE = "energy from nowhere"
+NOT_KNOWN = f"{FROM_NOWHERE} not known"
+_POSSIBLE = "its solver may not converge, its step be too long, or shapes overlap where it begins"
 _NOTICED = 0.01  # of the largest energy: what may appear from nowhere; steps alone make 0.004 of it
 
 
@@ -198,6 +200,8 @@ class Record(Mapping[str, ServoRecord]):
         actuators and applied forces since, but for what a semi-implicit step borrows of gravity [J]. Contacts and
         limits can only take; a solver that has not converged lets them give. Where bodies are moved as mocap it cannot
         be told and is nan. State that is set by hand counts.
+    cause : str
+        Why energy comes from nowhere, in words; empty until somebody has found out, as `run_motion` does.
 
     Examples
     --------
@@ -221,6 +225,7 @@ class Record(Mapping[str, ServoRecord]):
                  slides: tuple[str, ...] = ()) -> None:
         self.time, self.energy, self.energy_from_nowhere = (rows[:, k].copy() for k in range(len(ROW)))
         self._solver_note, self._said, self._slides = solver_note, said, slides
+        self.cause = ""
         width, first = len(_COLUMNS), len(ROW)
         parts = [rows[:, first + width * k:first + width * (k + 1)] for k in range(len(joints))]
         still = _still_since(self.time, [part[:, _COLUMNS.index("command_angle")] for part in parts])
@@ -236,8 +241,8 @@ class Record(Mapping[str, ServoRecord]):
     def remarks(self) -> tuple[Remark, ...]:
         """Return what holds of the whole robot, (kind, time [s]).
 
-        "solver iterations raised" or "few solver iterations" of MuJoCo, "energy from nowhere", "commands clipped" of
-        each joint where they were.
+        "solver iterations raised" or "few solver iterations" of MuJoCo, "energy from nowhere" or "energy from nowhere
+        not known", "commands clipped" of each joint where they were.
         """
         found = [Remark(CLIPPED, servo.clipped.time) for servo in self._servos.values() if servo.clipped]
         if self._solver_note and len(self.time):
@@ -245,6 +250,8 @@ class Record(Mapping[str, ServoRecord]):
         noticed = np.flatnonzero(self.energy_from_nowhere > _NOTICED * self._largest)
         if len(noticed):
             found.append(Remark(FROM_NOWHERE, float(self.time[noticed[0]])))
+        if len(self.time) > 1 and np.isnan(self.energy_from_nowhere).all():
+            found.append(Remark(NOT_KNOWN, float(self.time[0])))
         return tuple(found)
 
     @property
@@ -260,8 +267,10 @@ class Record(Mapping[str, ServoRecord]):
         for time in (remark.time for remark in self.remarks if remark.kind == FROM_NOWHERE):
             most = float(np.nanmax(self.energy_from_nowhere))
             found.append(f"energy from nowhere from {time:.3g} s on: up to {most:.3g} J more than there was and than "
-                         f"servos have given, with {self._largest:.3g} J at most in the model: its solver does not "
-                         "converge, or its step is too long")
+                         f"servos have given, with {self._largest:.3g} J at most in the model: "
+                         f"{self.cause or _POSSIBLE}")
+        if any(remark.kind == NOT_KNOWN for remark in self.remarks):
+            found.append("energy from nowhere is not known: bodies are moved as mocap, and nobody counts their work")
         for joint, servo in self._servos.items():
             clipped, (factor, unit) = servo.clipped, _SHOWN.get(
                 servo.unit("joint_command", slides=joint in self._slides), (1.0, ""))

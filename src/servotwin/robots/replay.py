@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 from servotwin.datasheet.full_drive import FullDrive
 from servotwin.errors import InputError
 from servotwin.models import Model
+from servotwin.robots.contacts import leave_out_measured
 from servotwin.robots.gains import COMMON, Gains, position_run
+from servotwin.robots.model_file import plant_of
 from servotwin.robots.motion import Motion
 from servotwin.robots.mount import Mount
 from servotwin.robots.run import RobotRun, run_motion
@@ -153,10 +155,11 @@ def validate_robot(model: Any, servos: Mapping[str, Model | Mount], motions: Mot
     """
     given = [motions] if isinstance(motions, Motion) else list(motions)
     _check(given, servos, latency)
-    runs = []
+    plant, runs = plant_of(model), []
+    left_out = leave_out_measured(plant.model, given)
     with shown(progress, len(given), "replaying") as tell:
         for k, motion in enumerate(given):
-            runs.append(run_motion(model, servos, motion, bus=bus, joint_friction=joint_friction, timestep=timestep,
+            runs.append(run_motion(plant, servos, motion, bus=bus, joint_friction=joint_friction, timestep=timestep,
                                    settle=_SETTLE, hold="previous", assume_heat=assume_heat))
             tell(k + 1)
     joints = [joint for joint in runs[0].mounts if all(joint in motion.measured for motion in given)]
@@ -166,8 +169,8 @@ def validate_robot(model: Any, servos: Mapping[str, Model | Mount], motions: Mot
     replays = tuple(_replay(run, own, late, joints) for run, own in zip(runs, courses, strict=True))
     errors = {name: {joint: {kind: _error(replays, name, joint, kind) for kind in KINDS} for joint in joints}
               for name in names}
-    said = tuple(dict.fromkeys(text for run in runs for text in (
-        *run.said, *(f"{run.motion.source}: {touch.words}" for touch in run.ideal.touches))))
+    said = tuple(dict.fromkeys((*left_out, *(text for run in runs for text in (
+        *run.said, *(f"{run.motion.source}: {touch.words}" for touch in run.ideal.touches))))))
     return RobotValidation(replays=replays, latency=late, errors=errors, windows=_windows(replays, joints), said=said)
 
 

@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
+import contextlib
+import copy
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.errors import InputError, UnknownNameError
+from servotwin.errors import InputError, SimulationError, UnknownNameError
 from servotwin.models import Model
 from servotwin.parameters.groups import Supply
 from servotwin.robots.command_map import unused_ranges
+from servotwin.robots.contacts import fall_of, leave_out, links_of, overlap_words, overlaps, robot_bodies
 from servotwin.robots.coupling import couple, couplings_of, led
 from servotwin.robots.drive import ServoDrive
 from servotwin.robots.heat import warm_mounts
 from servotwin.robots.ideal import IdealRun, blend_window, ideal_run
-from servotwin.robots.model_file import joint_names, robot_model
+from servotwin.robots.model_file import joint_names, joint_ranges, plant_of
 from servotwin.robots.motion import Motion
 from servotwin.robots.mount import Mount
 from servotwin.robots.notes import notes_of
 from servotwin.robots.places import load_mujoco
-from servotwin.robots.record import Record
+from servotwin.robots.record import FROM_NOWHERE, Record
 from servotwin.robots.registers import as_motion_says
 from servotwin.robots.sizing import supplied
 from servotwin.robots.tracking import Tracking, tracking_of
@@ -33,6 +36,11 @@ from servotwin.units import is_finite
 Array = NDArray[np.float64]
 SETTLE = 0.5  # s, before the motion and after it
 _HOLDS = ("linear", "previous")
+_OVERLAPS = ("keep", "ignore")
+_SLACK = 1e-6  # rad or m, of limits at which a joint begins
+_AFTER = 0.1  # s, for which a robot is followed again beyond the first energy from nowhere, to find its cause
+_NO_ENERGY = 1e-6  # J
+_MANY = 100  # iterations of a solver
 _MOST_TICKS = 2_000_000
 _SAME, _SAME_TICKS = 1e-9, 1e-3  # s; of a tick, beside which datasets round their times
 _TELL = 50  # ticks between two words on the progress
@@ -62,6 +70,9 @@ class RobotRun:
     said : tuple of str
         What was assumed of its servos, and done about the motion and the model, that nobody has asked for; one sentence
         each.
+    unjudged : str
+        Why nothing can be said about its servos, such as links that lie in each other where the motion begins, or a
+        robot that nothing carries; empty if it can.
     """
 
     model: Any
@@ -73,6 +84,7 @@ class RobotRun:
     ideal: IdealRun
     tracking: Mapping[str, Tracking]
     said: tuple[str, ...] = ()
+    unjudged: str = ""
 
     @property
     def time(self) -> Array:
@@ -123,7 +135,7 @@ def supply_of(bus: Any, joint: str) -> Supply | None:
 
 def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, *, bus: Any = None,
                joint_friction: str = "refuse", timestep: float | None = None, settle: float = SETTLE,
-               hold: str = "linear", window: float | None = None, assume_heat: bool = True,
+               hold: str = "linear", window: float | None = None, assume_heat: bool = True, overlap: str = "keep",
                progress: Progress = False) -> RobotRun:
     """Let the servos of a robot follow a motion, and the same robot with ideal actuators beside.
 
@@ -132,8 +144,9 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
 
     Parameters
     ----------
-    model : MjModel, MjSpec, str or Path
-        Of the robot: a copy is changed. A path is of an MJCF file; "so101" is an arm that comes with the package.
+    model : MjModel, MjSpec, Plant, str or Path
+        Of the robot: a copy is changed. A path is of an MJCF or URDF file; "so101" is an arm that comes with the
+        package. Links that a joint joins do not touch each other, as `robot_model` says.
     servos : mapping of str to Model or Mount
         By the name of the joint.
     motion : Motion
@@ -153,6 +166,9 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
         Over which the motion of the ideal actuators is blended; `blend_window` of it unless given [s]
     assume_heat : bool
         Whether servos whose files have no thermal numbers get warm by ones that their mass lets assume.
+    overlap : str
+        What to do with other shapes that lie over 1 mm in each other in the first pose or where the motion begins:
+        "keep", their contact counts, and the servos are not judged; "ignore", it is left out. The ground is never.
     progress : bool or callable
         Whether to show how far it is; a callable is told the steps done, and all.
 
@@ -173,9 +189,8 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
     >>> 0.01 < run.tracking["wrist_flex"].rms < 0.1
     True
     """
-    mujoco = load_mujoco()
-    _check(motion, settle, hold, timestep)
-    own = robot_model(model)
+    _check(motion, settle, hold, timestep, overlap)
+    own, read = plant_of(model)
     own.opt.timestep = timestep or _fitting(own.opt.timestep, motion, hold)
     settle = own.opt.timestep * math.ceil(settle / own.opt.timestep - _SAME_TICKS)  # the motion begins with a tick
     mounts = warm_mounts(servos, assume_heat=assume_heat, shared=bus is not None)
@@ -184,23 +199,99 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
         supplied(mount.model, supply_of(bus, joint))  # raises before anything is run
     motion, said = _led_motion(own, motion, mounts)
     _check_joints(motion, mounts, joint_names(own))
+    lying = _lying(own, motion, mounts, overlap)
     controls, ranges = unused_ranges(own, mounts)
-    drive = ServoDrive(own, mounts, bus=bus, joint_friction=joint_friction, controls=controls,
-                       assume_heat=False)  # it is in the mounts
-    time = _times(own.opt.timestep, motion.duration, settle)
-    with shown(progress, 2 * len(time), "following the motion") as tell:
-        data = mujoco.MjData(drive.model)
-        poses = np.zeros((len(time), own.nq))
-        begin(drive, data, motion, mounts, -settle)
-        for k, goals in enumerate(_goals(motion, time - own.opt.timestep, hold, 0.5 * own.opt.timestep)):
-            if goals:
-                drive.command(data, goals)
-            drive.step(data)
-            poses[k] = data.qpos
-            if k % _TELL == 0:
-                tell(k)
-        done = finished(drive, data, motion, mounts, bus, poses, window=window, tell=lambda k: tell(len(time) + k))
-    return replace(done, said=(*assumed, *said, *ranges))
+
+    def follow(plant: Any, until: float, tell: Callable[[int], object]) -> tuple[ServoDrive, Any, Array]:
+        drive = ServoDrive(plant, mounts, bus=bus, joint_friction=joint_friction, controls=controls,
+                           assume_heat=False)  # it is in the mounts
+        return (drive, *_followed(drive, motion, mounts, settle=settle, hold=hold, until=until, tell=tell))
+
+    first = copy.copy(own)
+    ticks = len(_times(own.opt.timestep, motion.duration, settle))
+    with shown(progress, 2 * ticks, "following the motion") as tell:
+        drive, data, poses = follow(own, math.inf, tell)
+        done = finished(drive, data, motion, mounts, bus, poses, window=window, tell=lambda k: tell(ticks + k))
+    done.record.cause = _cause(done, first, lying.deepest, follow)
+    fall = fall_of(own, done.time, done.poses, mounts)
+    return replace(done, said=(*read, *lying.said, *([fall.words] if fall else []), *assumed, *said, *ranges),
+                   unjudged=lying.unjudged or (fall.words if fall else ""))
+
+
+class _Lying(NamedTuple):
+    """What of a robot lies in what: sentences, the deepest pair where its motion begins, and why nothing is judged."""
+
+    said: tuple[str, ...] = ()
+    deepest: str = ""
+    unjudged: str = ""
+
+
+def _lying(model: Any, motion: Motion, mounts: Mapping[str, Mount], overlap: str) -> _Lying:
+    """Return what of a robot lies in what, and what begins beyond its limits; leave contacts out if so asked."""
+    if not joint_names(model).keys() >= mounts.keys():
+        return _Lying()  # the drive says what is wrong with them
+    bodies, start, ignored = robot_bodies(model, mounts), model.qpos0.copy(), overlap == "ignore"
+    _put(model, start, motion, mounts)
+    there = overlaps(model, start, bodies)
+    met = {(one.first, one.second) for one in there}
+    before = [one for one in overlaps(model, model.qpos0, bodies) if (one.first, one.second) not in met]
+    said = []
+    for found, when in ((there, "where the motion begins"), (before, "in the first pose")):
+        said += [f"{overlap_words(model, one)} {when}" + (
+            ": left out of contact" if ignored and links_of(model, [one]) else "") for one in found]
+    deepest = said[0] if there else ""
+    way = "leaves such contacts out" if links_of(model, there[:1]) else "judges all the same"
+    if overlap == "ignore":
+        leave_out(model, links_of(model, (*there, *before)))
+    for joint, (low, high) in joint_ranges(model).items():
+        at = float(start[model.jnt_qposadr[model.joint(joint).id]])
+        if joint not in motion.angles and not low - _SLACK <= at <= high + _SLACK:
+            said.append(f"joint {joint} begins at {at:.4g}, beyond its range in the model, {low:.4g} to {high:.4g} "
+                        "(rad or m)")
+    return _Lying(tuple(said), deepest, f"{deepest} (overlap=ignore {way})" if deepest and not ignored else "")
+
+
+def _followed(drive: ServoDrive, motion: Motion, mounts: Mapping[str, Mount], *, settle: float, hold: str, until: float,
+              tell: Callable[[int], object]) -> tuple[Any, Array]:
+    """Let a drive follow a motion up to some time [s]; return its data, and the poses at the ends of ticks."""
+    step, data = float(drive.model.opt.timestep), load_mujoco().MjData(drive.model)
+    time = _times(step, motion.duration, settle)
+    time = time[:int(np.searchsorted(time, until))]
+    poses = np.zeros((len(time), drive.model.nq))
+    begin(drive, data, motion, mounts, -settle)
+    for k, goals in enumerate(_goals(motion, time - step, hold, 0.5 * step)):
+        if goals:
+            drive.command(data, goals)
+        drive.step(data)
+        poses[k] = data.qpos
+        if k % _TELL == 0:
+            tell(k)
+    return data, poses
+
+
+def _cause(done: RobotRun, first: Any, lying: str,
+           follow: Callable[[Any, float, Callable[[int], object]], tuple[ServoDrive, Any, Array]]) -> str:
+    """Return why energy came from nowhere, found by going there again with more iterations and with shorter steps."""
+    times = [remark.time for remark in done.record.remarks if remark.kind == FROM_NOWHERE]
+    if not times:
+        return ""
+    if lying and times[0] < done.time[0] + _AFTER:
+        return f"{lying}, and is pushed out of it"
+    until = times[0] + _AFTER
+    most = float(np.nanmax(done.record.energy_from_nowhere[done.time < until]))
+    many = max(_MANY, 4 * int(first.opt.iterations))
+    for words, changes in ((f"its solver does not converge: with {many} iterations", {
+            "iterations": many, "ls_iterations": max(_MANY, int(first.opt.ls_iterations))}), (
+            f"its step is too long: with {500.0 * first.opt.timestep:.3g} ms", {"timestep": 0.5 * first.opt.timestep})):
+        plant = copy.copy(first)
+        for name, value in changes.items():
+            setattr(plant.opt, name, value)
+        with contextlib.suppress(SimulationError):
+            drive, data, _ = follow(plant, until, lambda k: None)
+            left = float(np.nanmax(drive.result(data).energy_from_nowhere))
+            if left < 0.5 * most:
+                return f"{words} it is {left if left > _NO_ENERGY else 0.0:.2g} J up to {until:.3g} s, not {most:.2g} J"
+    return "neither more iterations of its solver nor half the step change that"
 
 
 def finished(drive: ServoDrive, data: Any, motion: Motion, mounts: Mapping[str, Mount], bus: Any, poses: Array, *,
@@ -227,13 +318,15 @@ def finished(drive: ServoDrive, data: Any, motion: Motion, mounts: Mapping[str, 
                                                  motion.duration) for joint in drive.joints})
 
 
-def _check(motion: Motion, settle: float, hold: str, timestep: float | None) -> None:
+def _check(motion: Motion, settle: float, hold: str, timestep: float | None, overlap: str) -> None:
     if not isinstance(motion, Motion):
         raise InputError("motion", got=motion, allowed="a Motion, such as read_motion(...)")
     if not (is_finite(settle) and settle >= 0.0):
         raise InputError("settle", got=settle, allowed="a number of seconds that is not negative")
     if hold not in _HOLDS:
         raise InputError("hold", got=hold, allowed=" or ".join(map(repr, _HOLDS)))
+    if overlap not in _OVERLAPS:
+        raise InputError("overlap", got=overlap, allowed=" or ".join(map(repr, _OVERLAPS)))
     if timestep is not None and not (is_finite(timestep) and timestep > 0.0):
         raise InputError("timestep", got=timestep, allowed="a positive number of seconds")
 
@@ -307,18 +400,23 @@ def begin(drive: ServoDrive, data: Any, motion: Motion, mounts: Mapping[str, Mou
         If a servo would have to begin beyond its stops.
     """
     model, goals = drive.model, {}
+    _put(model, data.qpos, motion, mounts)
     for joint, mount in mounts.items():
-        at = int(model.jnt_qposadr[model.joint(joint).id])
-        if joint in motion.angles:
-            data.qpos[at] = motion.at(joint, 0.0)
         if not mount.model.endless:  # such as a bridge without its chip, which is told no angle
-            goals[joint] = float(data.qpos[at])
+            goals[joint] = float(data.qpos[model.jnt_qposadr[model.joint(joint).id]])
             _check_travel(joint, mount, goals[joint])
-    couple(model, data.qpos)
     data.time = time
     load_mujoco().mj_forward(model, data)
     drive.record(data)
     drive.command(data, goals)
+
+
+def _put(model: Any, qpos: Array, motion: Motion, mounts: Mapping[str, Mount]) -> None:
+    """Put joints at the first row of a motion, in place, and those that follow them."""
+    for joint in mounts:
+        if joint in motion.angles:
+            qpos[model.jnt_qposadr[model.joint(joint).id]] = motion.at(joint, 0.0)
+    couple(model, qpos)
 
 
 def _check_travel(joint: str, mount: Mount, start: float) -> None:

@@ -96,6 +96,10 @@ class Sizing:
         Of a motion that is repeated; None where thermal masses are not known.
     trips : tuple of Remark
         Of the run.
+    unjudged : str
+        Why nothing can be said about this, as of the run; empty if it can.
+    held : str
+        What presses on the joint while it moves, in words.
     """
 
     joint: str
@@ -114,15 +118,19 @@ class Sizing:
     lasting_torque: float
     heating: Heating | None
     trips: tuple[Remark, ...]
+    unjudged: str = ""
+    held: str = ""
 
     @property
     def big_enough(self) -> bool:
-        """Whether the servo has what the motion takes, stays cool enough, and does not trip."""
+        """Whether the servo has what the motion takes, stays cool enough, and does not trip; no if it is not judged."""
         return not self.problems
 
     @property
     def problems(self) -> tuple[str, ...]:
         """What is wrong, the worst first; empty where the servo is big enough."""
+        if self.unjudged:
+            return (f"not judged: {self.unjudged}",)
         found = [f"{trip.kind} at {trip.time:.2f} s" for trip in self.trips]
         if self.margin < 1.0:
             found.append(self._shortage())
@@ -134,11 +142,11 @@ class Sizing:
 
         Where the margin is less than 1 the servo may come through nevertheless, later than it should.
         """
-        if self.problems:
-            return "; ".join(self.problems)
-        if self.margin > _MOST_TOLD:
-            return f"big enough: more than {_MOST_TOLD:.0f} times what is needed"
-        return f"big enough: {self.margin:.2g} times what is needed"
+        said = list(self.problems)
+        if not said:
+            times = f"more than {_MOST_TOLD:.0f}" if self.margin > _MOST_TOLD else f"{self.margin:.2g}"
+            said.append(f"big enough: {times} times what is needed")
+        return "; ".join([*said, *([self.held] if self.held and not self.unjudged else [])])
 
     def _shortage(self) -> str:
         at = self.worst
@@ -259,7 +267,9 @@ def _sized(run: RobotRun, joint: str) -> Sizing:
         worst=Worst(float(run.time[at]), float(needed.speed[at]), float(abs(needed.torque[at])), float(has[at])),
         rms_torque=_rms(needed.torque[inside]), rms_delivered=_rms(delivered.torque[inside]),
         lasting_torque=math.nan if masses is None else lasting_torque(model, masses),
-        heating=None if masses is None else _heating(run, joint), trips=record.trips)
+        heating=None if masses is None else _heating(run, joint), trips=record.trips, unjudged=run.unjudged,
+        held="; ".join(f"held by {touch.first} against {touch.second} from {max(touch.time, 0.0):.2f} s on"
+                       for touch in run.ideal.touches if joint in touch.joints))
 
 
 def _heating(run: RobotRun, joint: str) -> Heating | None:

@@ -28,6 +28,7 @@ from servotwin.parameters import Servo, Supply
 from servotwin.parameters.output_side import OUTPUT_SIDE
 from servotwin.parameters.quantity import Quantity
 from servotwin.robots import Motion, RobotValidation, validate_robot
+from servotwin.robots.contacts import leave_out_measured
 from servotwin.robots.episode import joints_of_dataset
 from servotwin.units import is_finite
 
@@ -95,6 +96,7 @@ def identify_arm(logs: Any, robot: Any, servos: Any = None, *, bus: Supply | Non
     named = joints_of_dataset(Path(logs)) if robot == UNKNOWN and isinstance(logs, str | Path) else ()
     first = motions_of(logs, plant_of(robot, named)[0])
     plant, said = plant_of(robot, tuple(first[0].measured))
+    said += leave_out_measured(plant, first)
     mounts, assumed = mounts_of(servos, robot, plant, first)
     supply = supply_of(bus, mounts)
     joints = list(mounts)
