@@ -181,5 +181,5 @@ def test_mocap_bodies_may_give_what_they_want():
     record = drive.result(data)
     assert np.isnan(record.energy_from_nowhere).all()
     assert [remark.kind for remark in record.remarks] == ["energy from nowhere not known"]
-    assert record.notes[-1] == "energy from nowhere is not known: bodies are moved as mocap, and nobody counts their work"
+    assert record.notes[-1] == "energy from nowhere is not known: mocap bodies move, and nobody counts their work"
     assert np.isfinite(record.energy).all()

@@ -270,7 +270,7 @@ class Record(Mapping[str, ServoRecord]):
                          f"servos have given, with {self._largest:.3g} J at most in the model: "
                          f"{self.cause or _POSSIBLE}")
         if any(remark.kind == NOT_KNOWN for remark in self.remarks):
-            found.append("energy from nowhere is not known: bodies are moved as mocap, and nobody counts their work")
+            found.append("energy from nowhere is not known: mocap bodies move, and nobody counts their work")
         for joint, servo in self._servos.items():
             clipped, (factor, unit) = servo.clipped, _SHOWN.get(
                 servo.unit("joint_command", slides=joint in self._slides), (1.0, ""))
