@@ -192,6 +192,9 @@ def test_a_video(robot, tmp_path, monkeypatch):
     (("arm.xml", *SERVOS, "--supply", "-6"), "--supply: got '-6'"),
     (("arm.xml", *SERVOS, "--supply", "60"), "supply voltage of hitec-hs-755hb"),
     (("arm.xml", *SERVOS, "--supply", "6", "--servo", "elbow=towerpro-mg996r"), "servos on shared supplies are of one"),
+    (("arm.xml", *SERVOS, "--package", "arm"), "--package: got 'arm', allowed: NAME=FOLDER"),
+    (("arm.xml", *SERVOS, "--package", "arm=none"), "--package arm: got 'none', allowed: a folder that is there"),
+    (("arm.xml", *SERVOS, "--package", "a=.", "--package", "a=."), "--package a: got '. and .', allowed: one"),
     (("arm.xml", *SERVOS, "--friction", "off"), "--friction: got 'off'"),
     (("damped.xml", *SERVOS), "--friction clear sets it so, --friction keep"),
     (("arm.xml", *SERVOS, "--hold", "spline"), "--hold: got 'spline'"),
@@ -283,3 +286,15 @@ def test_what_lies_in_what_is_said_and_nothing_judged(robot, cli, tmp_path):
              "--voltage", "7.4")
     assert "not judged" in cli(*which, "--why").out
     assert "not judged" not in cli(*which, "--contact", "overlap=ignore", "--why").out
+
+
+def test_a_star_stands_for_the_joints_that_the_robot_drives(robot, tmp_path):
+    """Of two hinges and a slide an actuator drives one; another has a servo because it is named."""
+    (tmp_path / "elbow.csv").write_text("time_s,elbow_deg\n0,0\n0.2,10\n0.4,0\n")
+    words = ("driven.xml", "--servo", "*=hitec-hs-755hb", "--mount", "elbow=0deg", "--json")
+    found = json.loads(robot(*quick(*words, motion="elbow.csv")).out)
+    assert list(found["joints"]) == ["elbow"]
+    assert "no servo at shoulder: no actuator of the file drives it" in found["notes"]
+    both = json.loads(robot(*quick(*words, "--servo", "shoulder=hitec-hs-755hb", motion="elbow.csv", out="both")).out)
+    assert list(both["joints"]) == ["shoulder", "elbow"]
+    assert not any("no servo at" in note for note in both["notes"])

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.robot_options import ContactOption
+from servotwin.cli.robot_options import ContactOption, PackageOption
 from servotwin.cli.terminal import emit_json, pairs, patience, show, table
 
 if TYPE_CHECKING:
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from servotwin.datasheet.choice import Limits
     from servotwin.parameters import Servo, Supply
     from servotwin.robots import Motion
+    from servotwin.robots.model_file import Plant
 
 _WHY = {"torque": "lack the torque", "time": "are too slow", "voltage": "are not for this voltage",
         "current": "draw too much", "mass": "are too heavy", "travel": "do not travel so far",
@@ -37,7 +38,7 @@ class _Asked:
 
     lift: tuple[float, float] | None
     motion: Motion | None
-    plant: Any
+    plant: Plant | None
     robot: str | None
     joints: tuple[str, ...]
     at: Supply | float
@@ -79,7 +80,7 @@ def which(
     robot: Annotated[str | None, typer.Option(
         metavar="MODEL.xml", help="Robot whose joints follow --motion: MJCF or URDF file, or so101. Each candidate is "
         "put at all of its hinges.", rich_help_panel=_TASK)] = None,
-    contact: ContactOption = None,
+    contact: ContactOption = None, package: PackageOption = None,
     joint: Annotated[list[str] | None, typer.Option(
         metavar="NAME", help="Joint of the motion that counts, repeatable (default: all).", rich_help_panel=_TASK)]
     = None,
@@ -115,7 +116,7 @@ def which(
     weight = asked_lift(lift, arm)
     if not (weight or motion or robot or joint or limit or time or among or prices):
         raise _nothing()
-    plant, followed = _motion(motion, robot, joint or [], weight)
+    plant, followed = _motion(motion, robot, joint or [], weight, package or [])
     asked = _Asked(lift=weight, motion=followed, plant=plant, robot=robot, joints=tuple(joint or ()), at=at, bus=bus,
                    limits=bounds, named=bool(named), overlap=overlap_of(contact))
     servos = _servos(named, shop, prices, bounds, register or [])
@@ -146,8 +147,8 @@ def _supply(voltage: str | None, supply: str | None) -> tuple[Supply | float, Su
     return found, found
 
 
-def _motion(path: Path | None, robot: str | None, joints: list[str], lift: tuple[float, float] | None
-            ) -> tuple[Any, Motion | None]:
+def _motion(path: Path | None, robot: str | None, joints: list[str], lift: tuple[float, float] | None,
+            packages: list[str]) -> tuple[Plant | None, Motion | None]:
     """Return robot and motion; without a robot that of an arm, whose joint is the column of the table."""
     from servotwin.errors import InputError
 
@@ -155,15 +156,16 @@ def _motion(path: Path | None, robot: str | None, joints: list[str], lift: tuple
         if robot is not None or joints:
             raise InputError("--robot" if robot is not None else "--joint", allowed="--motion FILE beside it")
         return None, None
-    from servotwin.cli.robot_words import as_options
-    from servotwin.robots import joint_names, joint_ranges, read_motion, robot_model
+    from servotwin.cli.robot_words import as_options, packages_of
+    from servotwin.robots import joint_names, joint_ranges, read_motion
     from servotwin.robots.choice import arm_of, moved_joints
+    from servotwin.robots.model_file import plant_of
 
     if robot is not None and lift is not None:
         raise InputError("--robot", got="also --lift", allowed="one of them: a robot has its own masses")
-    plant = arm_of(_column(path, joints), lift) if robot is None else robot_model(robot)
+    plant = plant_of(arm_of(_column(path, joints), lift) if robot is None else robot, packages_of(packages))
     with as_options(), patience(f"reading {path}"):
-        found = read_motion(path, joint_names(plant), ranges=joint_ranges(plant))
+        found = read_motion(path, joint_names(plant.model), ranges=joint_ranges(plant.model))
     moved_joints(plant, found, joints)
     return plant, found
 
@@ -245,7 +247,8 @@ def _judged(servos: Sequence[tuple[Servo, float]], asked: _Asked, shop: Prices |
 def _tried(each: Judged, asked: _Asked) -> Judged:
     from servotwin.robots.choice import try_motion
 
-    if asked.motion is None or each.candidate.model is None or (each.candidate.reasons and not asked.named):
+    if asked.motion is None or asked.plant is None or each.candidate.model is None or (
+            each.candidate.reasons and not asked.named):
         return each
     tried = try_motion(each.candidate, asked.plant, asked.motion, joints=asked.joints, bus=asked.bus,
                        limits=asked.limits, overlap=asked.overlap)

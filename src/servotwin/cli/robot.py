@@ -52,7 +52,7 @@ def run(
     servo: options.ServoOption = None, mount: options.MountOption = None, model: options.ModelOption = None,
     change: options.SetOption = None, register: options.RegisterOption = None, supply: options.SupplyOption = None,
     friction: options.FrictionOption = "refuse", contact: options.ContactOption = None,
-    calibration: options.CalibrationOption = None,
+    package: options.PackageOption = None, calibration: options.CalibrationOption = None,
     episode: Annotated[int | None, typer.Option(
         metavar="NUMBER", help="Episode of the dataset (default: its first).", rich_help_panel=options.MOTION)] = None,
     unit: options.UnitOption = None,
@@ -85,27 +85,27 @@ def run(
     from servotwin.cli.robot_facts import facts
     from servotwin.cli.robot_words import (
         as_options,
-        chosen_servos,
         models_of,
         mounts_of,
         overlap_of,
+        packages_of,
+        servos_at,
         supply_of,
         units_of,
     )
     from servotwin.robots import joint_names, joint_ranges, run_motion, sizing_of
-    from servotwin.robots.coupling import couplings_of
     from servotwin.robots.model_file import plant_of
     from servotwin.robots.motion import is_dataset
 
     check_numbers(output_step=output_step, rate=rate, blend=blend)
-    plant, overlap = plant_of(model_file), overlap_of(contact)
+    plant, overlap = plant_of(model_file, packages_of(package or [])), overlap_of(contact)
     joints = joint_names(plant.model)
-    chosen = chosen_servos(model_file, servo or [], joints, followers=couplings_of(plant.model))
-    mounts = mounts_of(models_of(chosen, model, change or [], register or []), mount or [], joints)
-    bus = supply_of(supply)
     with as_options():
         followed = _read(motion, joints, joint_ranges(plant.model), unit=units_of(unit or []), calibration=calibration,
                          episode=episode)
+    chosen, left = servos_at(model_file, servo or [], plant, followed)
+    mounts = mounts_of(models_of(chosen, model, change or [], register or []), mount or [], joints)
+    bus = supply_of(supply)
     if register:  # who says registers does not have them assumed
         followed = replace(followed, robot="")
     picture = check_drawing(plant.model, camera, video=video)
@@ -116,6 +116,7 @@ def run(
             done = run_motion(plant, mounts, followed, bus=bus, joint_friction=friction, timestep=timestep,
                               settle=settle, hold=hold or ("previous" if is_dataset(motion) else "linear"),
                               window=blend, overlap=overlap, progress=True)
+            done = replace(done, said=(*done.said, *left))
             sized = sizing_of(done)
         found = facts(done, sized, model_file)
         files.write_all(done, sized, targets, found, force=force, output_step=output_step, camera=camera, rate=rate)

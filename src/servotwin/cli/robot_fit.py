@@ -26,6 +26,7 @@ def fit(
     model_file: options.ModelArgument, logs: DatasetArgument, servo: options.ServoOption = None,
     mount: options.MountOption = None, model: options.ModelOption = None, change: options.SetOption = None,
     register: options.RegisterOption = None, supply: options.SupplyOption = None,
+    package: options.PackageOption = None,
     calibration: options.CalibrationOption = None, episode: options.EpisodesOption = None,
     unit: options.UnitOption = None,
     each: Annotated[bool, typer.Option("--each", help="Fit every servo by itself (default: one for all that are "
@@ -57,7 +58,7 @@ def fit(
     plant, unknown = plant_of(UNKNOWN, joints_of_dataset(logs)) if model_file == UNKNOWN else (None, ())
     asked = options.asked_robot(model_file, logs, servo=servo or [], mount=mount or [], model=model,
                                 change=change or [], register=register or [], supply=supply, calibration=calibration,
-                                episodes=episode or [], unit=unit or [], plant=plant)
+                                episodes=episode or [], unit=unit or [], package=package or [], plant=plant)
 
     def done(names: Sequence[str]) -> tuple[ArmFit, dict[str, Any]]:
         targets = files.targets_of(out, names, force=force, inputs=[logs]) if out is not None else []

@@ -22,7 +22,11 @@ ModelArgument = Annotated[str, typer.Argument(
     "comes with servotwin: without --servo it has six STS3215 with LeRobot's registers.")]
 ServoOption = Annotated[list[str] | None, typer.Option(
     metavar="JOINT=ID", help="Servo of a joint, repeatable: catalog id, or path of a servo file (.toml); "
-    "'*=ID' for all other hinges that follow no other joint.", rich_help_panel=ROBOT)]
+    "'*=ID' for all other hinges that the robot drives: those of its actuators or transmissions, else those that the "
+    "motion moves.", rich_help_panel=ROBOT)]
+PackageOption = Annotated[list[str] | None, typer.Option(
+    metavar="NAME=FOLDER", help="Folder of a ROS package that package://NAME/ names, repeatable (default: found above "
+    "the robot's file).", rich_help_panel=ROBOT)]
 MountOption = Annotated[list[str] | None, typer.Option(
     metavar="JOINT=ZERO:DIRECTION:RATIO", help="How a servo sits at its joint, repeatable: angle of the joint "
     "where the servo's is 0, 1 or -1, turns of the joint per turn of the servo, such as elbow=-90deg:-1; of a "
@@ -78,27 +82,36 @@ class Asked:
 
 def asked_robot(model_file: str, dataset: Path, *, servo: Sequence[str], mount: Sequence[str], model: str | None,
                 change: Sequence[str], register: Sequence[str], supply: str | None, calibration: Path | None,
-                episodes: Sequence[int], unit: Sequence[str], plant: Any = None) -> Asked:
+                episodes: Sequence[int], unit: Sequence[str], package: Sequence[str] = (), plant: Any = None
+                ) -> Asked:
     """Return a robot and the recorded episodes of it, of the words of options; `plant` is one without a file."""
     from dataclasses import replace
 
-    from servotwin.cli.robot_words import as_options, chosen_servos, models_of, mounts_of, supply_of, units_of
+    from servotwin.cli.robot_words import (
+        as_options,
+        models_of,
+        mounts_of,
+        packages_of,
+        servos_at,
+        supply_of,
+        units_of,
+    )
     from servotwin.cli.terminal import patience
     from servotwin.robots import joint_names, joint_ranges, read_motion
-    from servotwin.robots.coupling import couplings_of
     from servotwin.robots.episode import episodes_of
     from servotwin.robots.model_file import Plant, plant_of
 
-    plant, read = plant_of(model_file) if plant is None else Plant(plant)
-    joints = joint_names(plant)
-    chosen = chosen_servos(model_file, servo, joints, followers=couplings_of(plant))
-    mounts = mounts_of(models_of(chosen, model, change, register), mount, joints)
+    found = plant_of(model_file, packages_of(package)) if plant is None else Plant(plant)
+    joints = joint_names(found.model)
     with as_options(), patience(f"reading {dataset}"):
         numbers = list(dict.fromkeys(episodes)) or list(episodes_of(dataset))
-        motions = [read_motion(dataset, joints, ranges=joint_ranges(plant), unit=units_of(unit),
+        motions = [read_motion(dataset, joints, ranges=joint_ranges(found.model), unit=units_of(unit),
                                calibration=calibration, episode=number) for number in numbers]
+    chosen, left = servos_at(model_file, servo, found, motions[0])
+    mounts = mounts_of(models_of(chosen, model, change, register), mount, joints)
     if register:  # who says registers does not have them assumed
         motions = [replace(one, robot="") for one in motions]
     own = sorted({name for each in chosen.values() for name in each.registers}) if not register else []
     said = (f"registers assumed as LeRobot writes them for {model_file} (sets {', '.join(own)})",) if own else ()
-    return Asked(plant=plant, mounts=mounts, bus=supply_of(supply), motions=motions, said=(*read, *said))
+    return Asked(plant=found.model, mounts=mounts, bus=supply_of(supply), motions=motions,
+                 said=(*found.said, *said, *left))

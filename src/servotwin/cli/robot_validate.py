@@ -31,6 +31,7 @@ def validate(
     model_file: options.ModelArgument, dataset: DatasetArgument, servo: options.ServoOption = None,
     mount: options.MountOption = None, model: options.ModelOption = None, change: options.SetOption = None,
     register: options.RegisterOption = None, supply: options.SupplyOption = None,
+    package: options.PackageOption = None,
     friction: options.FrictionOption = "refuse", calibration: options.CalibrationOption = None,
     episode: options.EpisodesOption = None, unit: options.UnitOption = None,
     latency: Annotated[float | None, typer.Option(
@@ -47,7 +48,7 @@ def validate(
 
     asked = options.asked_robot(model_file, dataset, servo=servo or [], mount=mount or [], model=model,
                                 change=change or [], register=register or [], supply=supply, calibration=calibration,
-                                episodes=episode or [], unit=unit or [])
+                                episodes=episode or [], unit=unit or [], package=package or [])
 
     def done(targets: Sequence[Target]) -> dict[str, Any]:
         with as_options():

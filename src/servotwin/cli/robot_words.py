@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Container, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.errors import InputError, UnknownNameError
@@ -11,7 +12,8 @@ from servotwin.errors import InputError, UnknownNameError
 if TYPE_CHECKING:
     from servotwin.models import Model
     from servotwin.parameters import Supply
-    from servotwin.robots import Mount
+    from servotwin.robots import Motion, Mount
+    from servotwin.robots.model_file import Plant
 
 ALL = "*"
 MODELS = ("digital", "pulse", "pulse-inductive", "bounded", "averaged")
@@ -34,7 +36,7 @@ class Chosen(NamedTuple):
 
 
 def chosen_servos(robot: str, words: Sequence[str], joints: Mapping[str, str], *,
-                  followers: Container[str] = ()) -> dict[str, Chosen]:
+                  driven: Container[str] | None = None) -> dict[str, Chosen]:
     """Return the servo of each joint that has one, in the order of the joints.
 
     Parameters
@@ -42,11 +44,11 @@ def chosen_servos(robot: str, words: Sequence[str], joints: Mapping[str, str], *
     robot : str
         As the command names it; an `so101` for which no servo is named has six STS3215 with LeRobot's registers.
     words : sequence of str
-        Such as ``"elbow=hitec-hs-755hb"``; ``"*=ID"`` stands for all hinges that are not named themselves.
+        Such as ``"elbow=hitec-hs-755hb"``; ``"*=ID"`` stands for all driven hinges that are not named themselves.
     joints : mapping of str to str
         "angle" of a hinge or "length" of a slide, by name.
-    followers : container of str
-        Joints that follow others by an equality of the model: `*` leaves them out.
+    driven : container of str, optional
+        Joints that the robot drives: `*` leaves others out. All hinges unless given.
 
     Raises
     ------
@@ -71,10 +73,50 @@ def chosen_servos(robot: str, words: Sequence[str], joints: Mapping[str, str], *
     given = dict(named_words("--servo", words, "JOINT=ID, such as elbow=hitec-hs-755hb", joints))
     if ALL in given:
         given = {joint: given[ALL] for joint, kind in joints.items()
-                 if kind == "angle" and joint not in followers} | given
+                 if kind == "angle" and (driven is None or joint in driven)} | given
     found = {joint: Chosen(given[joint]) for joint in joints if joint in given}
     if not found:
-        raise InputError("--servo", got=words[0], allowed="a robot whose hinges have names")
+        raise InputError("--servo", got=words[0], allowed="a robot whose driven hinges have names, or JOINT=ID: "
+                         f"{', '.join(joints) or 'none has a name'}")
+    return found
+
+
+def servos_at(robot: str, words: Sequence[str], plant: Plant, motion: Motion) -> tuple[dict[str, Chosen],
+                                                                                      tuple[str, ...]]:
+    """Return the servo of each joint that has one, and sentences on joints that `*` left out.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        As `chosen_servos` does.
+    """
+    from servotwin.robots import joint_names
+    from servotwin.robots.model_file import driven_joints
+
+    named = {word.partition("=")[0].strip() for word in words}
+    driven = driven_joints(plant, motion.joints, named)
+    return (chosen_servos(robot, words, joint_names(plant.model), driven=driven.joints),
+            driven.said if ALL in named else ())
+
+
+def packages_of(words: Sequence[str]) -> dict[str, Path]:
+    """Return the folders of ROS packages that words such as ``"arm_description=ros/arm"`` name.
+
+    Raises
+    ------
+    InputError
+        If a word has another form, names a package twice, or there is no such folder.
+    """
+    found: dict[str, Path] = {}
+    for word in words:
+        name, _, folder = (part.strip() for part in word.partition("="))
+        if not (name and folder):
+            raise InputError("--package", got=word, allowed="NAME=FOLDER, such as arm_description=ros/arm_description")
+        if name in found:
+            raise InputError(f"--package {name}", got=f"{found[name]} and {folder}", allowed="one")
+        if not Path(folder).is_dir():
+            raise InputError(f"--package {name}", got=folder, allowed="a folder that is there")
+        found[name] = Path(folder)
     return found
 
 

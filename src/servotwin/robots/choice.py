@@ -12,8 +12,7 @@ from xml.sax.saxutils import escape
 from servotwin.datasheet.choice import Candidate, Limits, Reason
 from servotwin.errors import InputError, SimulationError, UnknownNameError
 from servotwin.models import mid_travel
-from servotwin.robots.coupling import couplings_of
-from servotwin.robots.model_file import joint_names, robot_model
+from servotwin.robots.model_file import Plant, driven_joints, joint_names, robot_model
 from servotwin.robots.motion import Motion
 from servotwin.robots.mount import Mount
 from servotwin.robots.places import load_mujoco
@@ -85,15 +84,15 @@ def arm_of(joint: str, lift: tuple[float, float] | None) -> Any:
         joint=escape(joint, {'"': "&quot;"}), mass=mass, arm=arm)))
 
 
-def moved_joints(plant: Any, motion: Motion, joints: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the joints that candidates are put at: those that are named, else all hinges that follow no other.
+def moved_joints(plant: Plant, motion: Motion, joints: Sequence[str] = ()) -> tuple[str, ...]:
+    """Return the joints that candidates are put at: hinges that the robot drives, and those that are named.
 
     Raises
     ------
     InputError, UnknownNameError
         If there is no such joint, the motion says nothing of it, or a joint that moves is a slide.
     """
-    kinds, followers = joint_names(plant), couplings_of(plant)
+    kinds, driven = joint_names(plant.model), driven_joints(plant, motion.joints).joints
     for joint in joints:
         if joint not in kinds:
             raise UnknownNameError("joint of --joint", joint, kinds)
@@ -104,10 +103,10 @@ def moved_joints(plant: Any, motion: Motion, joints: Sequence[str] = ()) -> tupl
     if slide is not None:
         raise InputError(f"joint {slide} of {motion.source}", got="a slide",
                          allowed="hinges; servotwin robot run takes slides, with --mount")
-    return tuple(joint for joint, kind in kinds.items() if kind == "angle" and joint not in followers)
+    return tuple(joint for joint, kind in kinds.items() if kind == "angle" and (joint in driven or joint in joints))
 
 
-def try_motion(candidate: Candidate, plant: Any, motion: Motion, *, joints: Sequence[str] = (),
+def try_motion(candidate: Candidate, plant: Plant, motion: Motion, *, joints: Sequence[str] = (),
                bus: Supply | None = None, limits: Limits | None = None, overlap: str = "keep") -> Tried:
     """Let a candidate at all joints follow a motion, and say what speaks against it at those that are asked about.
 
@@ -117,7 +116,7 @@ def try_motion(candidate: Candidate, plant: Any, motion: Motion, *, joints: Sequ
     ----------
     candidate : Candidate
         With a model.
-    plant : MjModel
+    plant : Plant
     motion : Motion
     joints : sequence of str
         That count; those that the motion moves unless given.
@@ -135,7 +134,7 @@ def try_motion(candidate: Candidate, plant: Any, motion: Motion, *, joints: Sequ
     too_far = [reason for joint in asked for reason in _too_far(candidate, motion, joint)]
     if too_far:
         return Tried(_with(candidate, too_far), None, {})
-    mounts = {joint: Mount(model, zero=_middle(plant, motion, joint) - mid_travel(model)) for joint in at}
+    mounts = {joint: Mount(model, zero=_middle(plant.model, motion, joint) - mid_travel(model)) for joint in at}
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)

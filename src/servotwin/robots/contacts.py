@@ -64,6 +64,19 @@ def joints_between(model: Any, first: int, second: int) -> tuple[str, ...]:
         int(model.body_jntadr[body]), int(model.body_jntadr[body]) + int(model.body_jntnum[body])))
 
 
+def passive_joints(model: Any) -> set[str]:
+    """Return the joints that a spring moves, and those of loops that a connect or weld closes."""
+    mujoco = load_mujoco()
+    found = {model.joint(k).name for k in range(model.njnt) if np.any(model.jnt_stiffness[k] != 0.0)}
+    for n in np.flatnonzero(model.eq_active0).tolist():
+        if int(model.eq_type[n]) in (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)):
+            ends = [int(end) for end in (model.eq_obj1id[n], model.eq_obj2id[n])]
+            if int(model.eq_objtype[n]) == int(mujoco.mjtObj.mjOBJ_SITE):
+                ends = [int(model.site_bodyid[end]) for end in ends]
+            found.update(joints_between(model, *ends))
+    return found
+
+
 def _line(model: Any, body: int) -> list[int]:
     """Return a body and all above it but the world."""
     found = []

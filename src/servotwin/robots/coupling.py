@@ -175,6 +175,14 @@ def actuators_at_joints(model: Any) -> list[int]:
     return [k for k, kind in enumerate(model.actuator_trntype) if int(kind) in at_joint]
 
 
+def other_actuators(model: Any) -> list[tuple[str, str]]:
+    """Return name and transmission, such as "tendon" or "site", of actuators that are at no joint."""
+    mujoco, at_joints = load_mujoco(), set(actuators_at_joints(model))
+    return [(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, k) or str(k),
+             mujoco.mjtTrn(int(model.actuator_trntype[k])).name.removeprefix("mjTRN_").lower())
+            for k in range(model.nu) if k not in at_joints]
+
+
 def silence(model: Any, actuator: int) -> None:
     """Take away all force of an actuator."""
     for field in _FORCES:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 from xml.etree import ElementTree as Xml
 
 from servotwin.errors import InputError, UnknownNameError
-from servotwin.robots.contacts import part_neighbours
+from servotwin.robots.contacts import part_neighbours, passive_joints
+from servotwin.robots.coupling import actuators_at_joints, couplings_of, other_actuators
 from servotwin.robots.mobile_robot import mobile_robot
 from servotwin.robots.places import load_mujoco
 from servotwin.robots.so101 import so101
+from servotwin.robots.urdf import driven_in, find_meshes, parents_in, urdf_of
 from servotwin.text import checked_name, fault_of
 
 BUILT_IN: Mapping[str, Callable[[], str]] = MappingProxyType({"so101": so101, "mobile": mobile_robot})
@@ -25,13 +27,23 @@ _LIGHT = ((0.4, 0.4, 0.4), (0.6, 0.6, 0.6))  # ambient and diffuse, of a robot t
 
 
 class Plant(NamedTuple):
-    """A robot's MjModel, and in sentences what was done about its file; functions that take a model take it too."""
+    """A robot's MjModel, and what its file says that a model does not hold; functions that take a model take it too.
+
+    Parameters
+    ----------
+    model : MjModel
+    said : tuple of str
+        Sentences on what was done about the file.
+    driven : tuple of str, optional
+        Joints that the file says are driven, where its actuators do not.
+    """
 
     model: Any
     said: tuple[str, ...] = ()
+    driven: tuple[str, ...] | None = None
 
 
-def robot_model(source: Any) -> Any:
+def robot_model(source: Any, packages: Mapping[str, str | Path] = MappingProxyType({})) -> Any:
     """Return an MjModel of its own, which may be changed.
 
     Links that a joint joins do not touch each other in it: of a URDF none do, and of an MJCF, whose own choice stands,
@@ -40,8 +52,11 @@ def robot_model(source: Any) -> Any:
     Parameters
     ----------
     source : MjModel, MjSpec, Plant, str or Path
-        A path is of an MJCF or URDF file; a string may be the name of a robot that comes with the package. What is
-        read from a file gets a sky and light where it has none: pictures would be black.
+        A path is of an MJCF or URDF file, or of one with xacro's macros where `xacro` is installed; a string may be the
+        name of a robot that comes with the package. What is read from a file gets a sky and light where it has none:
+        pictures would be black.
+    packages : mapping of str to path
+        Folders of ROS packages that ``package://`` names, where they are not among the file's parents.
 
     Raises
     ------
@@ -55,11 +70,11 @@ def robot_model(source: Any) -> Any:
     >>> robot_model("so101").njnt
     6
     """
-    return plant_of(source).model
+    return plant_of(source, packages).model
 
 
-def plant_of(source: Any) -> Plant:
-    """Return an MjModel of its own, as `robot_model` does, and what was done about its file."""
+def plant_of(source: Any, packages: Mapping[str, str | Path] = MappingProxyType({})) -> Plant:
+    """Return an MjModel of its own, as `robot_model` does, and what its file says beside it."""
     mujoco = load_mujoco()
     if isinstance(source, Plant):
         return source._replace(model=copy.copy(source.model))
@@ -71,11 +86,12 @@ def plant_of(source: Any) -> Plant:
     if not isinstance(source, str | Path) or not str(source):
         raise InputError("model of a robot", got=source, allowed="an MjModel, an MjSpec or the path of an MJCF file")
     if str(source) in BUILT_IN:
-        return Plant(mujoco.MjModel.from_xml_string(BUILT_IN[str(source)]()))
-    return _read(mujoco, Path(source))
+        model = mujoco.MjModel.from_xml_string(BUILT_IN[str(source)]())
+        return Plant(model, driven=tuple(joint_names(model)))
+    return _read(mujoco, Path(source), packages)
 
 
-def _read(mujoco: Any, path: Path) -> Plant:
+def _read(mujoco: Any, path: Path, packages: Mapping[str, str | Path]) -> Plant:
     try:
         is_file = path.is_file()
     except (OSError, ValueError):  # a name that no file can have
@@ -85,15 +101,21 @@ def _read(mujoco: Any, path: Path) -> Plant:
             raise InputError(f"{path} is no file", allowed=f"the path of an MJCF file (.xml), or {', '.join(BUILT_IN)}")
         raise UnknownNameError("robot", str(path), BUILT_IN,
                                allowed=f"the path of an MJCF file (.xml), or {', '.join(BUILT_IN)}")
+    urdf = urdf_of(path)
     try:
-        spec = mujoco.MjSpec.from_file(str(path))
+        if urdf is None:
+            spec = mujoco.MjSpec.from_file(str(path))
+        else:
+            spec = mujoco.MjSpec.from_string(Xml.tostring(urdf, encoding="unicode"))
+            spec.modelfiledir = str(path.parent)
+        said = find_meshes(spec, path, packages)
         if not any(texture.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX for texture in spec.textures):
             spec.add_texture(name="servotwin sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
                              builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT, **_SKY)
         if not spec.lights:
             light = spec.visual.headlight
             light.ambient, light.diffuse = _LIGHT
-        plant = _compiled(spec, _parents(path))
+        plant = _compiled(spec, {} if urdf is None else parents_in(urdf))
     except InputError:
         raise
     except Exception as error:  # MuJoCo raises ValueError, its own FatalError and what its plugins raise
@@ -103,18 +125,7 @@ def _read(mujoco: Any, path: Path) -> Plant:
     for name in names.split("\0"):
         if fault_of(name, math.inf):
             checked_name(f"{path}: name{_of_what(model, names, name)}", name, math.inf)
-    return plant
-
-
-def _parents(path: Path) -> dict[str, str]:
-    """Return the links of a URDF by those that its joints hang on them; nothing of another file."""
-    try:
-        root = Xml.parse(path).getroot()
-    except (Xml.ParseError, OSError):
-        return {}
-    ends = ((joint.find("child"), joint.find("parent")) for joint in root.iter("joint") if root.tag == "robot")
-    return {child.get("link", ""): parent.get("link", "") for child, parent in ends
-            if child is not None and parent is not None}
+    return plant._replace(said=(*said, *plant.said), driven=None if urdf is None else driven_in(urdf))
 
 
 def _compiled(spec: Any, parents: Mapping[str, str]) -> Plant:
@@ -123,6 +134,54 @@ def _compiled(spec: Any, parents: Mapping[str, str]) -> Plant:
     model = spec.compile()
     merged = range(scene, int(model.body_geomnum[0]))  # into the world, whose own shapes come first
     return Plant(model, part_neighbours(model, fixed=merged, always=bool(parents), parents=parents))
+
+
+class Driven(NamedTuple):
+    """Hinges of a robot that are driven, and sentences on those that are not."""
+
+    joints: tuple[str, ...]
+    said: tuple[str, ...]
+
+
+def driven_joints(plant: Plant, moved: Iterable[str] | None = None, named: Container[str] = ()) -> Driven:
+    """Return the hinges that a robot drives, none that follow others: where servos are put if nobody names joints.
+
+    They are those of the file's actuators; of a URDF those of its transmissions or of ros2_control; where a file says
+    nothing, those that a motion moves; without a motion, those that neither a spring moves nor a loop closes.
+
+    Parameters
+    ----------
+    plant : Plant
+    moved : iterable of str, optional
+        Joints of the motion.
+    named : container of str
+        Joints that get a servo anyway, of which nothing is said.
+
+    Examples
+    --------
+    >>> foot = robot_model(load_mujoco().MjSpec.from_string('''<mujoco><worldbody><body><joint name="knee"/>
+    ...   <geom size=".1"/><body><joint name="toe" stiffness="1"/><geom size=".1"/></body></body></worldbody>
+    ...   <actuator><position joint="knee"/></actuator></mujoco>'''))
+    >>> driven_joints(Plant(foot))
+    Driven(joints=('knee',), said=('no servo at toe: no actuator of the file drives it',))
+    """
+    model = plant.model
+    hinges = [joint for joint, kind in joint_names(model).items() if kind == "angle"]
+    at_joints = {model.joint(int(model.actuator_trnid[k, 0])).name for k in actuators_at_joints(model)}
+    if plant.driven is not None:
+        driven, why = set(plant.driven), "the file does not name it as driven"
+    elif model.nu:
+        driven, why = at_joints, "no actuator of the file drives it"
+    elif moved is not None:
+        driven, why = set(moved), "the motion says nothing of it"
+    else:
+        driven, why = set(hinges) - passive_joints(model), "a spring moves it, or it is part of a closed loop"
+    followers = couplings_of(model)
+    left = [joint for joint in hinges if joint not in driven and joint not in followers
+            and joint not in named]
+    said = [f"no servo at {', '.join(left)}: {why}"] if left else []
+    said += [f"actuator {name} is at a {kind}, and gets no servo" for name, kind in other_actuators(model)]
+    return Driven(tuple(joint for joint in hinges if joint in driven and joint not in followers), tuple(said))
 
 
 def _of_what(model: Any, names: str, name: str) -> str:

@@ -190,7 +190,7 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
     True
     """
     _check(motion, settle, hold, timestep, overlap)
-    own, read = plant_of(model)
+    own, read, _ = plant_of(model)
     own.opt.timestep = timestep or _fitting(own.opt.timestep, motion, hold)
     settle = own.opt.timestep * math.ceil(settle / own.opt.timestep - _SAME_TICKS)  # the motion begins with a tick
     mounts = warm_mounts(servos, assume_heat=assume_heat, shared=bus is not None)
