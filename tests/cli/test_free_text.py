@@ -75,7 +75,7 @@ NAMED = {"curves": LEGAL, "linear": LEGAL, "validate": LEGAL, "fit": LEGAL, "rob
          "robot validate": LEGAL, "export c": "void f(){} / *", "export fmu": "void f(){} / *"}
 # Parameters that name what is read
 READ = {"--pulses", "--command", "--draws", "--table", "--scene", "--link", "--hand", "--faults", "--motion",
-        "--prices", "--calibration", "--wiring", "--log", "files", "file"}
+        "--prices", "--package", "--calibration", "--wiring", "--log", "files", "file"}
 # Writers that no name of a user reaches, or that another test writes with
 ELSEWHERE = {
     ("paper", "--out"): "the paper's own servo", ("paper", "--json"): "the paper's own servo",

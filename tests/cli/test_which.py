@@ -71,7 +71,7 @@ def test_each_limit_says_its_reason(which):
         "mass", "voltage", "travel", "time", "kind"}
     alone = which("--limit", "kind=bus", "--limit", "mass=20g", "--json").data
     assert {each["id"] for each in alone["found"]} == {
-        name for name in st.catalog_names() if "xl330" in name or "xl-320" in name}
+        name for name in st.catalog_names() if "xl330" in name}  # the sheet of an XL-320 begins at 7.4 V
 
 
 @pytest.mark.long

@@ -228,7 +228,7 @@ def _while(seconds: float) -> str:
 
 def notes(sheet: DataSheet) -> list[str]:
     """Return what one has to know to read a sheet: flags of what the maker prints, and what the model is."""
-    from servotwin.datasheet.conditions import highest_voltage
+    from servotwin.datasheet.conditions import highest_voltage, is_below_sheet, lowest_voltage
     from servotwin.datasheet.guesses import guesses
     from servotwin.datasheet.rotor import slow_rotor
     from servotwin.models import BoundedServo, DigitalServo
@@ -237,6 +237,8 @@ def notes(sheet: DataSheet) -> list[str]:
     servo, most = sheet.servo, highest_voltage(sheet.servo)
     found = [f"{part.voltage:g} V is above what the sheet prints ({most:g} V)" for part in sheet.voltages
              if 0.0 < most < part.voltage]
+    found += [f"{part.voltage:g} V is below what the sheet prints ({lowest_voltage(servo):g} V)"
+              for part in sheet.voltages if is_below_sheet(servo, part.voltage)]
     digital = isinstance(sheet.model, DigitalServo)
     if servo.kind != "analog" and not digital:
         found.append(f"a {servo.kind} servo, computed as an analog one: its program is left out")

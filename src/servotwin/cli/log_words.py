@@ -43,6 +43,7 @@ def sections(found: Survey, files: Sequence[str]) -> list[RenderableType]:
             (one.column, one.signal, one.unit, one.known) for one in log.reading.columns]), ""]
     rows = [*_curves(log), ("clock", _clock(found.clock)), *_gaps(found.clock)]
     rows += [(name.replace("_", " "), _values(name, one)) for name, one in found.values.items()]
+    rows += [("supply", f"{found.supply.voltage:.2f} V at least, at {found.supply.time:.3g} s")] if found.supply else []
     rows += [("motion", line) for line in _motion(log, found.motion)]
     if log.reading is not None:
         rows += [("mended" if "are joined" in one or "left out" in one or "spread" in one else "remark", one)

@@ -101,10 +101,13 @@ def servo_of(servo: str, change: Sequence[str], register: Sequence[str] = (), su
 
 
 def _check_sheet(servo: Servo, volts: float) -> None:
-    """Warn of a supply far above the maker's sheet; of twice as much simulations themselves do."""
-    from servotwin.datasheet.conditions import highest_voltage, is_above_sheet
+    """Warn of a supply far from the maker's sheet; of twice as much simulations themselves do."""
+    from servotwin.datasheet.conditions import highest_voltage, is_above_sheet, is_below_sheet, lowest_voltage
 
     most = highest_voltage(servo)
+    if is_below_sheet(servo, volts):
+        warnings.warn(f"{servo.name}: its sheet begins at {lowest_voltage(servo):g} V, and the supply has {volts:g} V",
+                      UserWarning, stacklevel=3)
     if is_above_sheet(servo, volts) and volts <= 2.0 * most:
         warnings.warn(f"{servo.name}: its sheet ends at {most:g} V, and the supply has {volts:g} V", UserWarning,
                       stacklevel=3)

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Any
 
-from servotwin.cli.summary import model_name
+from servotwin.cli.summary import model_name, supply_facts
 
 if TYPE_CHECKING:
     from servotwin.robots import RobotRun, Sizing
@@ -24,6 +24,7 @@ def facts(run: RobotRun, sized: dict[str, Sizing], robot: str) -> dict[str, Any]
         "supply": None if run.bus is None else {
             "open_circuit_voltage": run.bus.open_circuit_voltage, "internal_resistance": run.bus.internal_resistance},
         "judged": not run.unjudged, "reason": run.unjudged or None,
+        "supplies": [{"joints": list(joints), **supply_facts(sag)} for joints, _, sag in run.sags],
         "big_enough": None if run.unjudged else all(each.big_enough for each in sized.values()),
         "notes": list(run.notes),
         "joints": {joint: _of_joint(run, sized[joint]) for joint in run.mounts},

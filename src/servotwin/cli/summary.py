@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from servotwin.models import Model
     from servotwin.parameters.quantity import Quantity
     from servotwin.simulation import Result
+    from servotwin.simulation.sag import Sag
 
 NONE = "-"
 _LAST = 0.5  # s, or half of a shorter run: over which the speed of a servo that turns endlessly is meant
@@ -59,6 +60,7 @@ def facts(result: Result) -> dict[str, Any]:
            if result.model.endless else {}),
         "mean_current": result.mean_current,
         "peak_current": result.peak("armature_current") if metrics is None else metrics.peak_current,
+        "supply": None if result.sag is None else supply_facts(result.sag),
         "energy": dataclasses.asdict(result.energy),
         "remarks": [remark.facts for remark in result.remarks],
         "solution": dataclasses.asdict(result.stats),
@@ -67,6 +69,22 @@ def facts(result: Result) -> dict[str, Any]:
         "assumed": assumed(result.model),
         "ignored": list(result.model.ignored),
     }
+
+
+def supply_facts(sag: Sag) -> dict[str, float | None]:
+    """Return how far a supply fell, in SI, ready for JSON; no limit of current is null."""
+    return sag._asdict() | {"limit": sag.limit if math.isfinite(sag.limit) else None}
+
+
+def supply_row(sag: Mapping[str, Any]) -> tuple[str, str]:
+    """Return the same as label and text.
+
+    Examples
+    --------
+    >>> supply_row({"voltage": 1.75, "time": 0.1234, "low": 0.8, "limited": 0.8, "limit": 0.2})
+    ('supply', '1.75 V at least, at 0.123 s')
+    """
+    return "supply", f"{sag['voltage']:.2f} V at least, at {sag['time']:.3g} s"
 
 
 def figures(found: Mapping[str, Any]) -> dict[str, float]:
@@ -130,6 +148,7 @@ def lines(found: Mapping[str, Any]) -> list[tuple[str, str]]:
     rows += _rest_rows(found)
     mean, most = (shown(name, found[name], ".3f", "A", "current") for name in ("mean_current", "peak_current"))
     rows.append(("current", f"{mean} in the mean, {most} at most"))
+    rows += [supply_row(found["supply"])] if found.get("supply") else []
     energy = found["energy"]
     parts = [f"{name} {energy[name]:.4g} J" for name in _ENERGY if abs(energy.get(name, 0.0)) > 1e-9]
     rows.append(("energy", f"{energy['supply']:z.4g} J supplied: {', '.join(parts) or 'nothing moved'}"))

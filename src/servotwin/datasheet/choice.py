@@ -8,7 +8,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from servotwin.datasheet.buzzing import buzz
-from servotwin.datasheet.conditions import at_voltage, changed, highest_voltage, is_above_sheet, supply_values
+from servotwin.datasheet.conditions import (
+    at_voltage,
+    changed,
+    highest_voltage,
+    is_above_sheet,
+    is_below_sheet,
+    lowest_voltage,
+    supply_values,
+)
 from servotwin.datasheet.full_drive import FullDrive
 from servotwin.datasheet.guesses import Span, spans, variants
 from servotwin.datasheet.holding import smallest_move
@@ -175,6 +183,8 @@ def candidate(servo: Servo, supply: Supply | float, *, lift: tuple[float, float]
     known = {"servo": servo, "mass": math.nan if mass is None else mass, "price": price, "travel": travel_of(servo)}
     if is_above_sheet(servo, volts):
         return _judged(known, [Reason("voltage", f"its sheet ends at {most:g} V")], limits)
+    if is_below_sheet(servo, volts):
+        return _judged(known, [Reason("voltage", f"its sheet begins at {lowest_voltage(servo):g} V")], limits)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # said in the notes

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 _Model = TypeVar("_Model", bound="Model")
 _MOST = 2.0  # times the highest voltage that the sheet prints
 _ABOVE = 1.25  # times that, at which nobody is told to buy a servo; assumed
+_BELOW = 0.9  # times the lowest: a servo for 12 V runs on three cells, which are called 11.1 V; assumed
 _THERMAL = ("winding_capacity", "housing_capacity", "winding_to_housing", "housing_to_ambient", "ambient",
             "magnet_coefficient")
 
@@ -49,6 +50,30 @@ def is_above_sheet(servo: Servo, voltage: float) -> bool:
     [False, True]
     """
     return voltage > _ABOVE * highest_voltage(servo) > 0.0
+
+
+def lowest_voltage(servo: Servo) -> float:
+    """Return the lowest supply voltage that the sheet prints; 0 without one [V].
+
+    Examples
+    --------
+    >>> from servotwin.parameters import load_servo
+    >>> lowest_voltage(load_servo("gobilda-2000-135")), lowest_voltage(load_servo("dynamixel-mx-28"))
+    (4.8, 11.1)
+    """
+    return min((point.supply_voltage for point in printed_points(servo) if point.supply_voltage), default=0.0)
+
+
+def is_below_sheet(servo: Servo, voltage: float) -> bool:
+    """Tell whether a supply voltage [V] is so far below the lowest of a sheet that the servo may not work.
+
+    Examples
+    --------
+    >>> from servotwin.parameters import load_servo
+    >>> [is_below_sheet(load_servo("feetech-sts3215-12v"), volts) for volts in (11.1, 5.0)]
+    [False, True]
+    """
+    return 0.0 < voltage < _BELOW * lowest_voltage(servo)
 
 
 def check_voltage(servo: Servo, voltage: float) -> float:

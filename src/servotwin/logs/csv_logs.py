@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, OutputError, OutputExistsError, UnknownNameError
+from servotwin.logs.boot_texts import boot_remarks
 from servotwin.logs.clock import Timed, timed
 from servotwin.logs.column_words import Wanted, wanted_columns
 from servotwin.logs.columns import COMMANDS, SWITCH, TIME, Column, switch_value
@@ -146,7 +147,8 @@ def _log(path: Path, part: Timed, layout: Layout, said: Sidecar, suffix: str) ->
             values = np.where(values == 0.0, math.nan, values)  # a pulse without a width is none
     switch = _switch(table, of[SWITCH]) if SWITCH in of else None
     used = {column.column for column in layout.shown}
-    reading = Reading(file=str(path), columns=layout.shown, remarks=(*table.remarks, *_silences(values)),
+    reading = Reading(file=str(path), columns=layout.shown, remarks=(
+        *table.remarks, *_silences(values), *boot_remarks(table, measured)),
                       layout=of, unread=tuple(name for name in table.header if name and name not in used))
     given = {"name": path.stem, "source": str(path), **said.log}
     given["name"] = f"{given['name']}{suffix}"

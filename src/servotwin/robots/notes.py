@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from servotwin.robots.model_file import joint_ranges
-from servotwin.simulation.remarks import NOT_AT_REST
+from servotwin.simulation.remarks import NOT_AT_REST, held_back
+from servotwin.simulation.sag import floor_of, watches_its_supply
 
 if TYPE_CHECKING:
+    from servotwin.parameters.groups import Supply
     from servotwin.robots.run import RobotRun
+    from servotwin.simulation.sag import Sag
 
 _SLACK = math.radians(0.5)  # rad, of ends that goals are rounded to
 
@@ -44,9 +47,24 @@ def notes_of(run: RobotRun) -> tuple[str, ...]:
         if joint in ranges and _beyond(goals, ranges[joint], _SLACK * (mount.ratio if slides else 1.0)):
             said.append(f"goals of joint {joint} go {_between(goals, slides=slides)}, beyond its range in the model, "
                         f"{_ends(*ranges[joint], slides=slides)}")
+    said += [words for joints, supply, sag in run.sags for words in _sag_words(run, joints, supply, sag)]
     swings = (f"joint {joint} {remark.words}" for joint in run.mounts for remark in run.tracking[joint].remarks
               if remark.kind == NOT_AT_REST)
     return (*said, *(touch.words for touch in run.ideal.touches), *run.record.notes, *swings)
+
+
+def _sag_words(run: RobotRun, joints: tuple[str, ...], supply: Supply, sag: Sag) -> list[str]:
+    """Return that a supply holds servos back, and that it falls below what anybody knows of them."""
+    who = "the supply" if len(joints) == len(run.mounts) else f"the supply of {', '.join(joints)}"
+    said = [f"{who} holds back: {held_back(sag).words.partition(': ')[2]}, at {sag.time:.2f} s, of "
+            f"{supply.open_circuit_voltage:g} V"] if sag.holds_back else []
+    below = {joint: floor_of(run.mounts[joint].model.servo).voltage for joint in joints
+             if not watches_its_supply(run.mounts[joint].model)}
+    low = [joint for joint, floor in below.items() if sag.voltage < floor]
+    if low:
+        said.append(f"{who} falls to {sag.voltage:.2f} V: below {below[low[0]]:g} V nobody knows what the servo of "
+                    f"{low[0]} does" + (f", and {len(low) - 1} more" if len(low) > 1 else ""))
+    return said
 
 
 def _beyond(values: np.ndarray[tuple[int], np.dtype[np.float64]], ends: tuple[float, float], slack: float) -> bool:

@@ -31,6 +31,7 @@ from servotwin.robots.registers import as_motion_says
 from servotwin.robots.sizing import supplied
 from servotwin.robots.tracking import Tracking, tracking_of
 from servotwin.simulation.progress import Progress, shown
+from servotwin.simulation.sag import Sag, sag_in
 from servotwin.units import is_finite
 
 Array = NDArray[np.float64]
@@ -115,6 +116,22 @@ class RobotRun:
     def notes(self) -> tuple[str, ...]:
         """What is odd about the motion, one sentence each."""
         return notes_of(self)
+
+    @property
+    def sags(self) -> tuple[tuple[tuple[str, ...], Supply, Sag], ...]:
+        """How far supplies fell from the beginning of the motion on, among the ends of ticks: joints, supply, sag."""
+        found: dict[int, list[str]] = {}
+        for k, joint in enumerate(self.mounts):
+            shared = self.supply_of(joint)
+            found.setdefault(k if shared is None else -1 - id(shared), []).append(joint)
+        made = []
+        for joints in found.values():
+            record, model = self.record[joints[0]], self.mounts[joints[0]].model
+            supply = self.supply_of(joints[0]) or model.servo.supply
+            if "bus_voltage" in record:
+                sag = sag_in(self.time[self.time >= 0.0], record["bus_voltage"][self.time >= 0.0], supply)
+                made += [(tuple(joints), supply, sag)] if sag is not None else []
+        return tuple(made)
 
     def supply_of(self, joint: str) -> Supply | None:
         """Return the supply that a servo shares with others, None where it has its own."""

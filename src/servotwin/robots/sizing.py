@@ -23,6 +23,7 @@ from servotwin.models import AveragedServo, BoundedServo
 from servotwin.physics.thermal import REFERENCE_TEMPERATURE, Temperatures
 from servotwin.robots.heat import Heating, heating, lasting_torque, mean_heat
 from servotwin.simulation.remarks import Remark
+from servotwin.simulation.sag import LOW
 
 if TYPE_CHECKING:
     from servotwin.models import Model
@@ -99,7 +100,7 @@ class Sizing:
     unjudged : str
         Why nothing can be said about this, as of the run; empty if it can.
     held : str
-        What presses on the joint while it moves, in words.
+        What first presses on the joint while it moves, in words.
     """
 
     joint: str
@@ -152,10 +153,13 @@ class Sizing:
         at = self.worst
         speed = f"{math.degrees(at.speed):.0f} deg/s"
         when = f"at {at.time:.2f} s" + (f" and for {self.short:.2f} s in all" if self.short > 0.0 else "")
+        held = "" if not self.left_voltage < LOW * self.voltage else (
+            f", held back by its supply: the others leave it {self.left_voltage:.2g} V of {self.voltage:g} V")
         if at.available == 0.0:
             return (f"too slow {when}: the motion needs {speed}, the servo turns at most "
-                    f"{math.degrees(self.top_speed):.0f} deg/s")
-        return f"too weak {when}: the motion needs {at.torque:.3g} N m at {speed}, the servo has {at.available:.3g} N m"
+                    f"{math.degrees(self.top_speed):.0f} deg/s{held}")
+        return (f"too weak {when}: the motion needs {at.torque:.3g} N m at {speed}, the servo has {at.available:.3g} "
+                f"N m{held}")
 
 
 def _too_hot(found: Heating) -> list[str]:
@@ -268,8 +272,8 @@ def _sized(run: RobotRun, joint: str) -> Sizing:
         rms_torque=_rms(needed.torque[inside]), rms_delivered=_rms(delivered.torque[inside]),
         lasting_torque=math.nan if masses is None else lasting_torque(model, masses),
         heating=None if masses is None else _heating(run, joint), trips=record.trips, unjudged=run.unjudged,
-        held="; ".join(f"held by {touch.first} against {touch.second} from {max(touch.time, 0.0):.2f} s on"
-                       for touch in run.ideal.touches if joint in touch.joints))
+        held=next((f"held by {touch.first} against {touch.second} from {max(touch.time, 0.0):.2f} s on"
+                   for touch in run.ideal.touches if joint in touch.joints), ""))
 
 
 def _heating(run: RobotRun, joint: str) -> Heating | None:

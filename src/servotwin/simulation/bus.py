@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -23,10 +23,11 @@ from servotwin.simulation.engine import Plan
 from servotwin.simulation.oddities import warn_of
 from servotwin.simulation.remarks import ServoRemark
 from servotwin.simulation.result import Result
+from servotwin.simulation.sag import Sag, sag_of
 from servotwin.simulation.simulator import Simulator
 from servotwin.simulation.status import Status
 from servotwin.simulation.times import times_asked
-from servotwin.simulation.trajectory import Trajectory
+from servotwin.simulation.trajectory import Bus, Trajectory
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
@@ -53,8 +54,8 @@ class Fleet(Mapping[str, Result]):
         Of each servo, by its name.
     status : Status
         How the run ended; `cause` says it in words, `ended` when [s].
-    bus : callable
-        Voltage of the supply under load [V] at any times [s], an array.
+    bus : Bus
+        Voltage of the supply under load [V] at any times [s], an array; `sag`, how far it fell.
 
     Examples
     --------
@@ -72,7 +73,7 @@ class Fleet(Mapping[str, Result]):
     status: Status
     ended: float
     cause: str
-    bus: Callable[[Array], Array]
+    bus: Bus
 
     def __repr__(self) -> str:
         return f"Fleet({', '.join(self.results)}; {self.ended:g} s, {self.status.name}, {len(self.time)} times)"
@@ -99,6 +100,11 @@ class Fleet(Mapping[str, Result]):
     def supply_current(self) -> Array:
         """Current that the supply gives to all servos [A], shape (n,); negative where some comes back."""
         return np.asarray(sum(result["supply_current"] for result in self.results.values()))
+
+    @property
+    def sag(self) -> Sag | None:
+        """How far the supply fell; None where it stayed as it is."""
+        return self.bus.sag
 
     @cached_property
     def remarks(self) -> tuple[ServoRemark, ...]:
@@ -251,7 +257,7 @@ def simulate_bus(servos: Mapping[str, Sequence[Any]], *, supply: Supply, duratio
     ended = duration if status.ok else rows.ended
     motions, events = segments_of(plans, rows), events_of(plans, rows)
     alone = [Trajectory(own) for own in motions]
-    bus = _AllAlong(source, plans, alone)
+    bus = _AllAlong(source, plans, alone, supply)
     results = {
         name: Result(model=sims[name].model, command=command, load=sims[name].load, drive=sims[name].drive(command),
                      time=times, trajectory=Trajectory(own, bus), events=happened, status=status, ended=ended,
@@ -287,6 +293,11 @@ class _AllAlong:
     source: Source
     plans: Sequence[Plan]
     trajectories: Sequence[Trajectory]
+    supply: Supply
+
+    @cached_property
+    def sag(self) -> Sag | None:
+        return sag_of(self.trajectories, lambda samples: self(samples.time), self.supply)
 
     def __call__(self, time: Array) -> Array:
         return bus_run.voltages(self.plans, self.source, [trajectory.at(time) for trajectory in self.trajectories])

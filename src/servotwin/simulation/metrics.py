@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from servotwin.simulation.trajectory import Trajectory
 
 _LOOK = 0.1  # s, five usual frames
+FLAT = 1e-6  # V of a voltage, within which it lies flat
 
 
 _UNITS = {"rise_time": "s", "settling_time": "s", "arrival_time": "s", "overshoot": "", "slew_rate": "rad/s",
@@ -154,6 +155,32 @@ def peak(trajectory: Trajectory, signal: Callable[[Samples], NDArray[np.float64]
     return _highest(trajectory, lambda samples: np.abs(signal(samples)), -math.inf)[1]
 
 
+class Least(NamedTuple):
+    """The least value of a signal, and when it came first [s]."""
+
+    value: float
+    time: float
+
+
+def least(trajectory: Trajectory, signal: Callable[[Samples], NDArray[np.float64]]) -> Least:
+    """Return the least value of a signal over a whole run; where it lies flat, when that begins.
+
+    Within 1e-6 of it, V of a voltage, a signal counts as there.
+    """
+    def fallen(samples: Samples) -> NDArray[np.float64]:
+        return -signal(samples)
+
+    times, values = _dense(trajectory, fallen, -math.inf)
+    when, best = _top(trajectory, fallen, times, values)
+    level = best - FLAT
+    k = next((k for k, own in enumerate(values) if (own >= level).any()), None)
+    if k is None:  # it lies between samples, or there are none
+        return Least(-best, when)
+    n = int(np.argmax(values[k] >= level))
+    return Least(-best, float(times[k][n]) if n == 0 else _bisected(
+        trajectory, k, lambda samples: fallen(samples) - level, float(times[k][n - 1]), float(times[k][n])))
+
+
 def _values(trajectory: Trajectory, index: int, signal: Callable[[Samples], NDArray[np.float64]],
             start: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     times = trajectory.dense_times(index)
@@ -164,13 +191,24 @@ def _values(trajectory: Trajectory, index: int, signal: Callable[[Samples], NDAr
 def _highest(trajectory: Trajectory, signal: Callable[[Samples], NDArray[np.float64]],
              start: float) -> tuple[float, float]:
     """Return time and value of the highest point from `start` on."""
-    when, best = math.nan, -math.inf
-    found = []
+    return _top(trajectory, signal, *_dense(trajectory, signal, start))
+
+
+def _dense(trajectory: Trajectory, signal: Callable[[Samples], NDArray[np.float64]],
+           start: float) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
+    """Return times from `start` on that resolve each segment, and a signal there."""
     looked_at = [trajectory.dense_times(k) for k in range(len(trajectory.segments))]
     looked_at = [times[times >= start] for times in looked_at]
     if not looked_at:
-        return when, best
-    of_each = np.split(signal(trajectory.inside_each(looked_at)), np.cumsum([times.size for times in looked_at])[:-1])
+        return [], []
+    ends = np.cumsum([times.size for times in looked_at])[:-1]
+    return looked_at, np.split(signal(trajectory.inside_each(looked_at)), ends)
+
+
+def _top(trajectory: Trajectory, signal: Callable[[Samples], NDArray[np.float64]],
+         looked_at: Sequence[NDArray[np.float64]], of_each: Sequence[NDArray[np.float64]]) -> tuple[float, float]:
+    """Return time and value of the highest point, from what a signal is at dense times of each segment."""
+    when, best, found = math.nan, -math.inf, []
     for k, (times, values) in enumerate(zip(looked_at, of_each, strict=True)):
         if values.size == 0:
             continue

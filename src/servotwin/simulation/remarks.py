@@ -18,6 +18,7 @@ from servotwin.models.terms.chip import NO_CHIP
 from servotwin.models.terms.numbers import at_temperature
 from servotwin.physics.motor import electromagnetic_torque
 from servotwin.physics.pieces import piece_value
+from servotwin.simulation.sag import LOW, floor_of, watches_its_supply
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -29,8 +30,11 @@ if TYPE_CHECKING:
     from servotwin.models.terms.numbers import Numbers
     from servotwin.simulation.rest import Rest
     from servotwin.simulation.result import Result
+    from servotwin.simulation.sag import Sag
 
 NOT_AT_REST, BUZZES = "does not come to rest", "buzzes at rest"
+HELD_BACK, BELOW_CHIP, BELOW_REGISTER = (
+    "held back by its supply", "supply below what its electronics need", "supply below its registers")
 REFUSED, ON_STOP, CANNOT_HOLD = KINDS = ("pulses refused", "ended on a stop", "cannot hold")
 COLUMNS = {kind: kind.replace(" ", "_") for kind in KINDS}
 """Name of a table's column that holds the time of a kind."""
@@ -61,7 +65,28 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.2g}" if share < 0.995 else f"{100.0 * share:.0f}"  # not 1e+02
 
 
-_NUMBERS: dict[str, Callable[..., str]] = {NOT_AT_REST: swing_words, BUZZES: drive_words}
+def held_back_words(voltage: float, low: float, limited: float, limit: float = math.inf) -> str:
+    """Return how a supply holds a servo back: least voltage [V], time below 0.8 of its own and at its limit [s, A].
+
+    Examples
+    --------
+    >>> held_back_words(1.75, 0.8, 0.84, 0.2), held_back_words(3.61, 0.05, 0.0)
+    ('at its limit of 0.2 A for 0.84 s, 1.75 V at least', 'below 80 % of its voltage for 0.05 s, 3.61 V at least')
+    """
+    when = f"at its limit of {limit:g} A for {limited:.2g} s" if limited >= low else (
+        f"below {100.0 * LOW:.0f} % of its voltage for {low:.2g} s")
+    return f"{when}, {voltage:.2f} V at least"
+
+
+def _beyond_words(why: str) -> Callable[..., str]:
+    return lambda voltage, floor: f"{voltage:.2f} V at least, {why.format(floor=floor)}"
+
+
+_NUMBERS: dict[str, Callable[..., str]] = {
+    NOT_AT_REST: swing_words, BUZZES: drive_words, HELD_BACK: held_back_words,
+    BELOW_CHIP: _beyond_words("and below about {floor:g} V (assumed) such electronics stop: no model here knows that"),
+    BELOW_REGISTER: _beyond_words("its protection does not watch the supply, and below {floor:g} V, its "
+                                  "Min_Voltage_Limit, the maker promises nothing")}
 _MARKS = {ON_STOP: final_checks.ON_STOP, CANNOT_HOLD: final_checks.CANNOT_HOLD}
 
 
@@ -90,8 +115,12 @@ class Remark(_Kind):
         [rad] at `frequency` [Hz].
         "buzzes at rest": the shaft stands where friction alone would hold it, and the bridge goes on switching: `rate`
         [Hz], `duty` in the mean [1], `current` of the supply in the mean [A].
+        "held back by its supply": that fell to `voltage` [V], was below 0.8 of its own for `low` [s] and at its `limit`
+        [A] for `limited` [s].
+        "supply below what its electronics need", "... below its registers": it fell to `voltage`, below the `floor` [V]
+        under which nobody knows what the servo does.
     time : float
-        Of the first such pulse, or the first such trip; otherwise the end of the run, of which the remark speaks [s].
+        Of the first such pulse, trip, or least voltage; otherwise the end of the run, of which the remark speaks [s].
     **numbers : float
         Those of the kind (SI).
 
@@ -153,7 +182,8 @@ def words(kind: str, time: str = "") -> str:
     text, before, after = {
         REFUSED: ("all pulses refused", "from", "on"), ON_STOP: ("ended on a stop that it was not sent to", "at", ""),
         CANNOT_HOLD: ("cannot hold its load", "at", ""), NOT_AT_REST: (NOT_AT_REST, "at", ""),
-        BUZZES: (BUZZES, "at", ""), STAYS_TRIPPED: ("a protection still acts", "at", ""),
+        BUZZES: (BUZZES, "at", ""), **{kind: (kind, "at", "") for kind in (HELD_BACK, BELOW_CHIP, BELOW_REGISTER)},
+        STAYS_TRIPPED: ("a protection still acts", "at", ""),
         **{tripped: (tripped, "at", "") for tripped in _TRIPPED}}[kind]
     return " ".join(filter(None, (text, before, time, after))) if time else text
 
@@ -186,7 +216,27 @@ def remarks_of(result: Result) -> tuple[Remark, ...]:
                                    not math.isnan(refused), final)
     said = tuple(Remark(remark.kind, remark.time) for remark in lane_remarks([refused], [marks], end))
     trips = () if firmware is None else _trips(result, last)
-    return (*said, *trips, *_of_rest(result.rest, end, alone=not said))
+    return (*said, *trips, *_of_supply(result), *_of_rest(result.rest, end, alone=not said))
+
+
+def _of_supply(result: Result) -> tuple[Remark, ...]:
+    """Return that the supply holds a servo back, and that it falls below what anybody knows of it."""
+    sag, said = result.sag, []
+    if sag is None:
+        return ()
+    if sag.holds_back:
+        said.append(held_back(sag))
+    floor = floor_of(result.model.servo)
+    if sag.voltage < floor.voltage and not watches_its_supply(result.model):
+        said.append(Remark(BELOW_REGISTER if floor.of_register else BELOW_CHIP, sag.time, voltage=sag.voltage,
+                           floor=floor.voltage))
+    return tuple(said)
+
+
+def held_back(sag: Sag) -> Remark:
+    """Return the remark on a supply that holds back what is on it."""
+    limit = {"limit": sag.limit} if math.isfinite(sag.limit) else {}
+    return Remark(HELD_BACK, sag.time, voltage=sag.voltage, low=sag.low, limited=sag.limited, **limit)
 
 
 def _of_rest(rest: Rest | None, end: float, *, alone: bool) -> tuple[Remark, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -17,9 +17,10 @@ from servotwin.models.samples import Samples
 from servotwin.simulation import files
 from servotwin.simulation.energy import Energy, energy_of
 from servotwin.simulation.engine import HELD
-from servotwin.simulation.metrics import StepMetrics, holding_error, mean_current, peak, step_metrics
+from servotwin.simulation.metrics import Least, StepMetrics, holding_error, least, mean_current, peak, step_metrics
 from servotwin.simulation.remarks import Remark, remarks_of
 from servotwin.simulation.rest import Rest, rest_of
+from servotwin.simulation.sag import Sag, sag_of
 from servotwin.simulation.status import Status
 from servotwin.simulation.trajectory import Trajectory
 
@@ -164,6 +165,22 @@ class Result:
         return remarks_of(self)
 
     @cached_property
+    def sag(self) -> Sag | None:
+        """How far the supply fell; None where it stayed as it is, or the model has none."""
+        if self.trajectory.bus is not None:
+            return self.trajectory.bus.sag
+        if "bus_voltage" not in self._signals:
+            return None
+        return sag_of([self.trajectory], self._shown("bus_voltage"), self.model.servo.supply)
+
+    def _shown(self, name: str) -> Callable[[Samples], NDArray[np.float64]]:
+        return lambda samples: self.model.output(name, samples, self.drive, self.load)
+
+    def least(self, name: str) -> Least:
+        """Return the least value of a signal (SI) over the whole continuous solution, and when it came first [s]."""
+        return least(self.trajectory, self._shown(name))
+
+    @cached_property
     def rest(self) -> Rest | None:
         """What the servo does where command and load stand still at the end; None where that is under half a second."""
         return rest_of(self)
@@ -175,7 +192,7 @@ class Result:
 
     def peak(self, name: str) -> float:
         """Return the largest magnitude of a signal (SI) over the whole continuous solution."""
-        return peak(self.trajectory, lambda samples: self.model.output(name, samples, self.drive, self.load))
+        return peak(self.trajectory, self._shown(name))
 
     def mean(self, name: str, since: float = 0.0) -> float:
         """Return the mean over time of a signal (SI), from `since` [s] to the end of the continuous solution."""

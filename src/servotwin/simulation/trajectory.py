@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,9 @@ from servotwin.models.engine.motions import motion
 from servotwin.models.samples import Samples
 from servotwin.physics import play
 from servotwin.simulation.engine import Segment
+
+if TYPE_CHECKING:
+    from servotwin.simulation.sag import Sag
 
 Array = NDArray[np.float64]
 _NODES = 12  # Gauss-Legendre nodes per interval
@@ -25,12 +29,23 @@ _NOTHING, _TIMES = 1e-15, 3.0  # A, what is left of a current; of 1/rate: an int
 _SHORTEST = 1e-307  # s: what is over in less has no time of its own
 
 
+class Bus(Protocol):
+    """The voltage of a shared bus [V] at any times [s], shape (n,), and how far it fell."""
+
+    def __call__(self, time: Array) -> Array:
+        """Return the voltage."""
+
+    @property
+    def sag(self) -> Sag | None:
+        """As of `Result.sag`."""
+
+
 @dataclass(frozen=True)
 class Trajectory:
     """Segments without gaps, in order; after the last one the state is not known (nan)."""
 
     segments: Sequence[Segment]
-    bus: Callable[[Array], Array] | None = None  # voltage of a shared bus [V] at times [s]
+    bus: Bus | None = None
 
     @cached_property
     def _starts(self) -> Array:

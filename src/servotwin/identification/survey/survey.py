@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from servotwin.errors import InputError
 from servotwin.identification.survey.clock import Clock, clock_of
@@ -16,6 +18,13 @@ from servotwin.logs.log import Log
 FEWEST = 8  # rows that say anything
 _MOST_GAPS = 20
 _ANGLES = ("output_angle", "load_angle")
+
+
+class Lowest(NamedTuple):
+    """The least voltage of a supply [V], and when it came first [s]."""
+
+    voltage: float
+    time: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +52,15 @@ class Survey:
     missing: tuple[str, ...]
 
     @property
+    def supply(self) -> Lowest | None:
+        """Least voltage of the supply and when it came first [s]; None where it was not logged."""
+        volts = self.log.measured.get("bus_voltage")
+        if volts is None or not np.isfinite(volts).any():
+            return None
+        k = int(np.nanargmin(volts))
+        return Lowest(float(volts[k]), float(self.log.time[k]))
+
+    @property
     def facts(self) -> dict[str, Any]:
         """All of it as plain data."""
         log, clock = self.log, self.clock
@@ -56,6 +74,7 @@ class Survey:
                         "changes": len(log.changes)},
             "clock": {**clock._asdict(), "gaps": [gap._asdict() for gap in clock.gaps[:_MOST_GAPS]],
                       "gap_count": len(clock.gaps)},
+            "supply": None if self.supply is None else self.supply._asdict(),
             "signals": {name: found._asdict() for name, found in self.values.items()},
             "motion": self.motion._asdict(), "wrong": list(self.wrong), "missing": list(self.missing)}
 

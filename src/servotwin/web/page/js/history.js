@@ -99,6 +99,16 @@ export class History {
     return sum / whole;
   }
 
+  /** @param {string} name @param {number} start @param {number} end @returns {{value: number, time: number}} the least value, and when it came first */
+  lowest(name, start, end) {
+    const found = { value: NaN, time: NaN };
+    for (let k = this.at(start); k < this.length && this.time(k) <= end; k += 1) {
+      const value = this.value(name, k);
+      if (!(value >= found.value)) Object.assign(found, { value, time: this.time(k) });
+    }
+    return found;
+  }
+
   /**
    * @param {string} name
    * @param {number} start

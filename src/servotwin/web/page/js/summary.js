@@ -1,12 +1,13 @@
 // What the drawings show, as a sentence that is spoken and as a table.
 
 import { el } from "./dom.js";
-import { meanCurrent, moves } from "./moves.js";
+import { lowestSupply, meanCurrent, moves } from "./moves.js";
 import { fullName, shortNames } from "./names.js";
 import { SHOWN, engineering, shown } from "./units.js";
 
 const ROWS = 20;
 const LATEST = 2; // s of the table
+const RECENT = 10; // s in which the supply is looked at
 const NAMES = ["command_angle", "output_angle", "output_speed", "load_torque", "armature_current", "bus_voltage"];
 
 /** @param {HTMLElement} root @param {import("./bench.js").Bench} bench */
@@ -56,7 +57,8 @@ export function sentence(bench, k) {
   const degrees = (/** @type {string} */ name) => (180 / Math.PI) * seen.latest(name);
   const angle = degrees("output_angle");
   const error = degrees("command_angle") - angle;
+  const fell = lowestSupply(bench, k, Math.max(0, bench.time - RECENT), bench.time);
   const off = Number.isFinite(error) ? `, ${Math.abs(error).toFixed(2)} degrees ${error > 0 ? "below" : "above"} its command` : "";
   return `${fullName(bench.facts[k])}, ${moves(bench, k).replace("°", " degrees")} at ${angle.toFixed(1)} degrees${off}, with ${
-    engineering(meanCurrent(bench, k), "A", 3)} on average.`;
+    engineering(meanCurrent(bench, k), "A", 3)} on average.${fell && ` Its supply: ${fell}.`}`;
 }

@@ -2,6 +2,7 @@
 
 import uPlot from "../vendor/uPlot.js";
 import { READABLE, choice, el, paced, svg } from "./dom.js";
+import { lowestSupply } from "./moves.js";
 import { shortNames } from "./names.js";
 import { around, lines } from "./traces_data.js";
 import { SHOWN, plain, printed, shown } from "./units.js";
@@ -167,7 +168,9 @@ export function mount(root, bench) {
   const read = paced(() => {
     const at = Number.isFinite(under) ? under : bench.time;
     for (const { keys, when } of charts) {
-      when.textContent = Number.isFinite(under) ? `at ${under.toFixed(span < 0.5 ? 6 : 3)} s` : "";
+      const supply = keys.find((key) => key.signal === "bus_voltage");
+      when.textContent = Number.isFinite(under) ? `at ${under.toFixed(span < 0.5 ? 6 : 3)} s`
+        : supply ? lowestSupply(bench, supply.servo, end - span, end) : "";
       for (const key of keys) {
         const history = bench.history[key.servo];
         const value = Number.isFinite(under) ? history.between(key.signal, at) : history.latest(key.signal);

@@ -1,0 +1,160 @@
+"""How far the supply falls: least voltage and its time beside a loop of small steps, remarks, and sheets."""
+
+import math
+
+import numpy as np
+import pytest
+
+import servotwin as st
+from servotwin.datasheet.choice import candidate
+from servotwin.datasheet.conditions import lowest_voltage
+from servotwin.parameters import catalog_names
+from servotwin.simulation.remarks import BELOW_CHIP, BELOW_REGISTER, HELD_BACK
+from servotwin.simulation.sag import floor_of
+
+STEP = 2e-5  # s
+SG90, BIG, STS, XL = "towerpro-sg90", "hitec-hs-755hb", "feetech-sts3215-12v", "dynamixel-xl330-m288"
+SITUATIONS = [  # servo, supply, torque against the shaft [N m]
+    (SG90, "usb", 0.0), (SG90, "4.5V:0.6ohm", 0.0), (SG90, "5V:0.2A", 0.0), (SG90, "5V:3ohm", 0.0),
+    (SG90, "5V:3ohm:0.35A", 0.02), (BIG, "6V:0.5ohm", 0.0), (BIG, "7.4V:0.1ohm", 0.3), (BIG, "6V:1A", 0.1),
+    (STS, "12V:0.3ohm", 0.0), (STS, "12V:0.3ohm:2A", 0.5), (STS, "12V:5A", 0.0), (XL, "usb", 0.05)]
+
+
+def model_of(name, supply):
+    from servotwin.datasheet.conditions import on_supply
+
+    servo = on_supply(st.load_servo(name), st.Supply.of(supply))
+    plain = dict.fromkeys(("gear.backlash", "gear.output_inertia", "friction.load_friction",
+                           "friction.load_friction_motor", "friction.load_friction_external"))
+    return (st.DigitalServo if servo.kind == "bus" else st.PulseServo)(servo.replace(plain))
+
+
+def small_steps(result, torque):
+    """Return the least voltage of a run and when it came.
+
+    The drives are those of the run, all else is a loop of its own: a motor with Coulomb friction behind a bridge whose
+    duty is given, in steps of 20 us by Runge and Kutta; at each the voltage is what source and bridge agree upon.
+    """
+    servo = result.model.servo
+    N, motor, supply = servo.gear.gear_reduction, servo.motor, servo.supply
+    J = N**2 * motor.rotor_inertia
+    K, K_b = N * motor.torque_constant, N * motor.back_emf_constant
+    F = N * servo.friction.coulomb_torque_forward + (servo.friction.bearing_coulomb_torque or 0.0)
+    b = N**2 * (motor.motor_viscous_friction or 0.0)
+    V, R_b, limit = supply.open_circuit_voltage, supply.internal_resistance or 0.0, supply.current_limit or math.inf
+    V_br, V_ce0 = motor.brush_drop_voltage or 0.0, supply.bridge_drop_voltage or 0.0
+    R_a, r_c = motor.armature_resistance, supply.bridge_drop_resistance or 0.0
+
+    def circuit(d, w):
+        """Current of the motor and voltage of the bus at a duty, whose share of the time the bridge conducts."""
+        turn, d = math.copysign(1.0, d), abs(d)
+        lost, R = d * V_ce0 + V_br, R_a + d * r_c
+        over, under = d * V - turn * K_b * w - lost, d * V - turn * K_b * w + lost
+        i = over / (R + d * d * R_b) if over > 0.0 else min(under, 0.0) / (R + d * d * R_b)
+        if d * i > limit:  # the source gives no more, at the voltage that this takes
+            i = limit / d
+            return turn * i, (R * i + turn * K_b * w + lost) / d
+        if i < 0.0 and math.isfinite(limit):  # and takes nothing back
+            return turn * under / R, V
+        return turn * i, V - R_b * d * i
+
+    def rate(d, w):
+        if d == 0.0:  # braked: the current goes round in the bridge
+            over = K_b * abs(w) - V_br
+            i = -math.copysign(over / R_a, w) if over > 0.0 else 0.0
+        else:
+            i = circuit(d, w)[0]
+        push = K * i - torque
+        if w == 0.0:
+            return (push - math.copysign(F, push)) / J if abs(push) > F else 0.0
+        return (push - b * w - math.copysign(F, w)) / J
+
+    w, least, when = 0.0, V, 0.0
+    for segment in result.trajectory.segments:
+        d = segment.drive if isinstance(result.model, st.PulseServo) else segment.duty
+        d = d if abs(d) <= 1.0 else 0.0
+        count = max(math.ceil((segment.end - segment.start) / STEP - 1e-6), 1)
+        h = (segment.end - segment.start) / count
+        for k in range(count + 1):
+            volts = circuit(d, w)[1] if d else V
+            if volts < least - 1e-7:
+                least, when = volts, segment.start + k * h
+            if k < count:
+                a = rate(d, w)
+                b2 = rate(d, w + 0.5 * h * a)
+                c = rate(d, w + 0.5 * h * b2)
+                e = rate(d, w + h * c)
+                after = w + h * (a + 2.0 * b2 + 2.0 * c + e) / 6.0
+                w = 0.0 if w * after < 0.0 and abs(K * (circuit(d, 0.0)[0] if d else 0.0) - torque) <= F else after
+    return least, when
+
+
+@pytest.mark.parametrize(("name", "supply", "torque"), SITUATIONS)
+def test_the_least_voltage_is_that_of_small_steps(name, supply, torque):
+    model = model_of(name, supply)
+    ends = (10.0, 80.0) if name == BIG else (-40.0, 40.0)
+    command = st.signals.step(*ends, at=0.04, unit="deg")
+    load = st.loads.Constant(torque)
+    result = st.simulate(model, command, load=load, duration=0.3, output_step=0.1)
+    least, when = small_steps(result, torque)
+    bus = st.simulate_bus({"one": (model, command, load)}, supply=st.Supply.of(supply), duration=0.3, output_step=0.1)
+    if (name, supply) == (STS, "12V:5A"):  # it gives all that is asked
+        assert (least, result.sag, bus.sag) == (12.0, None, None)
+        return
+    for sag in (result.sag, bus.sag):
+        assert sag.voltage == pytest.approx(least, abs=1e-6)
+        assert sag.time == pytest.approx(when, abs=1e-3)
+    assert result.least("bus_voltage") == (result.sag.voltage, result.sag.time)
+
+
+def said(name, supply, load=0.0):
+    servo = st.load_servo(name)
+    from servotwin.datasheet.conditions import on_supply
+
+    model = (st.DigitalServo if servo.kind == "bus" else st.PulseServo)(on_supply(servo, st.Supply.of(supply)))
+    result = st.simulate(model, st.signals.step(-40.0, 40.0, at=0.04, unit="deg"), load=st.loads.Constant(load),
+                         duration=0.4, output_step=0.1)
+    return {remark.kind: remark for remark in result.remarks}
+
+
+@pytest.mark.parametrize(("name", "supply", "load", "kinds"), [
+    (SG90, "5V:0.2A", 0.0, {HELD_BACK, BELOW_CHIP}), (SG90, "5V:3ohm", 0.0, {HELD_BACK}),
+    (SG90, "5V:0.1ohm", 0.0, set()), (STS, "12V:0.3ohm", 0.0, set()), (SG90, "5V", 0.0, set()),
+    (STS, "6V:9ohm", 0.1, {HELD_BACK, BELOW_REGISTER})])
+def test_what_is_said_of_a_supply(name, supply, load, kinds):
+    found = said(name, supply, load)
+    assert {kind for kind in found if kind in (HELD_BACK, BELOW_CHIP, BELOW_REGISTER)} == kinds
+    for kind in kinds:
+        assert f"{found[kind].numbers['voltage']:.2f} V at least" in found[kind].words
+
+
+def test_a_protection_that_watches_the_supply_says_it_itself():
+    """An XL330's Shutdown has the bit of its supply, an STS3215's mask has not."""
+    watching = st.load_servo(XL).replace({"supply.open_circuit_voltage": 5.0, "supply.internal_resistance": 4.0})
+    result = st.simulate(st.DigitalServo(watching), st.signals.step(-40.0, 40.0, at=0.04, unit="deg"),
+                         load=st.loads.Constant(0.2), duration=0.4)
+    assert result.sag.voltage < floor_of(watching).voltage
+    assert BELOW_REGISTER not in dict(result.remarks)
+    assert "tripped by undervoltage" in dict(result.remarks)
+
+
+@pytest.mark.parametrize("volts", [5.0, 3.3, 7.4])
+def test_no_servo_is_taken_below_its_sheet(volts):
+    for name in catalog_names():
+        servo = st.load_servo(name)
+        if lowest_voltage(servo) > volts:
+            assert "voltage" in [reason.kind for reason in candidate(servo, volts).reasons], name
+    assert any(not candidate(st.load_servo(name), 5.0).reasons for name in catalog_names())
+
+
+def test_a_fleet_tells_its_supply_and_each_servo_it():
+    """Twelve SG90 at 3.5 A: the limit holds them all."""
+    model = model_of(SG90, "5V:3.5A")
+    command = st.signals.step(0.0, 60.0, at=0.05, unit="deg")
+    fleet = st.simulate_bus({f"s{k}": (model, command) for k in range(12)}, supply=st.Supply.of("5V:3.5A"),
+                            duration=0.2)
+    assert fleet.sag.voltage < 3.0
+    assert fleet.sag.voltage <= fleet.bus_voltage.min()
+    assert fleet.sag.limited == pytest.approx(
+        1e-3 * np.count_nonzero(fleet.supply_current > 3.5 - 1e-9), abs=2e-3)
+    assert {servo for servo, kind, _ in fleet.remarks if kind == HELD_BACK} == set(fleet)
