@@ -104,7 +104,8 @@ def _log(path: Path, read: Callable[[], list[Log]]) -> Log:
 
     logs = read()
     if len(logs) != 1:
-        raise InputError(str(path), got=f"{len(logs)} logs", allowed="one, such as a single file")
+        raise InputError(str(path), got=f"{len(logs)} logs", allowed="one: servotwin log with --out FILE.csv writes "
+                         "each to a file of its own, FILE-1.csv and so on")
     return logs[0]
 
 

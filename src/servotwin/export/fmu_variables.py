@@ -41,6 +41,8 @@ class Variable:
         Bounds of what may be set; infinite where there are none.
     is_open : bool
         Whether the lower one is excluded.
+    said : str
+        Bounds in words, where numbers do not tell them.
     """
 
     name: str
@@ -52,10 +54,13 @@ class Variable:
     low: float = -math.inf
     high: float = math.inf
     is_open: bool = False
+    said: str = ""
 
     @property
     def allowed(self) -> str:
         """The bounds in words."""
+        if self.said:
+            return self.said
         if self.low == -math.inf and self.high == math.inf:
             return "a finite number"
         if self.high == math.inf:
@@ -67,7 +72,8 @@ def inputs_of(goals: bool, command: float, low: float, high: float) -> tuple[Var
     """Return command and torque, which are held over a step."""
     name, unit = ("command_angle", "rad") if goals else ("pulse_width", "s")
     meaning = "goal that the servo is told" if goals else "width of the pulses that the servo is told"
-    return (Variable(name, COMMAND, "input", unit, meaning, command, low, high),
+    said = "" if goals else "a width of more than 0 and less than a frame [s], from the first step on"
+    return (Variable(name, COMMAND, "input", unit, meaning, command, low, high, said=said),
             Variable("external_torque", TORQUE, "input", "N m",
                      "torque beside that of the load; positive pushes towards smaller angles", 0.0))
 

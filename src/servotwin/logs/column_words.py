@@ -88,7 +88,9 @@ def _all(option: str, words: str) -> list[Wanted]:
 
 
 def with_signals(option: str, words: str) -> str:
-    """Return words such as ``1:ms 2:deg`` with the signals that their units say; the second of two times is a pulse.
+    """Return words such as ``1:ms 2:deg`` with the signals that their units say.
+
+    The second of two times is a pulse, and so is one in us that is not the first column.
 
     Examples
     --------
@@ -103,7 +105,8 @@ def with_signals(option: str, words: str) -> str:
         dimension = scaled_unit(f"{option} {number}:{unit}", unit)[1]
         if dimension not in _BY_UNIT:
             raise UnitError(f"{option} {number}:{unit}", got=unit, allowed=f"a signal before it: {_FORM}")
-        known = dimension == "time" and any(word.startswith("time=") for word in named)
+        known = dimension == "time" and (any(word.startswith("time=") for word in named)
+                                         or (number != "1" and unit.endswith("us") and len(found) > 1))
         named.append(f"{'pulse' if known else _BY_UNIT[dimension]}={number}:{unit}")
     return " ".join(named)
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from servotwin.errors import InputError, UnitError
 from servotwin.logs import column_names as names
-from servotwin.logs.column_values import Guess, guess, is_increasing, range_of
+from servotwin.logs.column_values import Guess, are_counts, guess, is_increasing, range_of
 from servotwin.logs.column_words import COMMAND, SHORT, Wanted, column_said
 from servotwin.logs.columns import COMMANDS, SWITCH, TIME, Column, columns_of, dimension_of_signal, si_unit_of
 from servotwin.logs.defined import checked_definition, is_defined
@@ -292,6 +292,9 @@ def _column(one: _Candidate) -> Column:
     return Column(one.column, one.found.unit, from_first=one.found.from_first)
 
 
+_A_COUNT = "0.3deg-90"  # an example of what one count is
+
+
 def _no_unit(table: TextTable, signal: str, column: str, meaning: names.Meaning | None) -> InputError:
     """Return the error of a column whose unit is not known, or cannot be."""
     short = _SHORT.get(signal, signal)
@@ -305,7 +308,7 @@ def _no_unit(table: TextTable, signal: str, column: str, meaning: names.Meaning 
             signal, (si_unit_of(signal), units_written(dimension_of_signal(signal))))
     values = range_of(table, column)  # raises where they are no numbers
     if meaning is not None and COUNTS in (meaning.role, meaning.dimension):
-        example = "0.3deg-90" if short == "angle" else f"0.3{example}"
+        example = _A_COUNT if short == "angle" else f"0.3{example}"
         return InputError(f"{table.path}: column {column} holds counts ({values})",
                           allowed=f'{SAID} "{short}={column}:{example}", with what one of them is')
     said = f'{SAID} "{short}={column}:{example}"' if ":" not in column and "=" not in column else (
@@ -321,6 +324,8 @@ def _unknown(table: TextTable, lacking: list[str], made: Mapping[str, tuple[Colu
     """Return the error of a table without a time, a command or an angle that could be told."""
     taken = {column.column for column, _ in made.values()}
     free = [name for name in table.header if name not in taken]
+    if TIME not in lacking:  # what grows with time is proposed last
+        free.sort(key=lambda name: is_increasing(table, name))
     words = " ".join(f"{what}={name}:{_likely(table, what, name)}" for what, name in zip(
         lacking, [*free, *["COLUMN"] * len(lacking)], strict=False))
     usual = {TIME: "time_s", COMMAND: "pulse_width_us, command_angle_deg or command_voltage_V",
@@ -335,7 +340,8 @@ def _unknown(table: TextTable, lacking: list[str], made: Mapping[str, tuple[Colu
         more.append("--commanded 153deg@0s, a jump that was commanded" if step is None else
                     f"--commanded {step.command}, as the angle shows an unknown step {step.words}")
     return InputError(f"{table.path}: {what}", got=got, allowed=", or ".join(
-        [*more, f"names such as {', '.join(usual[one] for one in lacking)}", f'{SAID} "{words}"']))
+        [*more, f"names such as {', '.join(usual[one] for one in lacking)}", f'{SAID} "{words}"'])
+        + (", with what one of its counts is" if _A_COUNT in words else ""))
 
 
 def _likely(table: TextTable, what: str, name: str) -> str:
@@ -345,6 +351,8 @@ def _likely(table: TextTable, what: str, name: str) -> str:
         found = guess(table, name, role) if name in table.header else None
     except InputError:  # no numbers
         found = None
+    if what == "angle" and found is None and are_counts(table, name):
+        return _A_COUNT
     return {TIME: "s", COMMAND: "us", "angle": "deg"}[what] if found is None else found.unit
 
 

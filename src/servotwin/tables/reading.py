@@ -156,7 +156,8 @@ class TextTable:
                 return float(cell.replace(",", ".", 1) if self.decimal == "," else cell)
             except ValueError:
                 pass
-        raise InputError(f"{self.path}: line {line}, {name}", got=cell or "nothing", allowed=allowed)
+        where = name if self.has_header else f"column {name}"
+        raise InputError(f"{self.path}: line {line}, {where}", got=cell or "nothing", allowed=allowed)
 
     def check_lengths(self, *, shorter: bool = False) -> None:
         """Raise unless every row has as many cells as the header; empty ones behind do not count.
