@@ -104,9 +104,14 @@ def new_figure(width: float, height: float, layout: Literal["constrained"] | Non
     return figure
 
 
-def finished(figure: Figure) -> Figure:
-    """Return the figure with its layout found once and then kept, so that all files of it look the same."""
+def finished(figure: Figure, foot: str = "") -> Figure:
+    """Return the figure with its layout found once and then kept, so that all files of it look the same.
+
+    Words for its foot, such as which page of a picture it is, stand in its lower right corner.
+    """
     with context():
+        if foot:
+            figure.supxlabel(foot, x=0.995, ha="right", fontsize=7.5, color=COLOURS["grey"])
         figure.draw_without_rendering()
         figure.set_layout_engine("none")
     return figure
