@@ -16,6 +16,7 @@ from servotwin.cli import linear_page
 from servotwin.datasheet import Bandwidth, Loop
 from servotwin.errors import InputError
 from servotwin.identification.fitting.holdout import ErrorTable, LogError
+from servotwin.identification.report import parts
 from servotwin.identification.report import pictures as report_pictures
 from servotwin.logs import Log
 from servotwin.look import on_page
@@ -48,9 +49,10 @@ def loop(volts):
     return Loop(st.DigitalServo(BUS.replace({"supply.open_circuit_voltage": volts})))
 
 
-def errors(count, page):
+def errors(count):
+    """Return errors by so many kinds of motion."""
     found = tuple(LogError("log", name, {}, 0.1 * (k + 1), 0.2, 1) for k, name in enumerate(names(count)))
-    return report_pictures.errors({"": ErrorTable(("servo",), {"servo": found})}, "motion", 1.0, "°", page)
+    return {"": ErrorTable(("servo",), {"servo": found})}
 
 
 def sines(count, page):
@@ -126,7 +128,8 @@ PICTURES = {
     "sines": Case("cli.linear_page.CURVES_A_PAGE", sines, lambda figure: [
         f"item {int(label.split()[2][:-2]) - 1}" for label in lines()(figure) if label.startswith("sines")],
         scaled=False),
-    "errors": Case("identification.report.pictures.VALUES_A_PAGE", errors, lambda figure: [
+    "errors": Case("identification.report.pictures.VALUES_A_PAGE", lambda n, page: report_pictures.errors(
+        errors(n), "motion", 1.0, "°", page), lambda figure: [
         tick.get_text() for tick in figure.axes[0].get_yticklabels()], scaled=False),
 }
 
@@ -171,6 +174,11 @@ def test_a_page_says_which_it_is():
     feet = [plotting.curves(some, x_label="x (1)", y_label="y (1)", page=page).get_supxlabel()
             for some, page in ((drawn[:5], 1), (drawn, 1), (drawn, 2))]
     assert feet == ["", "page 1 of 2", "page 2 of 2"]
+
+
+@pytest.mark.parametrize(("count", "pictures"), [(1, 1), (12, 1), (13, 2)])
+def test_a_report_has_all_pages(count, pictures):
+    assert parts.errors(errors(count), [], "Of all logs.").count("<img") == pictures
 
 
 def test_names_of_many_joints_do_not_overlap():

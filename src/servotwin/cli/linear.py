@@ -96,7 +96,7 @@ def linear(
 def _targets(paths: dict[str, Path | None], servo: str, amplitudes: int, *, tune: bool, force: bool) -> list[Target]:
     from servotwin.cli.outputs import Target, check_targets, page_name
     from servotwin.errors import InputError
-    from servotwin.plotting import CURVES_A_PAGE, pages
+    from servotwin.look import CURVES_A_PAGE, pages
 
     several = {"--plot": pages(amplitudes, CURVES_A_PAGE)}
     targets = [Target(option=option, path=Path(page_name(str(path), page)), endings=_ENDINGS[option], page=page)

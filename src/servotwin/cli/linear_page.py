@@ -9,8 +9,8 @@ import numpy as np
 
 from servotwin import plotting
 from servotwin.cli.linear_words import LOOP_HEAD, SINE_HEAD, loop_rows, mean_pairs, sine_rows
-from servotwin.look import document, escape, on_page, picture, table, to_bytes
-from servotwin.plotting import CURVES_A_PAGE, Response, pages
+from servotwin.look import CURVES_A_PAGE, document, escape, on_page, pages, picture, table, to_bytes
+from servotwin.plotting import Response
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

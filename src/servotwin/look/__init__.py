@@ -7,12 +7,23 @@ from servotwin.look.files import FORMATS, to_bytes
 from servotwin.look.numbers import figure_in, label_of, readable, unit_for
 from servotwin.look.page import document
 from servotwin.look.pages import on_page, pages
-from servotwin.look.style import COLOURS, LINES, WIDTH, axes_grid, context, finished, new_figure, plain_decades
+from servotwin.look.style import (
+    COLOURS,
+    CURVES_A_PAGE,
+    LINES,
+    WIDTH,
+    axes_grid,
+    context,
+    finished,
+    new_figure,
+    plain_decades,
+)
 from servotwin.look.words import MINUS, TIMES, fixed, number, picture, plain, table, with_error
 from servotwin.text import escape
 
 __all__ = [
     "COLOURS",
+    "CURVES_A_PAGE",
     "FORMATS",
     "LINES",
     "MINUS",

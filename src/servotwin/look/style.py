@@ -25,6 +25,9 @@ LINES: tuple[tuple[str, Any], ...] = (
 )
 """Colour and dash of the first, second, … curve: the dash alone tells them apart in grey print."""
 
+CURVES_A_PAGE = len(LINES)
+"""How many curves a picture shows at once: as many as are told apart."""
+
 _RC = {
     "font.size": 9.0, "axes.titlesize": 9.0, "axes.labelsize": 9.0, "legend.fontsize": 8.0, "xtick.labelsize": 8.0,
     "ytick.labelsize": 8.0, "font.family": "DejaVu Sans", "mathtext.fontset": "dejavusans", "lines.linewidth": 1.6,

@@ -5,7 +5,7 @@ asked for. Angles are in degrees and pulses in microseconds. A picture of more t
 even as possible: `page=2` draws the second, and `pages` says which there are.
 """
 
-from servotwin.look import COLOURS, LINES, axes_grid, finished, pages, readable, to_bytes
+from servotwin.look import COLOURS, CURVES_A_PAGE, LINES, axes_grid, finished, pages, readable, to_bytes
 from servotwin.plotting.block_diagrams import PAPER_DIAGRAMS, block_diagram
 from servotwin.plotting.bode import Response, bode, root_locus
 from servotwin.plotting.characteristics import (
@@ -20,7 +20,7 @@ from servotwin.plotting.files import save
 from servotwin.plotting.formula import Formula, formula_svg
 from servotwin.plotting.loops import LOOPS_A_PAGE, loop_curve
 from servotwin.plotting.measured import log_over_time
-from servotwin.plotting.panels import CURVES_A_PAGE, Curve, Limit, curves, pulses
+from servotwin.plotting.panels import Curve, Limit, curves, pulses
 from servotwin.plotting.paths import PATHS_A_PAGE, PathTrace, robot_paths
 from servotwin.plotting.ranking import ranking
 from servotwin.plotting.replays import ReplayTrace, replay_windows

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from servotwin import units
-from servotwin.look import COLOURS, LINES, context, finished, new_figure, on_page
-from servotwin.plotting.panels import CURVES_A_PAGE, Curve, Limit, curves, same_axes
+from servotwin.look import COLOURS, CURVES_A_PAGE, LINES, context, finished, new_figure, on_page
+from servotwin.plotting.panels import Curve, Limit, curves, same_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

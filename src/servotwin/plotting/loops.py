@@ -62,7 +62,8 @@ def loop_curve(loops: Sequence[Loop], *, width: float = 8.4, height: float = 3.9
         _cap(axes[0], first)
         _middle(axes[1], first, near)
         handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), handlelength=3.2)
+        columns = len(labels) if len(labels) < 6 else 3  # six are wider than the figure
+        figure.legend(handles, labels, loc="outside lower center", ncols=columns, handlelength=3.2)
         axes[0].set_ylabel("torque (N m)")
         title = first.model.servo.title or first.model.servo.name
         figure.suptitle(f"{title}: {first.stiffness:.3g} N m/rad" + (f", {which}" if which else ""), fontsize=9)

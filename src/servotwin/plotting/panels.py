@@ -9,15 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from servotwin.errors import InputError
-from servotwin.look import COLOURS, LINES, axes_grid, context, finished, on_page
+from servotwin.look import COLOURS, CURVES_A_PAGE, LINES, axes_grid, context, finished, on_page
 from servotwin.look.pages import pages, part
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-CURVES_A_PAGE = len(LINES)
-"""How many curves a picture shows at once: as many as there are colours, each with a dash of its own."""
 _BELOW = 1.5  # levels between two trains of pulses
 _MARKERS = ("o", "s", "^", "D", "v")
 

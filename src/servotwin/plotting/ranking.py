@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from servotwin.look import LINES, axes_grid, context, finished, on_page, plain_decades
-from servotwin.plotting.panels import CURVES_A_PAGE, same_axes
+from servotwin.look import CURVES_A_PAGE, LINES, axes_grid, context, finished, on_page, plain_decades
+from servotwin.plotting.panels import same_axes
 from servotwin.text import shortened
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from servotwin.look import COLOURS, LINES, context, finished, new_figure, on_page
-from servotwin.plotting.panels import CURVES_A_PAGE, same_axes
+from servotwin.look import COLOURS, CURVES_A_PAGE, LINES, context, finished, new_figure, on_page
+from servotwin.plotting.panels import same_axes
 from servotwin.text import shortened
 
 if TYPE_CHECKING:
