@@ -68,6 +68,34 @@ def test_page_picture_and_points(cli, sheet, tmp_path):
 
 
 @pytest.mark.long
+def test_pictures_of_many_voltages_have_pages(cli, tmp_path):
+    words = ["curves", SERVO, "--quick", "--model", "bounded", "--voltage", "4.8,5,5.2,5.4,5.6,6,6", "--plot", "a.png"]
+    (tmp_path / "a-2.png").write_text("mine")
+    assert "a-2.png exists already" in cli(*words).error
+    assert [path.name for path in tmp_path.iterdir()] == ["a-2.png"]
+    found = cli(*words, "--out", "page.html", "--force", "--json").data
+    assert found["files"] == ["page.html", "a.png", "a-2.png"]
+    assert all((tmp_path / name).read_bytes().startswith(b"\x89PNG") for name in found["files"][1:])
+    assert (tmp_path / "page.html").read_text(encoding="utf-8").count("<img") == 4  # two pages of two pictures
+
+
+@pytest.mark.parametrize("words", [
+    ["curves", SERVO, "towerpro-sg90", "hitec-hs-311", "hitec-hs-422", "towerpro-mg996r", "gobilda-2000-135", "--plot"],
+    ["curves", "feetech-sts3215-12v", "--voltage", "9,10,11,12", "--loop"],
+    ["linear", SERVO, "--amplitude", "1deg,2deg,3deg,4deg,5deg", "--amplitude", "6deg", "--plot"],
+])
+def test_pages_are_known_before_anything_is_computed(cli, tmp_path, words):
+    (tmp_path / "a-2.png").write_text("mine")
+    assert "a-2.png exists already" in cli(*words, "a.png").error
+    assert [path.name for path in tmp_path.iterdir()] == ["a-2.png"]
+
+
+def test_a_servo_that_turns_endlessly_has_no_loop(cli, tmp_path):
+    words = ["curves", "feetech-sts3215-12v", "--set", "potentiometer.fixed_angle=0", "--loop", "a.png"]
+    assert "--loop: got 'feetech-sts3215-12v', allowed: one" in cli(*words).error
+
+
+@pytest.mark.long
 def test_a_digital_servo_says_once_that_it_is_computed_as_analog_where_that_is_asked_for(cli):
     words = ["curves", "towerpro-mg996r", "--voltage", "5", "--quick"]
     ended = cli(*words, "--model", "pulse")

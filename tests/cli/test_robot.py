@@ -72,6 +72,32 @@ def test_files_and_table(robot, tmp_path):
 
 
 @pytest.mark.long
+def test_pictures_of_many_joints_have_pages(robot, tmp_path):
+    """Thirteen hinges in a row, all that is computed before it is drawn; no page is known too late."""
+    joints = [f"hinge_{k}" for k in range(13)]
+    links = "".join(f'<body pos=".02 0 0"><joint name="{joint}" axis="0 0 1"/><geom size=".003" mass=".001"/>'
+                    for joint in joints)
+    (tmp_path / "chain.xml").write_text(f"<mujoco><worldbody>{links}{'</body>' * 13}</worldbody></mujoco>")
+    time = np.linspace(0.0, 0.2, 11)
+    np.savetxt(tmp_path / "row.csv", np.column_stack([time, *[3.0 * np.sin(9.0 * time)] * 13]), delimiter=",",
+               comments="", header=",".join(["time_s", *(f"{joint}_deg" for joint in joints)]))
+    words = quick("chain.xml", "--servo", "*=hitec-hs-755hb", "--model", "bounded", motion="row.csv")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "sizing-2.png").write_text("mine")
+    refused = robot(*words)
+    assert refused.code == 2
+    assert refused.err.endswith("out/sizing-2.png exists already; use --force (overwrite=True) to replace it\n")
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["sizing-2.png"]
+    found = robot(*words, "--force", "--json").data
+    pages = {"tracking-2.png", "electrical-2.png", "sizing-2.png"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == FILES | pages
+    assert {name.removeprefix("out/") for name in found["files"]} == FILES | pages
+    assert len(found["joints"]) == 13
+    html = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    assert all(html.count(f'<img src="{name}"') == 1 for name in FILES | pages if name.endswith(".png"))
+
+
+@pytest.mark.long
 def test_json_is_the_summary(robot, tmp_path):
     found = robot(*quick("arm.xml", *SERVOS), "--json").data
     files = found.pop("files")

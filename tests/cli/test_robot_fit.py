@@ -40,6 +40,9 @@ WORDS = ("robot", "fit", "arm.xml", "arm.csv", "--servo", "*=feetech-sts3215-12v
 
 
 def test_servo_files_a_page_and_numbers(cli, arm):
+    """A hinge beside the arm of which nothing was recorded has a servo too: that is not fitted, and gets no file."""
+    beside = '<body pos="1 0 0"><joint name="beside" axis="0 1 0"/><geom size=".01" mass=".01"/></body></worldbody>'
+    (arm / "arm.xml").write_text((arm / "arm.xml").read_text().replace("</worldbody>", beside))
     ended = cli(*WORDS, "--out", "out", "--json")
     assert ended.code == 0, ended.err
     told = json.loads(ended.out)

@@ -31,7 +31,13 @@ def test_the_command(cli, tmp_path, monkeypatch):
         "summary.json", "errors.png", "windows.png", "index.html"}
     page = (tmp_path / "out" / "index.html").read_text()
     assert "Where it is worst" in page
-    assert "shoulder" in cli(*words, "--episode", "0").out
+    with monkeypatch.context() as one_a_page:
+        for module in ("servotwin.plotting", "servotwin.plotting.replays"):
+            one_a_page.setattr(f"{module}.JOINTS_A_PAGE", 1)
+        assert "shoulder" in cli(*words, "--episode", "0", "--out", "pages").out
+    pages = {"windows.png", "windows-2.png"}
+    assert {path.name for path in (tmp_path / "pages").glob("windows*")} == pages
+    assert all(f'<img src="{name}"' in (tmp_path / "pages" / "index.html").read_text() for name in pages)
     for bad, said in ((("--episode", "7"), "episode: got 7"), (("--unit", "mm"), "allowed")):
         refused = cli(*words, *bad)
         assert refused.code == 2

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from servotwin import plotting
-from servotwin.errors import InputError
 from servotwin.plotting import PathTrace, robot_paths
 
 CORNERS = np.array([[0.0, 0.0], [0.6, 0.0], [0.6, 0.3]])
@@ -26,9 +25,3 @@ def test_each_run_has_a_panel_with_both_paths_and_all_waypoints(count):
         assert low < 0.0 < 0.7 < high
         assert down < 0.0 < 0.35 < up
     assert plotting.to_bytes(figure, "png").startswith(b"\x89PNG")
-
-
-@pytest.mark.parametrize("count", [0, 5])
-def test_none_or_too_many(count):
-    with pytest.raises(InputError, match=f"paths in one picture: got {count}, allowed: 1 to 4"):
-        robot_paths([PathTrace("run", DRIVEN, DRIVEN)] * count, CORNERS)

@@ -7,7 +7,6 @@ import pytest
 
 import servotwin as st
 from servotwin import plotting
-from servotwin.errors import InputError
 
 TIME = np.linspace(-0.5, 4.5, 2501)
 CURVE = st.curves(st.PulseServo(st.load_servo("hitec-hs-755hb")), bandwidth=False).voltages[0]
@@ -82,13 +81,6 @@ def test_torques_stand_in_the_curve_of_the_servo():
 def test_what_is_not_known_is_not_drawn():
     ax = plotting.shaft_torques([shaft(worst=None, lasting_torque=math.nan)]).axes[0]
     assert not {"least to spare", "lifted without end"} & {line.get_label() for line in ax.lines}
-
-
-@pytest.mark.parametrize("draw", [plotting.joint_tracking, plotting.servo_electrics, plotting.shaft_torques])
-@pytest.mark.parametrize("count", [0, 25])
-def test_too_much_to_tell_apart_is_refused(draw, count):
-    with pytest.raises(InputError, match="joints in one picture"):
-        draw([joint()] * count)
 
 
 @pytest.mark.long

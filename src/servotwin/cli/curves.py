@@ -69,14 +69,15 @@ def curves(
     from servotwin.cli.lift_words import loads_of
     from servotwin.errors import InputError
 
-    asked = loads_of(lift, arm, load or [])
-    targets = _targets({"--out": out, "--plot": plot, "--loop": loop, "--csv": csv}, servos, force=force)
+    asked, volts = loads_of(lift, arm, load or []), _voltages(voltage)
+    targets = _targets({"--out": out, "--plot": plot, "--loop": loop, "--csv": csv}, servos,
+                       1 if volts is None else len(volts), force=force)
     models = _models(servos, model, change or [], register or [], supply)
     if voltage and supply:
         raise InputError("--supply", got=f"also --voltage {','.join(voltage)}", allowed="one of them")
     _check_loop(loop, models)
     sheets = _computed(models, {
-        "voltage": _voltages(voltage), "lift": asked.lift, "hot": hot + _ZERO_CELSIUS, "bandwidth": not quick})
+        "voltage": volts, "lift": asked.lift, "hot": hot + _ZERO_CELSIUS, "bandwidth": not quick})
     _write(sheets, targets, asked.torque, force=force)
     files = [str(target.path) for target in targets]
     if as_json:
@@ -90,26 +91,31 @@ def curves(
         show(pairs([("written", name) for name in files]))
 
 
-def _targets(paths: dict[str, Path | None], servos: list[str], *, force: bool) -> list[Target]:
-    from servotwin.cli.outputs import Target, check_targets
+def _targets(paths: dict[str, Path | None], servos: list[str], voltages: int, *, force: bool) -> list[Target]:
+    from servotwin.cli.outputs import Target, check_targets, page_name
     from servotwin.errors import InputError
+    from servotwin.plotting import CURVES_A_PAGE, LOOPS_A_PAGE, pages
 
     repeated = next((name for name in servos if servos.count(name) > 1), None)
     if repeated is not None:
         raise InputError("servos", got=f"{repeated!r} twice", allowed="each once")
-    targets = [Target(option=option, path=path, endings=_ENDINGS.get(option, _PICTURES))
-               for option, path in paths.items() if path is not None]
+    several = {"--plot": pages(voltages if len(servos) == 1 else len(servos), CURVES_A_PAGE),
+               "--loop": pages(voltages, LOOPS_A_PAGE)}
+    targets = [Target(option=option, path=Path(page_name(str(path), page)), page=page,
+                      endings=_ENDINGS.get(option, _PICTURES))
+               for option, path in paths.items() if path is not None for page in several.get(option, [1])]
     check_targets(targets, force=force, inputs=[Path(servo) for servo in servos])
     return targets
 
 
 def _voltages(words: list[str] | None) -> list[float] | None:
+    """Return the voltages that are asked for, each once; None: the servo's own."""
     from servotwin.units.quantities import quantity
 
     if words is None:
         return None
-    return [quantity("--voltage", part, "voltage", bare=True, positive=True)
-            for word in words for part in word.split(",")]
+    return list(dict.fromkeys(quantity("--voltage", part, "voltage", bare=True, positive=True)
+                              for word in words for part in word.split(",")))
 
 
 def _models(servos: list[str], model: str | None, change: list[str], register: list[str],
@@ -125,9 +131,10 @@ def _check_loop(path: Path | None, models: list[Model]) -> None:
     from servotwin.errors import InputError
     from servotwin.models import DigitalServo
 
-    if path is not None and not (len(models) == 1 and isinstance(models[0], DigitalServo)):
+    if path is not None and not (len(models) == 1 and isinstance(models[0], DigitalServo) and not models[0].endless):
         names = ", ".join(model.servo.name for model in models)
-        raise InputError("--loop", got=names, allowed="one digital or bus servo, whose file has a program")
+        raise InputError("--loop", got=names, allowed="one digital or bus servo, whose file has a program, and that "
+                         "does not turn endlessly")
 
 
 def _computed(models: list[Model], options: dict[str, Any]) -> list[DataSheet]:
@@ -152,12 +159,13 @@ def _write(sheets: list[DataSheet], targets: list[Target], torque: float | None,
             elif target.option == "--loop":
                 from servotwin import plotting
 
-                plotting.save(plotting.loop_curve([part.loop for part in sheets[0].voltages if part.loop]), draft)
+                loops = [part.loop for part in sheets[0].voltages if part.loop]
+                plotting.save(plotting.loop_curve(loops, page=target.page), draft)
             elif target.option == "--plot":
                 from servotwin import plotting
 
-                drawn = plotting.speed_curves(sheets[0]) if len(sheets) == 1 else plotting.compared_curves(sheets)
-                plotting.save(drawn, draft)
+                plotting.save(plotting.speed_curves(sheets[0], page=target.page) if len(sheets) == 1 else
+                              plotting.compared_curves(sheets, page=target.page), draft)
             else:
                 _write_points(sheets, draft)
 

@@ -25,8 +25,6 @@ figure img.drawing{width:100%;max-width:30rem}figure.wide img.drawing{width:100%
 .yes{border-left-color:#009e73;background:#f0faf6}
 @media print{section.servo{break-before:page}section.servo:first-of-type{break-before:auto}}
 """
-_MOST_COMPARED = 5
-_MOST_LOOPS = 3
 
 
 def page(sheets: Sequence[DataSheet], torque: float | None = None) -> str:
@@ -44,10 +42,10 @@ def page(sheets: Sequence[DataSheet], torque: float | None = None) -> str:
 def _contents(sheets: Sequence[DataSheet], names: Sequence[str]) -> str:
     items = "".join(f'<li><a href="#{escape(sheet.servo.name)}">{escape(name)}</a></li>'
                     for sheet, name in zip(sheets, names, strict=True))
-    drawn = ""
-    if len(sheets) <= _MOST_COMPARED:
-        drawn = _figure(plotting.compared_curves(sheets), "Torque and current over speed at full drive, cold, each "
-                        "servo at the first of its voltages. Open marks are what the sheets print for it.", wide=True)
+    drawn = _figure([plotting.compared_curves(sheets, page=page)
+                     for page in plotting.pages(len(sheets), plotting.CURVES_A_PAGE)],
+                    "Torque and current over speed at full drive, cold, each servo at the first of its voltages. Open "
+                    "marks are what the sheets print for it.", wide=True)
     return f'<nav aria-label="Contents"><ol>{items}</ol></nav>\n{drawn}'
 
 
@@ -57,22 +55,25 @@ def _servo(sheet: DataSheet, torque: float | None, *, alone: bool) -> str:
     known = "".join(f"<li>{escape(note)}</li>" for note in notes(sheet))
     said = f'<div class="note"><ul>{known}</ul></div>\n' if known else ""
     parts = "".join(_voltage(sheet, part, torque) for part in sheet.voltages)
-    drawn = _figure(plotting.speed_curves(sheet), f"At full drive over speed: cold (25 °C) and hot "
-                    f"({escape(_degrees(hot_words(sheet.voltages[0])))}). Open marks are what the sheet prints.",
-                    wide=True)
-    small = _figure(plotting.holding_curves(sheet), "How far a constant load pulls the servo off its command, 1.5 to "
-                    "2 s after it was put on, or longer by what a protection waits.")
+    pages = plotting.pages(len(sheet.voltages), plotting.CURVES_A_PAGE)
+    hot = escape(_degrees(hot_words(sheet.voltages[0])))
+    drawn = _figure([plotting.speed_curves(sheet, page=page) for page in pages], "At full drive over speed: cold "
+                    f"(25 °C) and hot ({hot}). Open marks are what the sheet prints.", wide=True)
+    small = _figure([plotting.holding_curves(sheet, page=page) for page in pages], "How far a constant load pulls the "
+                    "servo off its command, 1.5 to 2 s after it was put on, or longer by what a protection waits.")
     loops = [part.loop for part in sheet.voltages if part.loop is not None]
     if loops:
-        drawn += _figure(plotting.loop_curve(loops[:_MOST_LOOPS]), "The torque that the program gives while an error "
-                         "stands. A load in the grey stays where it is, held by friction; the right half is the middle "
-                         "of the left one.", wide=True)
+        drawn += _figure([plotting.loop_curve(loops, page=page)
+                          for page in plotting.pages(len(loops), plotting.LOOPS_A_PAGE)],
+                         "The torque that the program gives while an error stands. A load in the grey stays where it "
+                         "is, held by friction; the right half is the middle of the left one.", wide=True)
     if any(part.bandwidth for part in sheet.voltages):
-        small += _figure(plotting.bandwidth_curves(sheet), "Up to which frequency the free servo follows sines within "
-                         "3 dB, over their amplitude. What is not followed at 1 Hz has no mark.")
+        small += _figure([plotting.bandwidth_curves(sheet, page=page) for page in pages], "Up to which frequency the "
+                         "free servo follows sines within 3 dB, over their amplitude. What is not followed at 1 Hz has "
+                         "no mark.")
     lifts = [(part.voltage, part.lift) for part in sheet.voltages if part.lift is not None]
     if lifts:
-        small += _figure(plotting.lift_curve(lifts), "What the mass takes over the angle of its arm, and the most "
+        small += _figure([plotting.lift_curve(lifts)], "What the mass takes over the angle of its arm, and the most "
                          "that the servo lifts.")
     facts = f"<code>{escape(servo.name)}</code>, {escape(servo.kind)}, computed by {type(sheet.model).__name__}"
     return (f'<section class="servo" id="{escape(servo.name)}">{heading}<p class="lead">{facts}</p>\n{said}{drawn}'
@@ -134,9 +135,10 @@ def _degrees(text: str) -> str:
     return text.replace(" deg C", " °C").replace("deg/s", "°/s").replace(" deg", "°").replace(" us)", " µs)")
 
 
-def _figure(figure: Figure, words: str, *, wide: bool = False) -> str:
-    drawn = picture(to_bytes(figure, "svg"), words, kind="drawing")
-    return f'<figure{" class=wide" if wide else ""}><div>{drawn}</div><figcaption>{words}</figcaption></figure>\n'
+def _figure(drawn: Sequence[Figure], words: str, *, wide: bool = False) -> str:
+    """Return the pages of a picture, one below the other, with words below them."""
+    images = "".join(picture(to_bytes(figure, "svg"), words, kind="drawing") for figure in drawn)
+    return f'<figure{" class=wide" if wide else ""}><div>{images}</div><figcaption>{words}</figcaption></figure>\n'
 
 
 _READING = """<ul>

@@ -76,13 +76,15 @@ def linear(
     hangs = load_from(load or [], chosen)
     words.check_together({"--amplitude": amplitude, "--angle": angle, "--phase-margin": phase_margin,
                           "--overshoot": overshoot, "--step": step, "--derivative": derivative or None}, tune=tune)
-    targets = _targets({"--out": out, "--plot": plot, "--csv": csv}, servo, tune=tune, force=force)
+    asked = {"amplitudes": []} if tune else words.asked(chosen, amplitude, frame, angle)
+    targets = _targets({"--out": out, "--plot": plot, "--csv": csv}, servo, len(asked["amplitudes"]), tune=tune,
+                       force=force)
     if tune:
         wanted = words.wanted(phase_margin=phase_margin, overshoot=overshoot, step=step, frame=frame,
                               derivative=derivative)
         _tune(chosen, hangs, wanted, as_json=as_json)
         return
-    found = _computed(chosen, hangs, words.asked(chosen, amplitude, frame, angle))
+    found = _computed(chosen, hangs, asked)
     _write(found, targets, force=force)
     facts = words.facts(found) | {"files": [str(target.path) for target in targets]}
     if as_json:
@@ -91,12 +93,14 @@ def linear(
     _show(found, targets)
 
 
-def _targets(paths: dict[str, Path | None], servo: str, *, tune: bool, force: bool) -> list[Target]:
-    from servotwin.cli.outputs import Target, check_targets
+def _targets(paths: dict[str, Path | None], servo: str, amplitudes: int, *, tune: bool, force: bool) -> list[Target]:
+    from servotwin.cli.outputs import Target, check_targets, page_name
     from servotwin.errors import InputError
+    from servotwin.look import CURVES_A_PAGE, pages
 
-    targets = [Target(option=option, path=path, endings=_ENDINGS[option])
-               for option, path in paths.items() if path is not None]
+    several = {"--plot": pages(amplitudes, CURVES_A_PAGE)}
+    targets = [Target(option=option, path=Path(page_name(str(path), page)), endings=_ENDINGS[option], page=page)
+               for option, path in paths.items() if path is not None for page in several.get(option, [1])]
     if tune and targets:
         raise InputError(targets[0].option, got=str(targets[0].path), allowed="no file beside --tune, which prints")
     check_targets(targets, force=force, inputs=[Path(servo)])
@@ -136,7 +140,7 @@ def _write(found: Overview, targets: list[Target], *, force: bool) -> None:
                 from servotwin import plotting
                 from servotwin.cli.linear_page import by_amplitude
 
-                plotting.save(by_amplitude(found), draft)
+                plotting.save(by_amplitude(found, target.page), draft)
             else:
                 from servotwin.cli.linear_words import columns
                 from servotwin.tables import csv_text

@@ -28,11 +28,14 @@ class Target:
         As the user gave it.
     endings : tuple of str
         What its name may end in, such as ``(".csv",)``.
+    page : int
+        Of the picture, whose first page is 1.
     """
 
     option: str
     path: Path
     endings: tuple[str, ...]
+    page: int = 1
 
     @property
     def place(self) -> Path:
@@ -41,6 +44,18 @@ class Target:
             return self.path.resolve()
         except (OSError, RuntimeError, ValueError) as error:
             raise OutputError(f"{self.option} {self.path} cannot be written ({_reason(error)})") from None
+
+
+def page_name(name: str, page: int) -> str:
+    """Return the name of the file on which a page of a picture stands.
+
+    Examples
+    --------
+    >>> [page_name("tracking.png", page) for page in (1, 2, 3)]
+    ['tracking.png', 'tracking-2.png', 'tracking-3.png']
+    """
+    stem, dot, ending = name.rpartition(".")
+    return name if page == 1 else f"{stem}-{page}{dot}{ending}"
 
 
 def check_targets(targets: Sequence[Target], *, force: bool, inputs: Sequence[Path] = ()) -> None:

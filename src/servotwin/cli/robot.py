@@ -111,7 +111,7 @@ def run(
     picture = check_drawing(plant.model, camera, video=video)
     inputs = [Path(model_file), motion, *([] if calibration is None else [calibration])]
     with files.folder(out):
-        targets = files.targets_in(out, picture=picture, video=video, force=force, inputs=inputs)
+        targets = files.targets_in(out, servos=len(mounts), picture=picture, video=video, force=force, inputs=inputs)
         with as_options():
             done = run_motion(plant, mounts, followed, bus=bus, joint_friction=friction, timestep=timestep,
                               settle=settle, hold=hold or ("previous" if is_dataset(motion) else "linear"),

@@ -153,7 +153,8 @@ def _do(arm: Arm, asked: Asked) -> None:
     picture = check_drawing(arm.model(), None, video=asked.video)
     with files.folder(asked.out):
         targets = files.targets_of(asked.out, written.names(
-            ideal=asked.ideal, redundant=arm.redundant, picture=picture, video=asked.video), force=asked.force)
+            len(arm.joints), ideal=asked.ideal, redundant=arm.redundant, picture=picture, video=asked.video),
+            force=asked.force)
         with patience("inverse kinematics"):
             joints = criterion.solve(arm, path)
             ways = Ways(joints, written.other_ways(arm, path, criterion, joints))

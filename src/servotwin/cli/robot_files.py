@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from servotwin.cli.outputs import Target, check_targets, staged
+from servotwin.cli.outputs import Target, check_targets, page_name, staged
 from servotwin.cli.robot_facts import margin_words
 from servotwin.cli.terminal import json_text, patience
 from servotwin.errors import OutputError
 from servotwin.parameters.output_file import undone
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from servotwin.robots import RobotRun, Sizing
@@ -63,17 +64,29 @@ def _remove_if_empty(path: Path) -> None:
         path.rmdir()
 
 
-def targets_in(out: Path, *, picture: bool, video: bool, force: bool, inputs: Sequence[Path] = (),
-               more: Iterable[str] = ()) -> list[Target]:
-    """Return the files to be written into a folder that is there, checked; `more` are names beside the usual ones.
+def targets_in(out: Path, *, servos: int, picture: bool, video: bool, force: bool,
+               inputs: Sequence[Path] = ()) -> list[Target]:
+    """Return the files to be written of so many servos into a folder that is there, checked.
 
     Raises
     ------
     OutputExistsError, OutputError
         As `check_targets` does.
     """
-    names = [SERVOS, JOINTS, SUMMARY, TRACKING, ELECTRICAL, SIZING, *more, *drawn_names(picture=picture, video=video)]
+    names = [SERVOS, JOINTS, SUMMARY, *servo_pictures(servos), *drawn_names(picture=picture, video=video)]
     return targets_of(out, [*names, PAGE], force=force, inputs=inputs)
+
+
+def servo_pictures(servos: int) -> list[str]:
+    """Return the names of the pictures of what so many servos have done, all pages of each."""
+    return [name for picture in (TRACKING, ELECTRICAL, SIZING) for name in joint_pages(picture, servos)]
+
+
+def joint_pages(picture: str, joints: int) -> list[str]:
+    """Return the names of the pages on which a picture shows so many joints."""
+    from servotwin.plotting import JOINTS_A_PAGE, pages
+
+    return [page_name(picture, page) for page in pages(joints, JOINTS_A_PAGE)]
 
 
 def drawn_names(*, picture: bool, video: bool) -> list[str]:
@@ -181,12 +194,20 @@ def _pictures(run: RobotRun, sized: Mapping[str, Sizing]) -> dict[str, Callable[
         for joint in run.mounts]
     inside = (run.time >= 0.0) & (run.time <= run.motion.duration)
     shafts = [_shaft(each, inside) for each in sized.values()]
-    return {
-        TRACKING: lambda path: plotting.save(plotting.joint_tracking(
-            followed, events=(0.0, run.motion.duration)), path),
-        ELECTRICAL: lambda path: plotting.save(plotting.servo_electrics(drawn), path),
-        SIZING: lambda path: plotting.save(plotting.shaft_torques(shafts), path),
+    pictures: dict[str, Callable[[int], Figure]] = {
+        TRACKING: lambda page: plotting.joint_tracking(followed, events=(0.0, run.motion.duration), page=page),
+        ELECTRICAL: lambda page: plotting.servo_electrics(drawn, page=page),
+        SIZING: lambda page: plotting.shaft_torques(shafts, page=page),
     }
+    return {name: partial(_save, draw, page) for picture, draw in pictures.items()
+            for page, name in enumerate(joint_pages(picture, len(run.mounts)), 1)}
+
+
+def _save(draw: Callable[[int], Figure], page: int, path: Path) -> None:
+    """Write a page of a picture into a file."""
+    from servotwin import plotting
+
+    plotting.save(draw(page), path)
 
 
 def _shaft(sized: Sizing, inside: Any) -> Any:

@@ -51,7 +51,7 @@ def fit(
     from servotwin.cli.robot_words import as_options
     from servotwin.cli.stopping import best_kept, end_if_stopped
     from servotwin.identification.arms import identify_arm
-    from servotwin.identification.arms.plant import UNKNOWN, plant_of
+    from servotwin.identification.arms.plant import UNKNOWN, mounts_of, plant_of
     from servotwin.robots.episode import joints_of_dataset
 
     limit = duration("--within", within)
@@ -74,13 +74,15 @@ def fit(
             _show(found, told)
         return found, told
 
-    stems = file_stems(asked.mounts)
+    with as_options():  # of the servos at recorded joints, the only ones that are fitted
+        stems = file_stems(mounts_of(asked.mounts, model_file, asked.plant, asked.motions)[0])
     servos = [f"{stem}.toml" for stem in stems.values()]
+    windows = files.joint_pages(WINDOWS, len(stems))
     if out is None:
         found, told = done([])
     else:
         with files.folder(out):
-            found, told = done([*servos, SUMMARY, ERRORS, WINDOWS, PAGE])
+            found, told = done([*servos, SUMMARY, ERRORS, *windows, PAGE])
     if as_json:
         emit_json(told)
     end_if_stopped(found, timed=within is not None)
@@ -104,8 +106,9 @@ def _write(found: ArmFit, told: dict[str, Any], targets: Sequence[Target], stems
         return
     from servotwin import plotting
     from servotwin.cli.outputs import staged
-    from servotwin.cli.robot_page import figure
-    from servotwin.cli.robot_validate_page import errors_picture, windows_picture
+    from servotwin.cli.robot_files import joint_pages
+    from servotwin.cli.robot_page import figure, figures
+    from servotwin.cli.robot_validate_page import errors_picture, write_windows
     from servotwin.identification.report.arm_page import arm_page
 
     judged = found.holdout or found.training
@@ -115,7 +118,8 @@ def _write(found: ArmFit, told: dict[str, Any], targets: Sequence[Target], stems
             servo.save(places[f"{stems[joint]}.toml"], overwrite=True)
         places[SUMMARY].write_bytes((json_text(told) + "\n").encode())
         plotting.save(errors_picture(judged), places[ERRORS])
-        plotting.save(windows_picture(judged), places[WINDOWS])
-        pictures = figure(ERRORS, "The same beside ideal actuators.") + figure(
-            WINDOWS, "The second of each joint in which the fitted servos are furthest off, the worst joint first.")
+        write_windows(judged, places)
+        pictures = figure(ERRORS, "The same beside ideal actuators.") + figures(
+            joint_pages(WINDOWS, len(judged.windows)), "The second of each joint in which the fitted servos are "
+            "furthest off, the worst joint first.")
         places[PAGE].write_bytes(arm_page(found, pictures).encode())

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from servotwin.cli.robot_facts import celsius, heat_is_assumed, margin_words, place
+from servotwin.cli.robot_files import ELECTRICAL, SIZING, TRACKING, joint_pages
 from servotwin.look import document, escape, table
 
 if TYPE_CHECKING:
@@ -26,23 +27,23 @@ figure img,figure video{width:100%;height:auto}figure.film{max-width:44rem}
 def page(run: RobotRun, sized: Mapping[str, Sizing], found: Mapping[str, Any], files: Sequence[str],
          section: str = "", when: str = "") -> str:
     """Return the page of a run, with a section of its own; pictures and video stand beside it, those of `files`."""
-    title = f"{found['robot']}: {_motion_name(run)}"
+    title, count = f"{found['robot']}: {_motion_name(run)}", len(run.mounts)
     servos = sorted({f"{mount.model.servo.title or mount.model.servo.name} ({type(mount.model).__name__})"
                      for mount in run.mounts.values()})
     lead = (f"{len(run.mounts)} servo{'s' * (len(run.mounts) != 1)} ({'; '.join(servos)}) follow "
             f"{run.motion.source}, {run.motion.duration:.4g} s{_supply_words(run)}.")
     body = (f'<h1>{escape(title)}</h1>\n<p class="lead">{escape(lead)}</p>\n{_answer(sized)}{_notes(run)}'
             f"{_cards(run, sized)}{film(files, when)}{section}<h2>Is the servo big enough</h2>\n{_sizes(run, sized)}"
-            + figure("sizing.png", "Torque over speed of each servo: what the motion takes, rotor and gear included, "
-                      "and what the servo gave, as means over 20 ms, in its curve at full drive. Filled: the servo "
-                      "drives the motion; open: it holds it back. The number is the margin.")
+            + figures(joint_pages(SIZING, count), "Torque over speed of each servo: what the motion takes, rotor and "
+                      "gear included, and what the servo gave, as means over 20 ms, in its curve at full drive. "
+                      "Filled: the servo drives the motion; open: it holds it back. The number is the margin.")
             + f"<h2>Following the motion</h2>\n{_tracking(run)}"
-            + figure("tracking.png", "Goal, servo and ideal actuator"
+            + figures(joint_pages(TRACKING, count), "Goal, servo and ideal actuator"
                       f"{', and the measured joint' if run.motion.measured else ''}. Dashed lines: the motion "
                       "begins and ends; before and after it the robot holds its goal.")
             + "<h2>Currents, supply, temperatures</h2>\n"
-            + figure("electrical.png", "Motor current as its mean and, pale, all between the smallest and the "
-                      f"largest; voltage at the servo; temperatures.{_heat_words(run)}")
+            + figures(joint_pages(ELECTRICAL, count), "Motor current as its mean and, pale, all between the smallest "
+                      f"and the largest; voltage at the servo; temperatures.{_heat_words(run)}")
             + f"<section><h2>How to read this page</h2>{_READING}</section>\n")
     return document(title, body, style=STYLE)
 
@@ -106,8 +107,13 @@ def film(files: Sequence[str], when: str = "") -> str:
 
 def figure(name: str, words: str, *, kind: str = "wide") -> str:
     """Return a picture with words below it."""
-    return (f'<figure class="{kind}"><div><img src="{name}" alt="{escape(words)}"></div>'
-            f"<figcaption>{escape(words)}</figcaption></figure>\n")
+    return figures([name], words, kind=kind)
+
+
+def figures(names: Sequence[str], words: str, *, kind: str = "wide") -> str:
+    """Return the pages of a picture, one below the other, with words below them."""
+    drawn = "".join(f'<img src="{name}" alt="{escape(words)}">' for name in names)
+    return f'<figure class="{kind}"><div>{drawn}</div><figcaption>{escape(words)}</figcaption></figure>\n'
 
 
 def _sizes(run: RobotRun, sized: Mapping[str, Sizing]) -> str:

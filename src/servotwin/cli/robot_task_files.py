@@ -37,11 +37,11 @@ _LINE_STEP, _TRAIL_POINTS = 2e-3, 200  # m; points
 _UP = 6e-4  # m, by which a trail lies above the path
 
 
-def names(*, ideal: bool, redundant: bool, picture: bool, video: bool) -> list[str]:
-    """Return the names of all files of a task; the page is the last."""
-    servos = [files.SERVOS, files.TRACKING, files.ELECTRICAL, files.SIZING]
-    return [*([] if ideal else servos), files.JOINTS, files.SUMMARY, TOOL_TABLE, TOOL_PICTURE,
-            *([USE_PICTURE] if redundant else []), *files.drawn_names(picture=picture, video=video), files.PAGE]
+def names(joints: int, *, ideal: bool, redundant: bool, picture: bool, video: bool) -> list[str]:
+    """Return the names of all files of a task by an arm of `joints`; the page is the last."""
+    servos = [] if ideal else [files.SERVOS, *files.servo_pictures(joints)]
+    return [*servos, files.JOINTS, files.SUMMARY, TOOL_TABLE, TOOL_PICTURE, *([USE_PICTURE] if redundant else []),
+            *files.drawn_names(picture=picture, video=video), files.PAGE]
 
 
 def other_ways(arm: Arm, path: ToolPath, criterion: Criterion, joints: JointPath) -> dict[str, JointPath]:

@@ -45,6 +45,7 @@ def validate(
     from servotwin.cli import robot_files as files
     from servotwin.cli.robot_words import as_options
     from servotwin.robots import validate_robot
+    from servotwin.robots.replay import measured_joints
 
     asked = options.asked_robot(model_file, dataset, servo=servo or [], mount=mount or [], model=model,
                                 change=change or [], register=register or [], supply=supply, calibration=calibration,
@@ -65,7 +66,8 @@ def validate(
         told = done([])
     else:
         with files.folder(out):
-            told = done(files.targets_of(out, [SUMMARY, ERRORS, WINDOWS, PAGE], force=force, inputs=[dataset]))
+            windows = files.joint_pages(WINDOWS, len(measured_joints(asked.mounts, asked.motions)))
+            told = done(files.targets_of(out, [SUMMARY, ERRORS, *windows, PAGE], force=force, inputs=[dataset]))
     if as_json:
         emit_json(told)
 
@@ -130,11 +132,11 @@ def _write(found: RobotValidation, told: dict[str, Any], targets: Sequence[Targe
         return
     from servotwin import plotting
     from servotwin.cli.outputs import staged
-    from servotwin.cli.robot_validate_page import errors_picture, page, windows_picture
+    from servotwin.cli.robot_validate_page import errors_picture, page, write_windows
 
     with staged(targets, force=force) as drafts:
         places: dict[str, Path] = {target.path.name: draft for target, draft in zip(targets, drafts, strict=True)}
         places[SUMMARY].write_bytes((json_text(told) + "\n").encode())
         plotting.save(errors_picture(found), places[ERRORS])
-        plotting.save(windows_picture(found), places[WINDOWS])
+        write_windows(found, places)
         places[PAGE].write_bytes(page(found, told).encode())

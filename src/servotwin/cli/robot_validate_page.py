@@ -8,13 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from servotwin import plotting
-from servotwin.cli.robot_page import STYLE, figure
+from servotwin.cli.robot_files import joint_pages
+from servotwin.cli.robot_page import STYLE, figure, figures
 from servotwin.cli.robot_validate import ERRORS, WINDOWS, degrees, head, rows
 from servotwin.look import document, escape, table
 from servotwin.robots.replay import ALL, SERVOS
 from servotwin.text import shortened
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
     from matplotlib.figure import Figure
 
     from servotwin.robots import RobotValidation
@@ -29,8 +33,8 @@ def errors_picture(found: RobotValidation) -> Figure:
         for name, kinds in found.errors.items()})
 
 
-def windows_picture(found: RobotValidation) -> Figure:
-    """Return the worst second of each joint."""
+def write_windows(found: RobotValidation, places: Mapping[str, Path]) -> None:
+    """Draw the worst second of each joint, page by page, into the places of their names."""
     traces = []
     for window in found.windows:
         one = found.replays[window.replay]
@@ -41,7 +45,8 @@ def windows_picture(found: RobotValidation) -> Figure:
             f"{shortened(window.joint.replace('_', ' '))}: {degrees(window.rms)}° rms, {window.kind}", one.time[inside],
             goal[inside], one.measured[window.joint][inside],
             {name: one.simulated[name][window.joint][inside] for name in (SERVOS, best)}))
-    return plotting.replay_windows(traces)
+    for page, name in enumerate(joint_pages(WINDOWS, len(traces)), 1):
+        plotting.save(plotting.replay_windows(traces, page=page), places[name])
 
 
 def page(found: RobotValidation, told: dict[str, Any]) -> str:
@@ -62,8 +67,8 @@ def page(found: RobotValidation, told: dict[str, Any]) -> str:
         + (f'<div class="note"><ul>{notes}</ul></div>\n' if notes else "")
         + f'<h2>Joint by joint</h2>\n<div class="joints">{drawn}</div>\n'
         + figure(ERRORS, "The same, all samples.") + "<h2>Where it is worst</h2>\n"
-        + figure(WINDOWS, "The second of each joint in which the servos are furthest off, the worst joint first; "
-                 "beside the best of the other actuators.")
+        + figures(joint_pages(WINDOWS, len(found.windows)), "The second of each joint in which the servos are furthest "
+                  "off, the worst joint first; beside the best of the other actuators.")
         + f"<h2>When goals act</h2>\n<p>Later than the positions of their row were read by: {late}; each is the one "
         f"time of all joints at which it fits best.</p>\n{_READING}"), style=STYLE)
 

@@ -6,12 +6,24 @@ What plotting, reports and the command line share. matplotlib is loaded when a p
 from servotwin.look.files import FORMATS, to_bytes
 from servotwin.look.numbers import figure_in, label_of, readable, unit_for
 from servotwin.look.page import document
-from servotwin.look.style import COLOURS, LINES, WIDTH, axes_grid, context, finished, new_figure, plain_decades
+from servotwin.look.pages import on_page, pages
+from servotwin.look.style import (
+    COLOURS,
+    CURVES_A_PAGE,
+    LINES,
+    WIDTH,
+    axes_grid,
+    context,
+    finished,
+    new_figure,
+    plain_decades,
+)
 from servotwin.look.words import MINUS, TIMES, fixed, number, picture, plain, table, with_error
 from servotwin.text import escape
 
 __all__ = [
     "COLOURS",
+    "CURVES_A_PAGE",
     "FORMATS",
     "LINES",
     "MINUS",
@@ -27,6 +39,8 @@ __all__ = [
     "label_of",
     "new_figure",
     "number",
+    "on_page",
+    "pages",
     "picture",
     "plain",
     "plain_decades",

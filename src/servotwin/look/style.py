@@ -25,6 +25,9 @@ LINES: tuple[tuple[str, Any], ...] = (
 )
 """Colour and dash of the first, second, … curve: the dash alone tells them apart in grey print."""
 
+CURVES_A_PAGE = len(LINES)
+"""How many curves a picture shows at once: as many as are told apart."""
+
 _RC = {
     "font.size": 9.0, "axes.titlesize": 9.0, "axes.labelsize": 9.0, "legend.fontsize": 8.0, "xtick.labelsize": 8.0,
     "ytick.labelsize": 8.0, "font.family": "DejaVu Sans", "mathtext.fontset": "dejavusans", "lines.linewidth": 1.6,
@@ -104,9 +107,14 @@ def new_figure(width: float, height: float, layout: Literal["constrained"] | Non
     return figure
 
 
-def finished(figure: Figure) -> Figure:
-    """Return the figure with its layout found once and then kept, so that all files of it look the same."""
+def finished(figure: Figure, foot: str = "") -> Figure:
+    """Return the figure with its layout found once and then kept, so that all files of it look the same.
+
+    Words for its foot, such as which page of a picture it is, stand in its lower right corner.
+    """
     with context():
+        if foot:
+            figure.supxlabel(foot, x=0.995, ha="right", fontsize=7.5, color=COLOURS["grey"])
         figure.draw_without_rendering()
         figure.set_layout_engine("none")
     return figure

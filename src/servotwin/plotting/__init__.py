@@ -1,10 +1,11 @@
 """Pictures: results over time, straight lines through data, pulses, and the paper's block diagrams.
 
 Everything is drawn with matplotlib's objects and without its global state; matplotlib is loaded when a picture is
-asked for. Angles are in degrees and pulses in microseconds.
+asked for. Angles are in degrees and pulses in microseconds. A picture of more than it can show at once has pages, as
+even as possible: `page=2` draws the second, and `pages` says which there are.
 """
 
-from servotwin.look import COLOURS, LINES, axes_grid, finished, readable, to_bytes
+from servotwin.look import COLOURS, CURVES_A_PAGE, LINES, axes_grid, finished, pages, readable, to_bytes
 from servotwin.plotting.block_diagrams import PAPER_DIAGRAMS, block_diagram
 from servotwin.plotting.bode import Response, bode, root_locus
 from servotwin.plotting.characteristics import (
@@ -17,14 +18,15 @@ from servotwin.plotting.characteristics import (
 from servotwin.plotting.diagram import Diagram
 from servotwin.plotting.files import save
 from servotwin.plotting.formula import Formula, formula_svg
-from servotwin.plotting.loops import loop_curve
+from servotwin.plotting.loops import LOOPS_A_PAGE, loop_curve
 from servotwin.plotting.measured import log_over_time
 from servotwin.plotting.panels import Curve, Limit, curves, pulses
-from servotwin.plotting.paths import PathTrace, robot_paths
+from servotwin.plotting.paths import PATHS_A_PAGE, PathTrace, robot_paths
 from servotwin.plotting.ranking import ranking
 from servotwin.plotting.replays import ReplayTrace, replay_windows
 from servotwin.plotting.responses import SHOWN, Shown, shown, time_response
 from servotwin.plotting.robots import (
+    JOINTS_A_PAGE,
     Cloud,
     JointTrace,
     ServoTrace,
@@ -38,8 +40,12 @@ from servotwin.plotting.tornado import metric_shown, tornado
 
 __all__ = [
     "COLOURS",
+    "CURVES_A_PAGE",
+    "JOINTS_A_PAGE",
     "LINES",
+    "LOOPS_A_PAGE",
     "PAPER_DIAGRAMS",
+    "PATHS_A_PAGE",
     "SHOWN",
     "Cloud",
     "Curve",
@@ -70,6 +76,7 @@ __all__ = [
     "log_over_time",
     "loop_curve",
     "metric_shown",
+    "pages",
     "pulses",
     "ranking",
     "readable",

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from servotwin.errors import InputError
-from servotwin.look import COLOURS, LINES, context, finished, new_figure
+from servotwin.look import COLOURS, LINES, context, finished, new_figure, on_page
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,12 +16,14 @@ if TYPE_CHECKING:
 
     from servotwin.datasheet import Loop
 
+LOOPS_A_PAGE = len(LINES) - 2
+"""How many loops a picture shows at once: of the first one three curves, of the others one each, none alike."""
 _BEYOND = 1.2  # times the error of the cap
 _POINTS = 1201
 _MOST = 1e3  # N m: what friction holds beyond is not drawn
 
 
-def loop_curve(loops: Sequence[Loop], *, width: float = 8.4, height: float = 3.9) -> Figure:
+def loop_curve(loops: Sequence[Loop], *, width: float = 8.4, height: float = 3.9, page: int = 1) -> Figure:
     """Return the torque of one servo over its error, both ways: the whole, and large around no error.
 
     Between what it lifts and what it holds friction keeps the shaft wherever it is.
@@ -30,14 +31,17 @@ def loop_curve(loops: Sequence[Loop], *, width: float = 8.4, height: float = 3.9
     Parameters
     ----------
     loops : sequence of Loop
-        Of one servo, at one voltage or several: the first one is drawn in full, of the others what the motor gives.
+        Of one servo, at one voltage or several: the first one of a page is drawn in full, of the others what the motor
+        gives.
     width, height : float
         [inch]
+    page : int
+        One of ``pages(len(loops), LOOPS_A_PAGE)``.
 
     Raises
     ------
     InputError
-        If there is none, or more than can be told apart.
+        If there are no loops, or no such page.
 
     Examples
     --------
@@ -46,8 +50,7 @@ def loop_curve(loops: Sequence[Loop], *, width: float = 8.4, height: float = 3.9
     >>> len(loop_curve([sheet.voltages[0].loop]).axes)
     2
     """
-    if not 1 <= len(loops) <= len(LINES) - 2:
-        raise InputError("loops in one picture", got=len(loops), allowed=f"1 to {len(LINES) - 2}")
+    loops, which = on_page("loops", loops, LOOPS_A_PAGE, page)
     first = loops[0]
     far = _BEYOND * max(each.cap_error for each in loops if not math.isnan(each.cap_error))
     near = min(far, 2.2 * (first.dead_zone + first.friction_error) + 3.0 * first.count)
@@ -59,10 +62,11 @@ def loop_curve(loops: Sequence[Loop], *, width: float = 8.4, height: float = 3.9
         _cap(axes[0], first)
         _middle(axes[1], first, near)
         handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), handlelength=3.2)
+        columns = len(labels) if len(labels) < 6 else 3  # six are wider than the figure
+        figure.legend(handles, labels, loc="outside lower center", ncols=columns, handlelength=3.2)
         axes[0].set_ylabel("torque (N m)")
         title = first.model.servo.title or first.model.servo.name
-        figure.suptitle(f"{title}: {first.stiffness:.3g} N m/rad", fontsize=9)
+        figure.suptitle(f"{title}: {first.stiffness:.3g} N m/rad" + (f", {which}" if which else ""), fontsize=9)
     return finished(figure)
 
 

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
     from servotwin.logs import Log
 
-_MOST = 5  # panels
 _COMMANDS = {"angle": "command_angle", "pulse_width": "pulse_width", "voltage": "command_voltage"}
 
 
@@ -35,7 +34,7 @@ def log_over_time(log: Log, gaps: Sequence[tuple[float, float]] = ()) -> Figure:
     >>> [axes.get_ylabel() for axes in log_over_time(log).axes]
     ['output angle (°)', 'supply current (A)']
     """
-    names = [log.angle_name, *(name for name in log.measured if name != log.angle_name and name in SHOWN)][:_MOST]
+    names = [log.angle_name, *(name for name in log.measured if name != log.angle_name and name in SHOWN)]
     together = (log.command_kind, log.angle_name) == ("angle", "output_angle")
     with context():
         figure, axes = axes_grid(len(names) + (not together), height=1.2 + 1.6 * (len(names) + (not together)))

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from servotwin.errors import InputError
-from servotwin.look import COLOURS, LINES, axes_grid, context, finished
+from servotwin.look import COLOURS, CURVES_A_PAGE, LINES, axes_grid, context, finished, on_page
+from servotwin.look.pages import pages, part
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -52,13 +53,15 @@ class Limit(NamedTuple):
 
 
 def curves(drawn: Sequence[Curve], *, x_label: str, y_label: str, limits: Sequence[Limit] = (),
-           below: Sequence[Curve] = (), below_label: str = "", height: float = 3.0) -> Figure:
+           below: Sequence[Curve] = (), below_label: str = "", height: float = 3.0, page: int = 1) -> Figure:
     """Return a figure with several curves in one panel, and differences in a second one below if there are any.
+
+    All pages have the same axes.
 
     Parameters
     ----------
     drawn : sequence of Curve
-        At least one, at most five of each kind; points that come later lie in front.
+        At least one; points that come later lie in front.
     x_label, y_label : str
         With the unit in brackets; formulas stand between $.
     limits : sequence of Limit
@@ -67,11 +70,13 @@ def curves(drawn: Sequence[Curve], *, x_label: str, y_label: str, limits: Sequen
         What the second panel shows, about zero, and its label with the unit.
     height : float
         [inch]
+    page : int
+        One of ``pages(len(drawn), CURVES_A_PAGE)``.
 
     Raises
     ------
     InputError
-        If there is nothing to draw, or too much to tell apart.
+        If there is nothing to draw, or no such page.
 
     Examples
     --------
@@ -79,8 +84,8 @@ def curves(drawn: Sequence[Curve], *, x_label: str, y_label: str, limits: Sequen
     >>> figure.axes[0].get_xlabel()
     'time (s)'
     """
-    if not 1 <= len(drawn) <= len(LINES):
-        raise InputError("curves in one panel", got=len(drawn), allowed=f"1 to {len(LINES)}")
+    shown, foot = on_page("curves", drawn, CURVES_A_PAGE, page)
+    shown_below = part(below, page, pages(len(drawn), CURVES_A_PAGE)[-1])
     figure, axes = axes_grid(2, height=height, ratios=(2.0, 1.0)) if below else axes_grid(1, height=height)
     with context():
         ax = axes[0]
@@ -88,15 +93,23 @@ def curves(drawn: Sequence[Curve], *, x_label: str, y_label: str, limits: Sequen
             ax.axhline(limit.y, color=COLOURS["grey"], linestyle=(0, (2, 2)), linewidth=1.0)
             ax.annotate(limit.label, xy=(1.0, limit.y), xycoords=("axes fraction", "data"), xytext=(-2.0, 2.5),
                         textcoords="offset points", ha="right", va="bottom", fontsize=7.5, color=COLOURS["grey"])
-        _panel(ax, drawn, y_label)
-        if len(drawn) > 1:
+        _panel(ax, shown, y_label)
+        same_axes(ax, ((curve.x, curve.y) for curve in drawn))
+        if len(shown) > 1:
             ax.legend(loc="upper left" if below else "best", handlelength=3.2)
         if below:
             axes[1].axhline(0.0, color=COLOURS["grey"], linewidth=1.0)
-            _panel(axes[1], below, below_label)
+            _panel(axes[1], shown_below, below_label)
+            same_axes(axes[1], ((curve.x, curve.y) for curve in below))
         axes[-1].set_xlabel(x_label, parse_math=True)
         figure.align_ylabels(axes)
-    return finished(figure)
+    return finished(figure, foot)
+
+
+def same_axes(ax: Axes, drawn: Iterable[tuple[ArrayLike, ArrayLike]]) -> None:
+    """Let the axes of a page reach as far as all that any page of its picture shows."""
+    for x, y in drawn:
+        ax.update_datalim(np.column_stack([x, y]))
 
 
 def _panel(ax: Axes, drawn: Sequence[Curve], label: str) -> None:

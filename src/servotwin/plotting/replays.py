@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.errors import InputError
-from servotwin.look import COLOURS, LINES, context, finished, new_figure
+from servotwin.look import COLOURS, LINES, context, finished, new_figure, on_page
+from servotwin.plotting.robots import JOINTS_A_PAGE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-_MOST, _WIDTH, _COLUMNS = 24, 8.6, 2
+_WIDTH, _COLUMNS = 8.6, 2
 
 
 class ReplayTrace(NamedTuple):
@@ -37,13 +37,15 @@ class ReplayTrace(NamedTuple):
     simulated: Mapping[str, Array]
 
 
-def replay_windows(traces: Sequence[ReplayTrace]) -> Figure:
+def replay_windows(traces: Sequence[ReplayTrace], *, page: int = 1) -> Figure:
     """Return goal, measured and simulated angle over time, a panel for each stretch.
+
+    Pages are those of `joint_tracking`.
 
     Raises
     ------
     InputError
-        If there are none, or too many.
+        If there are no stretches, or no such page.
 
     Examples
     --------
@@ -51,8 +53,7 @@ def replay_windows(traces: Sequence[ReplayTrace]) -> Figure:
     >>> len(replay_windows([ReplayTrace("elbow", time, time, 0.9 * time, {"servos": 0.8 * time})]).axes)
     1
     """
-    if not 1 <= len(traces) <= _MOST:
-        raise InputError("stretches in one picture", got=len(traces), allowed=f"1 to {_MOST}")
+    traces, foot = on_page("stretches", traces, JOINTS_A_PAGE, page)
     columns = min(len(traces), _COLUMNS)
     rows = -(-len(traces) // columns)
     with context():
@@ -74,4 +75,4 @@ def replay_windows(traces: Sequence[ReplayTrace]) -> Figure:
             ax.set_axis_off()
         handles, labels = grid[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=4, handlelength=2.8)
-    return finished(figure)
+    return finished(figure, foot)

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from servotwin import units
-from servotwin.errors import InputError
-from servotwin.look import COLOURS, LINES, context, finished, new_figure
+from servotwin.look import COLOURS, LINES, context, finished, new_figure, on_page
 from servotwin.text import shortened
 
 if TYPE_CHECKING:
@@ -22,7 +21,8 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_MOST = 24  # joints in one picture
+JOINTS_A_PAGE = 12
+"""How many joints or servos a picture of a robot shows at once; assumed: whole rows of two and of three panels."""
 _WIDTH = 8.4  # inch
 _LINE_POINTS, _CLOUD_POINTS, _BINS = 1500, 500, 400
 _STRETCH = 0.04  # s
@@ -110,20 +110,21 @@ class ShaftTrace(NamedTuple):
     lasting_torque: float
 
 
-def joint_tracking(joints: Sequence[JointTrace], *, events: Sequence[float] = ()) -> Figure:
+def joint_tracking(joints: Sequence[JointTrace], *, events: Sequence[float] = (), page: int = 1) -> Figure:
     """Return goal, real and ideal joint over time, with the error of the real one below, joint by joint.
 
     Parameters
     ----------
     joints : sequence of JointTrace
-        At most 24.
     events : sequence of float
         Times to mark, such as beginning and end of the motion [s]
+    page : int
+        One of ``pages(len(joints), JOINTS_A_PAGE)``.
 
     Raises
     ------
     InputError
-        If there are none, or too many.
+        If there are no joints, or no such page.
 
     Examples
     --------
@@ -131,7 +132,7 @@ def joint_tracking(joints: Sequence[JointTrace], *, events: Sequence[float] = ()
     >>> len(joint_tracking([JointTrace("elbow", time, time, 0.9 * time, time)]).axes)
     2
     """
-    _check(joints)
+    joints, foot = on_page("joints", joints, JOINTS_A_PAGE, page)
     columns = 1 if len(joints) < 3 else 2
     rows = -(-len(joints) // columns)
     with context():
@@ -154,18 +155,19 @@ def joint_tracking(joints: Sequence[JointTrace], *, events: Sequence[float] = ()
         if above is not None:
             handles, labels = above.get_legend_handles_labels()
             figure.legend(handles, labels, loc="outside upper center", ncols=3, handlelength=3.2)
-    return finished(figure)
+    return finished(figure, foot)
 
 
-def servo_electrics(servos: Sequence[ServoTrace]) -> Figure:
+def servo_electrics(servos: Sequence[ServoTrace], *, page: int = 1) -> Figure:
     """Return motor current, supply voltage and temperatures of servos over time, a row each.
 
-    Currents are shown as their mean and, pale, all between the smallest and the largest.
+    Currents are shown as their mean and, pale, all between the smallest and the largest. Pages are those of
+    `joint_tracking`.
 
     Raises
     ------
     InputError
-        If there are no servos, or too many.
+        If there are no servos, or no such page.
 
     Examples
     --------
@@ -173,7 +175,7 @@ def servo_electrics(servos: Sequence[ServoTrace]) -> Figure:
     >>> len(servo_electrics([ServoTrace("elbow", time, time, 6.0 - time)]).axes)
     2
     """
-    _check(servos)
+    servos, foot = on_page("servos", servos, JOINTS_A_PAGE, page)
     kinds = [kind for kind, has in (("current", True), ("voltage", any(s.voltage is not None for s in servos)),
                                     ("heat", any(s.winding is not None for s in servos))) if has]
     with context():
@@ -191,18 +193,20 @@ def servo_electrics(servos: Sequence[ServoTrace]) -> Figure:
         if "heat" in kinds:
             warm = next(row[-1] for row, servo in zip(grid, servos, strict=True) if servo.winding is not None)
             warm.legend(loc="upper left", handlelength=2.6, fontsize=7.5)
-    return finished(figure)
+    return finished(figure, foot)
 
 
-def shaft_torques(joints: Sequence[ShaftTrace]) -> Figure:
+def shaft_torques(joints: Sequence[ShaftTrace], *, page: int = 1) -> Figure:
     """Return torque over speed of servos: what a motion takes, and what they gave, in their curves at full drive.
+
+    Pages are those of `joint_tracking`.
 
     Raises
     ------
     InputError
-        If there are no joints, or too many.
+        If there are no joints, or no such page.
     """
-    _check(joints)
+    joints, foot = on_page("joints", joints, JOINTS_A_PAGE, page)
     columns = min(len(joints), 3 if len(joints) > 2 else 2)
     rows = -(-len(joints) // columns)
     with context():
@@ -223,12 +227,7 @@ def shaft_torques(joints: Sequence[ShaftTrace]) -> Figure:
         order = sorted(labelled, key=lambda label: _ORDER.index(label) if label in _ORDER else -1)
         figure.legend([labelled[label] for label in order], order, loc="outside upper center", ncols=3,
                       handlelength=2.6)
-    return finished(figure)
-
-
-def _check(parts: Sequence[object]) -> None:
-    if not 1 <= len(parts) <= _MOST:
-        raise InputError("joints in one picture", got=len(parts), allowed=f"1 to {_MOST}")
+    return finished(figure, foot)
 
 
 def _shown(values: Array, slides: bool) -> Array:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from servotwin.errors import InputError
-from servotwin.look import COLOURS, LINES, context, finished, new_figure
+from servotwin.look import COLOURS, CURVES_A_PAGE, LINES, context, finished, new_figure, on_page
+from servotwin.plotting.panels import same_axes
 from servotwin.text import shortened
 
 if TYPE_CHECKING:
@@ -44,20 +44,23 @@ class ToolTrace(NamedTuple):
     error: Array
 
 
-def tool_paths(line: Array, traces: Sequence[ToolTrace]) -> Figure:
+def tool_paths(line: Array, traces: Sequence[ToolTrace], *, page: int = 1) -> Figure:
     """Return the path of a tool as it was asked for and as it was, and its distance from that path over time.
+
+    All pages have the same axes.
 
     Parameters
     ----------
     line : ndarray, shape (m, 3)
         The path asked for [m]
     traces : sequence of ToolTrace
-        Up to five.
+    page : int
+        One of ``pages(len(traces), CURVES_A_PAGE)``.
 
     Raises
     ------
     InputError
-        If there is no trace, or too many.
+        If there are no traces, or no such page.
 
     Examples
     --------
@@ -65,15 +68,16 @@ def tool_paths(line: Array, traces: Sequence[ToolTrace]) -> Figure:
     >>> len(tool_paths(line, [ToolTrace("servo", np.array([0.0, 1.0]), line, np.zeros(2))]).axes)
     2
     """
-    if not 1 <= len(traces) <= len(LINES):
-        raise InputError("paths in one picture", got=len(traces), allowed=f"1 to {len(LINES)}")
+    shown, foot = on_page("paths", traces, CURVES_A_PAGE, page)
     first, second = sorted(np.argsort(np.ptp(line, axis=0), kind="stable")[1:].tolist())
     with context():
         figure = new_figure(_WIDTH, _HEIGHT)
         left, right = figure.subplots(1, 2)
         left.plot(_MM * line[:, first], _MM * line[:, second], color=COLOURS["orange"], linewidth=4.0, alpha=0.55,
                   label="asked for")
-        for trace, (colour, dash) in zip(traces, LINES, strict=False):
+        same_axes(left, ((_MM * trace.places[:, first], _MM * trace.places[:, second]) for trace in traces))
+        same_axes(right, ((trace.time, _MM * trace.error) for trace in traces))
+        for trace, (colour, dash) in zip(shown, LINES, strict=False):
             thin = slice(None, None, max(len(trace.time) // _POINTS, 1))
             left.plot(_MM * trace.places[thin, first], _MM * trace.places[thin, second], color=colour, linestyle=dash,
                       linewidth=1.3, label=trace.label)
@@ -87,7 +91,7 @@ def tool_paths(line: Array, traces: Sequence[ToolTrace]) -> Figure:
         right.set_ylim(bottom=0.0)
         handles, labels = left.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=min(len(labels), 4), handlelength=2.8)
-    return finished(figure)
+    return finished(figure, foot)
 
 
 class JointUse(NamedTuple):
@@ -107,21 +111,22 @@ class JointUse(NamedTuple):
     torque: Array
 
 
-def joint_use(joints: Sequence[str], uses: Sequence[JointUse]) -> Figure:
+def joint_use(joints: Sequence[str], uses: Sequence[JointUse], *, page: int = 1) -> Figure:
     """Return how far the joints of a redundant arm go in their ranges, and their torques, by criterion.
+
+    Pages are ``pages(len(uses), CURVES_A_PAGE)``.
 
     Raises
     ------
     InputError
-        If there is nothing to show, or too much.
+        If there are no criteria, or no such page.
 
     Examples
     --------
     >>> len(joint_use(["elbow"], [JointUse("none", np.zeros((3, 1)), np.ones(1))]).axes)
     2
     """
-    if not 1 <= len(uses) <= len(LINES):
-        raise InputError("criteria in one picture", got=len(uses), allowed=f"1 to {len(LINES)}")
+    uses, foot = on_page("criteria", uses, CURVES_A_PAGE, page)
     with context():
         figure = new_figure(_WIDTH, 0.8 * _HEIGHT)
         left, right = figure.subplots(1, 2)
@@ -139,7 +144,7 @@ def joint_use(joints: Sequence[str], uses: Sequence[JointUse]) -> Figure:
         right.set_ylabel("torque, rms (mN m)")
         handles, labels = left.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=len(uses))
-    return finished(figure)
+    return finished(figure, foot)
 
 
 def _bars(ax: Axes, at: Array, width: float, use: JointUse, colour: str) -> None:

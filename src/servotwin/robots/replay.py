@@ -162,7 +162,7 @@ def validate_robot(model: Any, servos: Mapping[str, Model | Mount], motions: Mot
             runs.append(run_motion(plant, servos, motion, bus=bus, joint_friction=joint_friction, timestep=timestep,
                                    settle=_SETTLE, hold="previous", assume_heat=assume_heat))
             tell(k + 1)
-    joints = [joint for joint in runs[0].mounts if all(joint in motion.measured for motion in given)]
+    joints = measured_joints(runs[0].mounts, given)
     courses = [_courses(run, joints, rivals) for run in runs]
     names = list(courses[0])
     late = {name: _latency(runs, courses, joints, name) if latency is None else latency for name in names}
@@ -172,6 +172,11 @@ def validate_robot(model: Any, servos: Mapping[str, Model | Mount], motions: Mot
     said = tuple(dict.fromkeys((*left_out, *(text for run in runs for text in (
         *run.said, *(f"{run.motion.source}: {touch.words}" for touch in run.ideal.touches))))))
     return RobotValidation(replays=replays, latency=late, errors=errors, windows=_windows(replays, joints), said=said)
+
+
+def measured_joints(servos: Mapping[str, object], motions: Sequence[Motion]) -> list[str]:
+    """Return the joints with servos that were measured in all motions: those that `validate_robot` compares."""
+    return [joint for joint in servos if all(joint in motion.measured for motion in motions)]
 
 
 def _check(motions: Sequence[Motion], servos: Mapping[str, object], latency: float | None) -> None:

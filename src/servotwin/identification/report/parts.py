@@ -10,7 +10,7 @@ from servotwin.identification.report import pictures as report_pictures
 from servotwin.identification.report import tables as report_tables
 from servotwin.identification.report import traces as report_traces
 from servotwin.identification.report.shown import error_shown, error_unit
-from servotwin.look import escape, number, picture, to_bytes
+from servotwin.look import escape, number, pages, picture, to_bytes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from servotwin.identification.fitting.holdout import ErrorTable
 
 _MOST_LOGS = 21  # that are drawn folded
-_MOST_BARS = 12  # groups of one picture
 STYLE = """
 .logs figure{margin:.7rem 0}#logs figure{padding:.4rem}#logs figure.held{border-color:#d55e00;background:#fff6ef}
 #logs figcaption{margin:0 0 .2rem;color:var(--ink);font-size:.85rem;overflow-wrap:anywhere}
@@ -35,8 +34,13 @@ figure img.drawing{max-width:27rem}}
 
 def figure(figure: Figure, words: str) -> str:
     """Return a picture with its caption."""
-    drawn = picture(to_bytes(figure, "svg"), words, kind="drawing")
-    return f'<figure><div>{drawn}</div><figcaption>{words}</figcaption></figure>\n'
+    return figures([figure], words)
+
+
+def figures(drawn: Sequence[Figure], words: str) -> str:
+    """Return the pages of a picture, one below the other, with their caption."""
+    images = "".join(picture(to_bytes(figure, "svg"), words, kind="drawing") for figure in drawn)
+    return f'<figure><div>{images}</div><figcaption>{words}</figcaption></figure>\n'
 
 
 def space(unit: str) -> str:
@@ -50,9 +54,10 @@ def errors(tables: Mapping[str, ErrorTable], traces: Sequence[Trace], words: str
     parts = []
     for label in dict.fromkeys(label for table in tables.values() for label in table.labels()):
         values = {value for table in tables.values() for value in table.by(label)}
-        if 1 < len(values) <= _MOST_BARS or label == "motion":
-            parts.append(figure(report_pictures.errors(tables, label, factor, unit),
-                                f"Rms error by {escape(label.replace('_', ' '))}. {words}"))
+        if len(values) > 1 or label == "motion":
+            parts.append(figures([report_pictures.errors(tables, label, factor, unit, page)
+                                  for page in pages(len(values), report_pictures.VALUES_A_PAGE)],
+                                 f"Rms error by {escape(label.replace('_', ' '))}. {words}"))
         parts.append(report_tables.errors(tables, label, factor, unit))
     every = report_tables.logs(tables, traces)
     return f"{''.join(parts)}<details><summary>Log by log</summary>{every}</details>\n"

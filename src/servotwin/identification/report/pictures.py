@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from servotwin.identification.report.shown import MODELS, error_rows, nominal_of
-from servotwin.look import COLOURS, WIDTH, context, finished, new_figure
+from servotwin.look import COLOURS, WIDTH, context, finished, new_figure, on_page
 from servotwin.text import shortened
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from servotwin.identification.fitting.fit import Fit
     from servotwin.identification.fitting.holdout import ErrorTable
 
+VALUES_A_PAGE = 12  # of a label, whose errors a picture shows at once; assumed
 _ROW, _BAR = 0.34, 0.15
 _TICKS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 1.0, 1.02, 1.05, 1.1, 1.25, 1.5, 2.0, 3.0, 5.0, 10.0,
           20.0)
@@ -161,15 +162,20 @@ def correlation(fit: Fit) -> Figure | None:
     return finished(figure)
 
 
-def errors(tables: Mapping[str, ErrorTable], label: str, factor: float, unit: str) -> Figure:
-    """Return bars of the rms error by the values of a label, one for each model; the servo itself first."""
+def errors(tables: Mapping[str, ErrorTable], label: str, factor: float, unit: str, page: int = 1) -> Figure:
+    """Return bars of the rms error by the values of a label, one for each model; the servo itself first.
+
+    All pages have the same axis.
+    """
     models = next(iter(tables.values())).models
-    rows = error_rows(tables, label)
+    every = error_rows(tables, label)
+    shown, foot = on_page("values", list(dict.fromkeys(row.value for row in every)), VALUES_A_PAGE, page)
+    rows = [row for row in every if row.value in shown]
     with context():
         height = 1.15 + len(rows) * (0.16 + _BAR * len(models))
         figure = new_figure(WIDTH, height)
         ax = figure.subplots()
-        most = max((x for *_, by in rows for x in by.values() if math.isfinite(x)), default=1.0) * factor
+        most = max((x for *_, by in every for x in by.values() if math.isfinite(x)), default=1.0) * factor
         for place, (_, which, by) in enumerate(rows):
             _draw_errors(ax, place, by, models, factor, most, faint=which == "fitted" and len(tables) > 1)
         ax.set_yticks(range(len(rows)), [f"{shortened(row.value)}\n{row.which}".rstrip() for row in rows])
@@ -179,7 +185,7 @@ def errors(tables: Mapping[str, ErrorTable], label: str, factor: float, unit: st
         ax.set_xlabel(f"rms error ({unit})")
         if len(models) > 1:
             _error_legend(figure, models)
-    return finished(figure)
+    return finished(figure, foot)
 
 
 def _draw_errors(ax: Axes, place: int, by: Mapping[str, float], models: Sequence[str], factor: float, most: float, *,
