@@ -9,6 +9,7 @@ import pytest
 import servotwin as st
 from servotwin.errors import InputError
 from servotwin.identification import identify, keep_columns, read_csv_log, read_logs
+from servotwin.logs.column_words import with_signals
 
 RNG = np.random.default_rng(11)
 TIME = np.arange(60) * 20  # ms
@@ -256,3 +257,35 @@ def test_logs_of_one_folder_share_what_was_said(tmp_path):
     assert keep_columns(logs, tmp_path) == [tmp_path / "logs.json"]
     assert [log.time.tobytes() for log in read_logs(tmp_path)] == [log.time.tobytes() for log in logs]
     assert keep_columns(read_logs(tmp_path), tmp_path) == []  # nothing was said
+
+
+def test_refusals_name_the_way_on(tmp_path):
+    """Counts are proposed as counts, a command is none of what grows, and a tap in volts is a feedback."""
+    path = tmp_path / "log.csv"
+    bare = "".join(f"{20 * k},{1500 + 400 * (k > 20)},{300 + 4 * min(max(k - 20, 0), 40)}\n" for k in range(80))
+
+    def refused(text, words=None):
+        path.write_text(text)
+        with pytest.raises(InputError) as caught:
+            read_logs(path, columns=words)
+        return str(caught.value)
+
+    said = refused(bare)
+    assert 'time=1:ms command=2:us angle=3:0.3deg-90", with what one of its counts is' in said
+    assert read_logs(path, columns="time=1:ms command=2:us angle=3:0.3deg-90")[0].command_kind == "pulse_width"
+    assert 'angle=3:deg"' in refused("".join(f"{20 * k},1500,{k % 9}\n" for k in range(80)))
+    assert '"command=a:us angle=b:deg"' in refused("time_ms,a,b\n" + "".join(
+        f"{20 * k},1500,{1 + k % 7}\n" for k in range(40)))
+    assert "feedback=tap:V is the tap of a potentiometer" in refused(
+        "time_ms,pulse_us,tap\n" + "".join(f"{20 * k},1500,{0.01 * k}\n" for k in range(40)), "angle=tap:V")
+    assert "line 41, column 3: got 'x'" in refused("".join(
+        f"{20 * k},1500,{'x' if k == 40 else k}\n" for k in range(80)), "time=1:ms command=2:us angle=3:deg")
+
+
+def test_a_pulse_by_its_number_is_no_time_where_there_is_one(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time_ms,a,b\n" + "".join(f"{20 * k},1500,{1 + k % 7}\n" for k in range(40)))
+    (log,) = read_logs(path, columns=with_signals("--columns", "2:us 3:deg"))
+    assert log.command_kind == "pulse_width"
+    assert with_signals("--columns", "1:us 2:us 3:deg") == "time=1:us pulse=2:us angle=3:deg"
+    assert with_signals("--columns", "1:us") == "time=1:us"

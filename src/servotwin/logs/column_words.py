@@ -149,6 +149,7 @@ def column_said(one: Wanted, column: str, option: str = "--columns") -> tuple[st
         signal = _KINDS[dimension]
     if dimension_of_signal(signal) != dimension:
         raise UnitError(what, got=one.unit, allowed=units_written(dimension_of_signal(signal)) + (
-            ", iso, clock" if signal == "time" else ""))
+            ", iso, clock" if signal == "time" else f"; feedback={one.column}:{one.unit} is the tap of a potentiometer"
+            if dimension == "voltage" and dimension_of_signal(signal) == "angle" else ""))
     return signal, Column(column, unit, scale, offset)
 
