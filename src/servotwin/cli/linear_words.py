@@ -114,9 +114,20 @@ def loop_rows(found: Overview) -> list[list[str]]:
     return [_loop_row(period, loop) for period, loop in found.loops.items()]
 
 
+def times(gain: float) -> str:
+    """Return a gain margin as people read it, in dB too.
+
+    Examples
+    --------
+    >>> times(4.0)
+    '4 times (12 dB)'
+    """
+    return f"{gain:.3g} times ({20.0 * math.log10(gain):.3g} dB)"
+
+
 def _loop_row(period: float, loop: SampledServo) -> list[str]:
     margins, slowest = loop.margins, loop.poles[0]
-    gain = "any" if math.isinf(margins.gain) else "none" if math.isnan(margins.gain) else f"{margins.gain:.3g} times"
+    gain = "any" if math.isinf(margins.gain) else "none" if math.isnan(margins.gain) else times(margins.gain)
     swings = f"{slowest.real:.3g} +/- {abs(slowest.imag):.3g}i 1/s" if slowest.imag else f"{slowest.real:.3g} 1/s"
     if math.isnan(margins.phase):
         rest = ["-", "-", "-"]
@@ -207,7 +218,7 @@ def tuning_pairs(found: Tuning) -> list[tuple[str, str]]:
     delay = "" if math.isnan(margins.delay) else f", {1e3 * margins.delay:.3g} ms of delay"
     rows = [("gain", settings), ("stiffness", f"{found.stiffness:.3g} N m/rad of the servo itself"
                                  + (", none is lost to a load that stays" if "outer_gain" in found.settings else "")),
-            ("margins", f"{margins.gain:.3g} times the gain, {math.degrees(margins.phase):.0f} deg of phase{delay}"),
+            ("margins", f"gain {times(margins.gain)}, {math.degrees(margins.phase):.0f} deg of phase{delay}"),
             ("step", f"{math.degrees(found.step):.4g} deg, simulated: overshoot {100.0 * found.overshoot:.1f} %")]
     if margins.phase < math.radians(_LITTLE):
         rows.append(("note", f"less than {_LITTLE:g} deg of phase margin: friction and the limit of the bridge calm a "

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError
 from servotwin.linear.frequency_response import frequency_response
 from servotwin.linear.linearise import linearise
-from servotwin.linear.sampled import SampledServo, sampled
+from servotwin.linear.sampled import SampledServo, mid_pulse, sampled
 from servotwin.linear.state_space import state_space
 from servotwin.loads import as_load
 from servotwin.models import (
@@ -53,7 +53,8 @@ class Sines:
     amplitude : float
         [rad]
     described : ndarray of complex, shape (F,), or None
-        By describing functions of the mean voltage; None where the model has none.
+        By describing functions of the mean voltage, later by half a frame and the decision of a servo that has frames;
+        None where the model has none.
     sticks : ndarray of bool, shape (F,)
         Where they say that the shaft stands for a while.
     bandwidth : float
@@ -136,7 +137,7 @@ def overview(model: Model, load: Load | Part | None = None, *, amplitudes: Seque
     omega = _frequencies(model, mean, next(iter(loops.values()), None))
     simulated = frequency_response(model, omega, amplitude=amplitudes, mean=angle, input="command_angle", load=load)
     reference = simulated.bandwidth(reference=1.0)
-    sines = tuple(_sines(model, load, size, angle, omega, float(width))
+    sines = tuple(_sines(model, load, size, angle, omega, float(width), _lag(model, angle))
                   for size, width in zip(simulated.amplitude.tolist(), reference, strict=True))
     return Overview(model=model, load=load, frequency=omega, mean=None if mean is None else _response(mean, omega),
                     natural=None if mean is None else _natural(mean), loops=loops, simulated=simulated, sines=sines)
@@ -190,10 +191,23 @@ def _frequencies(model: Model, mean: control.StateSpace | None, loop: SampledSer
     return np.geomspace(_SPAN[0] * bandwidth, min(_SPAN[1] * bandwidth, _LAST * top), _POINTS)
 
 
-def _sines(model: Model, load: Load, size: float, angle: float | None, omega: Array, bandwidth: float) -> Sines:
+def _sines(model: Model, load: Load, size: float, angle: float | None, omega: Array, bandwidth: float,
+           lag: float) -> Sines:
     if not isinstance(model, _DESCRIBED) or load.recorded or load.flexibles:
         return Sines(amplitude=size, described=None, sticks=np.zeros(len(omega), bool), bandwidth=bandwidth)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         found = linearise(model, load, amplitude=size, angle=angle)
-    return Sines(amplitude=size, described=found.response(omega), sticks=found.sticks(omega), bandwidth=bandwidth)
+    return Sines(amplitude=size, described=found.response(omega) * np.exp(-1j * omega * lag),
+                 sticks=found.sticks(omega), bandwidth=bandwidth)
+
+
+def _lag(model: Model, angle: float | None) -> float:
+    """Return by how much frames make a servo later than the mean of its voltage is [s].
+
+    A command waits for its frame, half of one in the mean, and is decided upon when its pulse ends; the loop itself is
+    left as it is, for half a frame of delay in it is worse than none (docs/theory/sampled).
+    """
+    if not isinstance(model, PulseServo | PulseServoInductive):
+        return 0.0
+    return 0.5 * model.frame_period + mid_pulse(model, angle)

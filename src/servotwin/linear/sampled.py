@@ -311,7 +311,7 @@ def _bursts(model: PulseServo | PulseServoInductive, load: Load, angle: float | 
     s_mu = model.value("electronics.one_shot_slope") * p
     stretch = model.value("electronics.stretcher_gain") * s_mu
     return Bursts(
-        plant=plant_of(numbers, load, angle), period=T_f, delay=_mid_pulse(model, angle),
+        plant=plant_of(numbers, load, angle), period=T_f, delay=mid_pulse(model, angle),
         spread=0.5 * s_mu, stretch=stretch, voltage=model.mean_gain() * T_f * p / stretch)
 
 
@@ -327,11 +327,11 @@ def _ticks(model: DigitalServo, load: Load, angle: float | None) -> Ticks:
                       "faster come later than it says", stacklevel=3)
     drop = numbers.bridge.D_drive - numbers.bridge.V_br
     told = ((firmware.latency, 0.0) if model.takes_goals else
-            (_mid_pulse(model, angle) + 0.5 * firmware.T_c, firmware.T_f))
+            (mid_pulse(model, angle) + 0.5 * firmware.T_c, firmware.T_f))
     return Ticks(plant=plant_of(numbers, load, angle), firmware=firmware, voltage=numbers.source.V - drop, command=told)
 
 
-def _mid_pulse(model: Model, angle: float | None) -> float:
+def mid_pulse(model: Model, angle: float | None) -> float:
     """Return the pulse width of an angle, or of the middle of the travel [s]."""
     centre = signals.constant(mid_travel(model) if angle is None else angle, unit="rad")
     return float(model.command(centre).table[0].value)

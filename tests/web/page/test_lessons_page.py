@@ -175,10 +175,10 @@ def test_a_pupil_finds_deadband_and_resistance_of_a_mystery_servo(opened, home):
     ohms = pupil.reads("highest", 2) / pupil.reads("highest", 1)  # of a motor that stood when it was switched on
     answers = {"electronics.deadband": width, "motor.armature_resistance": ohms}
     for name, value in answers.items():
-        page.locator(".side.mystery").get_by_label(name).fill(f"{value:.6g}")
+        page.locator(".lesson-panel").get_by_label(name).fill(f"{value:.6g}")
     page.get_by_role("button", name="Compare with the truth").click()
-    page.wait_for_selector(".side.mystery table")
+    page.wait_for_selector(".lesson-panel table")
     rows = {row.locator("th").inner_text(): row.locator("td").last.inner_text()
-            for row in page.locator(".side.mystery tr").all()}
+            for row in page.locator(".lesson-panel tr").all()}
     assert [rows[name] for name in answers] == ["found", "found"]
     assert [said for name, said in rows.items() if name not in answers] == ["not guessed"] * 3

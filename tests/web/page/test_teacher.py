@@ -107,12 +107,12 @@ def test_a_buzz_is_told_in_words_and_the_current_is_its_mean(page):
 
 def test_one_set_of_units_with_the_mystery_too(page):
     page.evaluate("bench.ask({mystery: 3})")
-    page.wait_for_selector(".side.mystery .card")
+    page.wait_for_selector(".lesson-panel .card")
     for title in ("Supply, chip and gear", "Any parameter"):
         opened_panel(page, title)
     units = {}
-    for box, name in ((".side.mystery", "friction.coulomb_torque"), (".side.mystery", "motor.rotor_inertia"),
-                      (".side.mystery", "electronics.deadband")):
+    for box, name in ((".lesson-panel", "friction.coulomb_torque"), (".lesson-panel", "motor.rotor_inertia"),
+                      (".lesson-panel", "electronics.deadband")):
         card = page.locator(f"{box} .card", has_text=name.split(".")[1])
         units[name] = card.locator(".unit").inner_text()
     assert units == {"friction.coulomb_torque": "mN m", "motor.rotor_inertia": "g cm²", "electronics.deadband": "µs"}

@@ -168,9 +168,13 @@ export class Bench extends EventTarget {
     this.addEventListener("push", goOn);
   }
 
+  /** @param {string} what is being set up, said until its scene is there */
+  setUp(what) { this.emit("said", `The ${what} is being set up.`); }
+
   /** Begin with what the link of the page carries. */
   begin() {
     const packed = location.hash.slice(1);
+    if (packed) this.setUp(packed.startsWith("lesson=") ? "lesson" : packed.startsWith("mystery=") ? "mystery servo" : "bench of this link");
     if (packed.startsWith("lesson=")) this.tell({ lesson: decodeURIComponent(packed.slice(7)) });
     else if (packed.startsWith("mystery=")) this.tell({ mystery: Number(packed.slice(8)) });
     else if (packed) this.tell({ fragment: packed });

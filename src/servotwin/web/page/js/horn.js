@@ -10,7 +10,8 @@ const STIFFNESS = 2.0; // N m per rad that the hand is away from the horn; assum
 const KEYS = /** @type {Record<string, number>} */ ({ ArrowLeft: 1, ArrowRight: -1, ArrowUp: 1, ArrowDown: -1 });
 const SPOKEN = 1; // times a second that the angle is said anew to a screen reader
 const TOLD = 3; // times a second that what it does is told anew
-const HINT = "Push a horn: with the mouse, or with an arrow key.";
+const HINT = window.matchMedia("(pointer: coarse)").matches ? "Turn it with the slider, or push the horn with the finger."
+  : "Turn it with the slider, or push the horn: with the mouse, or with an arrow key.";
 const BESIDE = /** @type {Record<string, [string, string]>} */ ({ // the model that is put beside each, and what it is for
   PulseServo: ["BoundedServo", "PulseServo follows every pulse. BoundedServo is the same servo in the mean of its pulses: for long runs, and to see what the pulses themselves do."],
   BoundedServo: ["PulseServo", "BoundedServo is a servo in the mean of its pulses. PulseServo follows every pulse: deadband, droop and buzz come from there."] });

@@ -12,6 +12,7 @@ export function mount(root, bench) {
       href: `#lesson=${one.name}`, text: one.title, onclick: (/** @type {Event} */ event) => {
         event.preventDefault();
         history.replaceState(null, "", `${location.pathname}${location.search}#lesson=${one.name}`);
+        bench.setUp(`lesson ${one.title}`);
         bench.tell({ lesson: one.name });
       } }))));
   });

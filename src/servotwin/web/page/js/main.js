@@ -86,6 +86,7 @@ bench.on("said", (line) => {
   quiet = window.setTimeout(() => { notice.hidden = true; }, 8000);
 });
 bench.on("scene", () => {
+  if (notice.textContent?.endsWith(" is being set up.")) notice.hidden = true;
   document.body.classList.add("ready");
   document.body.classList.toggle("many", bench.facts.length > 2);
 });

@@ -25,8 +25,8 @@ export function mount(root, bench) {
     const unknowns = state.unknowns ?? [];
     place.replaceChildren();
     fields = [];
-    if (!unknowns.length) return;
-    /** @type {HTMLDetailsElement} */ (body.parentElement).open = true;
+    if (!unknowns.length) { body.append(place); return; }
+    beside(place);
     const said = el("div", { "aria-live": "polite" });
     fields = unknowns.map((/** @type {any} */ one) => {
       const field = unique();
@@ -48,6 +48,18 @@ export function mount(root, bench) {
         }
       } }), said);
   });
+}
+
+/**
+ * Put what is to be found out where a lesson stands, beside the horn.
+ * @param {HTMLElement} place
+ */
+function beside(place) {
+  const panel = /** @type {HTMLElement} */ (document.querySelector(".lesson-panel"));
+  panel.hidden = false;
+  document.body.classList.add("teaches");
+  panel.firstElementChild?.replaceChildren(el("h2", { text: "Mystery servo" }),
+    el("p", { text: "Measure what it does, and find out these numbers." }), place);
 }
 
 /** @param {any} one what is hidden @param {number} value in SI @param {number} [digits] @returns {string} in the unit that is shown */
