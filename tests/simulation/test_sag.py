@@ -158,3 +158,17 @@ def test_a_fleet_tells_its_supply_and_each_servo_it():
     assert fleet.sag.limited == pytest.approx(
         1e-3 * np.count_nonzero(fleet.supply_current > 3.5 - 1e-9), abs=2e-3)
     assert {servo for servo, kind, _ in fleet.remarks if kind == HELD_BACK} == set(fleet)
+
+
+def test_a_sweep_has_the_least_voltage_of_its_samples_and_a_lane_the_exact_one():
+    model = model_of(SG90, "5V:3ohm")
+    command = st.signals.step(-40.0, 40.0, at=0.04, unit="deg")
+    study = st.sweep(model, command, duration=0.3, lanes=3, vary={"supply.internal_resistance": "uniform:1..3"},
+                     metrics=["lowest_voltage"], output_step=1e-3)
+    given = study.table["supply.internal_resistance"]
+    batch = st.simulate_many(model, command, parameters={"supply.internal_resistance": given}, duration=0.3)
+    for k, ohms in enumerate(given.tolist()):
+        alone = st.simulate(model_of(SG90, f"5V:{ohms!r}ohm"), command, duration=0.3, output_step=1e-3)
+        assert study.table["lowest_voltage"][k] == pytest.approx(alone["bus_voltage"].min(), abs=0.05)
+        assert study.table["lowest_voltage"][k] >= alone.sag.voltage - 1e-9
+        assert batch[k].sag == alone.sag

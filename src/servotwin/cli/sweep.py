@@ -72,7 +72,8 @@ def sweep(
         metavar="SECONDS", help="Time between samples used for the metrics.", rich_help_panel=shared.OUTPUT)] = 0.01,
     metric: Annotated[list[str] | None, typer.Option(
         metavar="NAME", help="Metric to show, the first one in the tornado, repeatable: overshoot, rise_time, "
-        "settling_time, steady_error, slew_rate, peak_current, rms_error, peak_error, or end_ and a signal's name.",
+        "settling_time, steady_error, slew_rate, peak_current, lowest_voltage, rms_error, peak_error, or end_ and a "
+        "signal's name.",
         rich_help_panel=shared.OUTPUT)] = None,
     out: Annotated[Path | None, typer.Option(
         metavar="FOLDER", help="Write all lanes, chunk by chunk.", rich_help_panel=shared.OUTPUT)] = None,

@@ -27,6 +27,7 @@ _METRICS = {
     "rest_swing": Shown("swing at rest", "", "°", "deg", "angle"),
     "slew_rate": Shown("slew rate", "", "°/s", "deg/s", "speed"),
     "peak_current": Shown("peak current", "", "A", "A", "current"),
+    "lowest_voltage": Shown("least voltage", "", "V", "V", "voltage"),
     "rms_error": Shown("rms error", "", "°", "deg", "angle"),
     "peak_error": Shown("peak error", "", "°", "deg", "angle"),
 }

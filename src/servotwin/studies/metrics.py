@@ -44,6 +44,7 @@ METRICS: dict[str, Metric] = {
     "slew_rate": Metric("speed", "highest speed", ("output_speed",), of_step=False),
     "peak_current": Metric("current", "highest magnitude of the armature current", ("armature_current",),
                            of_step=False),
+    "lowest_voltage": Metric("voltage", "least voltage of the supply", ("bus_voltage",), of_step=False),
     "rms_error": Metric("angle", "root of the mean square of commanded minus actual angle",
                         ("output_angle", "command_angle"), of_step=False),
     "peak_error": Metric("angle", "largest magnitude of commanded minus actual angle",
@@ -168,6 +169,8 @@ def lane_metrics(metrics: Sequence[str], times: Array, start: float, signals: Ma
             found[name] = swings
         elif name == "steady_error":
             found[name] = signals["command_angle"][:, -1] - signals["output_angle"][:, -1]
+        elif name == "lowest_voltage":
+            found[name] = signals["bus_voltage"].min(axis=1)
         elif name in ("slew_rate", "peak_current"):
             values = signals[METRICS[name].signals[0]]
             found[name] = np.maximum(values.max(axis=1), -values.min(axis=1))
