@@ -1,7 +1,8 @@
 """Robot files as strangers have them, rebuilt small by published numbers: which servos they get, and what is said.
 
-The numbers: an SO-101 whose URDF has the shoulder's hull 26 mm in the base and whose MJCF has not; a walker whose file is
-beside the scene that has its floor; a biped whose feet begin 17 mm in the floor; a humanoid of 47 hinges and 30 motors.
+The numbers: an SO-101 whose URDF has the shoulder's hull 26 mm in the base and whose MJCF has not; a walker whose file
+is beside the scene that has its floor; a biped whose feet begin 17 mm in the floor; a humanoid of 47 hinges and 30
+motors.
 """
 
 import mujoco
@@ -34,16 +35,16 @@ def arm_mjcf() -> str:
     """Return the same arm as MJCF, whose author left the shapes of its own links out."""
     base, shoulder, upper = (f'<inertial pos="{at}" mass="{mass}" diaginertia="{spread} {spread} {spread}"/>'
                              for _, at, mass, spread in LINKS)
-    return (f'<mujoco><worldbody><body name="base">{base}<body name="shoulder" pos="0 0 .024"><joint name="pan"/>{shoulder}'
-            f'<body name="upper" pos="0 0 .05"><joint name="lift" axis="0 1 0"/>{upper}</body></body></body></worldbody>'
-            "</mujoco>")
+    moving = (f'<body name="shoulder" pos="0 0 .024"><joint name="pan"/>{shoulder}<body name="upper" pos="0 0 .05">'
+              f'<joint name="lift" axis="0 1 0"/>{upper}</body></body>')
+    return f'<mujoco><worldbody><body name="base">{base}{moving}</body></worldbody></mujoco>'
 
 
 def biped(height: float, floor: bool) -> str:
     """Return a trunk of 0.8 kg on two legs, its soles 120 mm below it."""
     legs = "".join(
-        f'<body name="leg{k}" pos="0 {y} 0"><joint name="hip{k}" axis="0 1 0"/><geom type="capsule" size=".01" mass=".1" '
-        'fromto="0 0 -.02 0 0 -.1" contype="0" conaffinity="0"/><geom type="box" size=".06 .03 .01" pos="0 0 -.11" '
+        f'<body name="leg{k}" pos="0 {y} 0"><joint name="hip{k}" axis="0 1 0"/><geom type="capsule" size=".01" '
+        'mass=".1" fromto="0 0 -.02 0 0 -.1" contype="0" conaffinity="0"/><geom type="box" size=".06 .03 .01" pos="0 0 -.11" '
         'mass=".05"/></body>' for k, y in enumerate((0.05, -0.05)))
     ground = '<geom name="floor" type="plane" size="1 1 .1"/>' if floor else ""
     return (f'<mujoco><option timestep="0.002"/><worldbody>{ground}<body name="trunk" pos="0 0 {height}"><freejoint/>'
