@@ -44,8 +44,8 @@ def biped(height: float, floor: bool) -> str:
     """Return a trunk of 0.8 kg on two legs, its soles 120 mm below it."""
     legs = "".join(
         f'<body name="leg{k}" pos="0 {y} 0"><joint name="hip{k}" axis="0 1 0"/><geom type="capsule" size=".01" '
-        'mass=".1" fromto="0 0 -.02 0 0 -.1" contype="0" conaffinity="0"/><geom type="box" size=".06 .03 .01" pos="0 0 -.11" '
-        'mass=".05"/></body>' for k, y in enumerate((0.05, -0.05)))
+        'mass=".1" fromto="0 0 -.02 0 0 -.1" contype="0" conaffinity="0"/><geom type="box" size=".06 .03 .01" '
+        'pos="0 0 -.11" mass=".05"/></body>' for k, y in enumerate((0.05, -0.05)))
     ground = '<geom name="floor" type="plane" size="1 1 .1"/>' if floor else ""
     return (f'<mujoco><option timestep="0.002"/><worldbody>{ground}<body name="trunk" pos="0 0 {height}"><freejoint/>'
             f'<geom type="box" size=".05 .05 .03" mass=".8" contype="0" conaffinity="0"/>{legs}</body></worldbody>'
