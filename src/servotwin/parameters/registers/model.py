@@ -87,7 +87,7 @@ def model_for(models: Sequence[M], servo: Servo, number: int, common: Mapping[st
         Registers of the family.
     """
     told = [model for model in models if number and model.number == number]
-    text = f"{servo.name} {servo.title}".lower().replace("_", "-")
+    text = re.sub(r"[\s_]+", "-", f"{servo.name}|{servo.title}".lower())  # "XM430 W210" is an XM430-W210
     named = [model for model in told or models if _told(model.name.partition("(")[0], text)]
     if named:
         return max(named, key=lambda model: len(model.name))
