@@ -36,6 +36,7 @@ def fit(
     file_format: log_reading.FormatOption = "auto",
     columns: log_reading.ColumnsOption = None,
     joint: log_reading.JointOption = None,
+    raw: log_reading.RegistersOption = None,
     rate: log_reading.RateOption = None,
     commanded: log_reading.CommandedOption = None,
     change: Annotated[list[str] | None, typer.Option(
@@ -143,7 +144,7 @@ def fit(
                "diagnose": diagnose, "accuracy": accuracy, "within": within}
     chosen = _options(options)
     given = log_reading.read(logs, file_format, columns, joint, leave_out or [], mend=mend, rate=rate,
-                             commanded=commanded, force=force, quiet=as_json, registers=bool(register),
+                             commanded=commanded, force=force, quiet=as_json, registers=bool(register), raw=raw,
                              model=search.model)
     climbs = _climber(search, asked=bool(free), ladder=ladder, structures=structures, springs=spring)
     found = _run(search, given, chosen, scheduler, climbs)

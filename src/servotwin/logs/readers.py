@@ -13,6 +13,7 @@ from servotwin.logs.log import Log
 from servotwin.logs.mends import checked_mends
 from servotwin.logs.name_values import values_in
 from servotwin.logs.sidecar import FOLDER_FILE, FORMAT, patterns_of
+from servotwin.parameters import Servo
 from servotwin.signals.time_base import warn_of_time_base
 
 _CSV_ENDINGS = (".csv", ".tsv")
@@ -20,7 +21,7 @@ _CSV_ENDINGS = (".csv", ".tsv")
 
 def read_logs(path: str | Path, format: str = "auto", *, sidecar: str | Path | None = None,
               columns: str | Mapping[str, str] | None = None, joints: str | Mapping[str, str] | None = None,
-              mend: Sequence[str] = (), unknown_step: bool = False) -> list[Log]:
+              mend: Sequence[str] = (), unknown_step: bool = False, registers: str | Servo | None = None) -> list[Log]:
     r"""Return the logs in a file or folder, in the order of the file names.
 
     Parameters
@@ -42,6 +43,10 @@ def read_logs(path: str | Path, format: str = "auto", *, sidecar: str | Path | N
         "clock16", "thousands".
     unknown_step : bool
         Whether the command of a table without one may be the one step that its angle shows.
+    registers : str or Servo, optional
+        Whose registers the columns of tables are named after where they hold raw numbers: a family such as
+        ``"feetech-sts"``, a model such as ``"XM430-W350"``, or the servo itself, of which only what cannot be degrees
+        is taken for counts.
 
     Raises
     ------
@@ -76,7 +81,8 @@ def read_logs(path: str | Path, format: str = "auto", *, sidecar: str | Path | N
     if joints is not None:
         raise InputError(f"--joint for {path}", got="no dataset", allowed="--columns (columns=) for tables")
     files = _files(path, format) if _is_folder(path) else [path]
-    given = {"sidecar": sidecar, "columns": columns, "mend": mends, "unknown_step": unknown_step}
+    given = {"sidecar": sidecar, "columns": columns, "mend": mends, "unknown_step": unknown_step,
+             "registers": registers}
     logs = [log for file in files for log in _logs(file, format, given, alone=file is path)]
     if not logs:
         raise InputError(f"{path}", got="a folder without logs", allowed="*.csv, *.json of a known format ("

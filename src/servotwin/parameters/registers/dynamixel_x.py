@@ -149,7 +149,8 @@ def x_family(model: XModel) -> Family:
     settings = tuple(setting for setting in (*_control(model), *_LIMITS, *_TRIPS)
                      if not lacking & set(setting.registers))
     return Family(
-        label="Dynamixel X", model=model.name, reference=model.document, registers=model.registers(REGISTERS),
+        label="Dynamixel X", model=model.name, reference=model.document, count=_COUNT, middle=_MIDDLE,
+        current_sense=model.current_sense, registers=model.registers(REGISTERS),
         assumed=model.unseen(REGISTERS), masks=("Shutdown",), settings=settings,
         other_names={"Secondary_Shadow_ID": "Secondary_ID"},
         copied={"Goal_PWM": "PWM_Limit", **({"Goal_Current": "Current_Limit"} if model.current_unit else {})},

@@ -82,6 +82,7 @@ def _x(name: str, number: int, volts: tuple[str, int, int], speed: int, velocity
     return XModel(
         name=name, number=number, document=f"e-manual of the {name}, control table" if seen else "",
         page=f"https://emanual.robotis.com/docs/en/dxl/{last}/" if seen else "", values=values, ranges=ranges,
+        units={} if current is None else dict.fromkeys(OF_CURRENT, f"{1e3 * current[1]:.4g} mA"),
         lacks=frozenset((*(() if current else OF_CURRENT), *(() if slope else OF_SLOPE))),
         assumed=frozenset(assumed), current_unit=None if current is None else current[1],
         current_sense="bus" if slope else "motor", slope_unit=None if slope is None else slope[1], divisor=divisor,

@@ -146,10 +146,12 @@ def family_of(servo: Servo, number: int = 0) -> Family:
 def sts_family(model: StsModel) -> Family:
     """Return the registers of a model."""
     return Family(
-        label="Feetech STS", model=model.name, reference=model.document, registers=model.registers(REGISTERS),
+        label="Feetech STS", model=model.name, reference=model.document, count=_COUNT, middle=_MIDDLE,
+        registers=model.registers(REGISTERS),
         assumed=model.unseen(REGISTERS), elsewhere=model.elsewhere, masks=(_MASK,), sets=LEROBOT_SETS,
         settings=(*_CONTROL, *_profile(model), *_trips(model)),
-        other_names={"Hts": "Minimum_Velocity_Limit", "Moving_Velocity": "Moving_Velocity_Threshold"},
+        other_names={"Hts": "Minimum_Velocity_Limit", "Moving_Velocity": "Moving_Velocity_Threshold",
+                     "Goal_Speed": "Goal_Velocity", "Present_Speed": "Present_Velocity"},
         copied={"Torque_Limit": "Max_Torque_Limit"}, pairs=(("CW_Dead_Zone", "CCW_Dead_Zone"),), check=_check,
         served=_SERVED)
 

@@ -29,6 +29,8 @@ class RegisterModel:
         What its registers hold when it is new, where that is not what most of the family hold.
     ranges : mapping of str to tuple of int
         Lowest and highest value of registers, where these are not the family's.
+    units : mapping of str to str
+        Of a raw step of registers, where these are not the family's.
     lacks : frozenset of str
         Registers of the family that it does not have.
     elsewhere : mapping of str to str
@@ -43,6 +45,7 @@ class RegisterModel:
     page: str = ""
     values: Mapping[str, int] = field(default_factory=dict)
     ranges: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
     lacks: frozenset[str] = frozenset()
     elsewhere: Mapping[str, str] = field(default_factory=dict)
     assumed: frozenset[str] = frozenset()
@@ -59,7 +62,8 @@ class RegisterModel:
             if name in self.lacks:
                 continue
             lower, upper = self.ranges.get(name, (register.lower, register.upper))
-            made[name] = replace(register, factory=self.values.get(name, register.factory), lower=lower, upper=upper)
+            made[name] = replace(register, factory=self.values.get(name, register.factory), lower=lower, upper=upper,
+                                 unit=self.units.get(name, register.unit))
         return made
 
     def unseen(self, common: Mapping[str, Register]) -> frozenset[str]:
