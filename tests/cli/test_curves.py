@@ -119,7 +119,7 @@ def test_which_lists_the_lightest_first_and_says_why_others_cannot(cli):
     listed = [line.split()[0] for line in lines[3:lines.index("", 3)]]
     found = st.servos_that_lift(0.5, 0.1, voltage=5.0, time=0.3)
     assert listed == [each.servo.name for each in found.found]
-    assert "55 cannot: 34 lack the torque, 21 are too slow" in lines
+    assert "60 cannot: 34 lack the torque, 26 are too slow" in lines
     assert "takes 0.41 s" in next(line for line in lines if "mg996r" in line)
     assert "no servo of the catalog can" in cli("catalog", "which", "--lift", "50kg", "--arm", "1m").out
 

@@ -147,6 +147,15 @@ def test_what_a_register_cannot_hold_is_refused(tmp_path, change, message):
         read_logs(sts(tmp_path / "raw.csv", **change), registers="feetech-sts")
 
 
+@pytest.mark.parametrize(("name", "got"), [("run.json", "JSON"), ("dataset", "a dataset .lerobot.")])
+def test_only_tables_have_registers(tmp_path, name, got):
+    (tmp_path / "dataset" / "meta").mkdir(parents=True)
+    (tmp_path / "dataset" / "meta" / "info.json").write_text('{"codebase_version": "v2.1"}')
+    (tmp_path / "run.json").write_text("{}")
+    with pytest.raises(InputError, match=f"--registers for .*: got '{got}', allowed: tables"):
+        read_logs(tmp_path / name, registers="feetech-sts")
+
+
 def test_a_column_that_is_said_counts_before_its_register(tmp_path):
     path = sts(tmp_path / "raw.csv", Present_Voltage=7.4)
     log = read_logs(path, registers="feetech-sts", columns="voltage=Present_Voltage:V")[0]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from servotwin.errors import InputError, UnitError
 from servotwin.logs import column_names as names
 from servotwin.logs.column_values import Guess, guess, is_increasing, range_of
-from servotwin.logs.column_words import COMMAND, SHORT, Wanted, column_said
+from servotwin.logs.column_words import COMMAND, SAID, SHORT, Wanted, column_said
 from servotwin.logs.columns import COMMANDS, SWITCH, TIME, Column, columns_of, dimension_of_signal, si_unit_of
 from servotwin.logs.defined import checked_definition, is_defined
 from servotwin.logs.log import ANGLES
@@ -22,7 +22,7 @@ from servotwin.tables.dialect import MISSING
 from servotwin.tables.serial import ARRIVAL
 from servotwin.units.words import COUNTS, unit_shown, units_written
 
-NAMED, SAID, SIDECAR = "named", "--columns", "sidecar"
+NAMED, SIDECAR = "named", "sidecar"
 NEEDS = (TIME, COMMAND, "angle")
 """What a table has to have to be a log."""
 _SHORT = {**{name: short for short, name in SHORT.items()}, TIME: TIME}

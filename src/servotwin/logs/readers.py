@@ -77,6 +77,8 @@ def read_logs(path: str | Path, format: str = "auto", *, sidecar: str | Path | N
             if columns is not None:
                 raise InputError(f"--columns for {path}", got=f"a dataset ({name})",
                                  allowed="--joint (joints=), which says the units of its joints")
+            if isinstance(registers, str):
+                raise InputError(f"--registers for {path}", got=f"a dataset ({name})", allowed="tables")
             return list(dataset.room.logs_of(path, joints=joints))
     if joints is not None:
         raise InputError(f"--joint for {path}", got="no dataset", allowed="--columns (columns=) for tables")
@@ -123,8 +125,9 @@ def _logs(file: Path, format: str, given: Mapping[str, Any], *, alone: bool) -> 
     name = "csv" if format == "auto" and not _is_json(file) else format
     if name != "auto" and LOG_FORMATS[name].holds == "table":
         return list(LOG_FORMATS[name].room.logs_of(file, **given))
-    if alone and given["columns"] is not None:
-        raise InputError(f"--columns for {file}", got="JSON", allowed="tables; JSON says what it holds")
+    for said in ("columns", "registers"):
+        if alone and isinstance(given[said], str | Mapping):
+            raise InputError(f"--{said} for {file}", got="JSON", allowed="tables; JSON says what it holds")
     content: Any = read_json(file)
     if name != "auto":
         return list(LOG_FORMATS[name].room.logs_of(file, content))

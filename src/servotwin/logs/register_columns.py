@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.logs.column_values import MOST_DEGREES
+from servotwin.logs.column_words import SAID
 from servotwin.logs.columns import Column
 from servotwin.parameters import Servo
 from servotwin.parameters.registers.held import register_family_of
@@ -109,25 +110,25 @@ def register_columns(table: TextTable, raw: RawRegisters | None, taken: Containe
     if raw is None:
         _ask(table, taken)
         return {}
-    found = _found(table, raw.family, taken)
-    if not raw.said and not _are_raw(table, found):
+    named = _named(table, raw.family, taken)
+    if not raw.said and not _are_raw(table, named):
         return {}
     known = f"{OPTION} {raw.said}" if raw.said else f"register of {raw.family.model}"
     made: dict[str, RegisterColumn] = {}
     for signal, registers in _SIGNALS.items():
-        name = next((name for name in registers if name in found and raw.family.registers[name].unit), None)
+        name = next((name for name in registers if name in named.values() and raw.family.registers[name].unit), None)
         if name is not None:
-            one = raw.family.registers[name]
-            _check(table, found[name], name, raw.family)
+            column, one = _only(table, named, name), raw.family.registers[name]
+            _check(table, column, name, raw.family)
             own = _SENSED[raw.family.current_sense] if signal == "current" else signal
-            made[own] = RegisterColumn(_column(found[name], raw.family, one),
+            made[own] = RegisterColumn(_column(column, raw.family, one),
                                        known + ", assumed" * one.unit.endswith("assumed"))
     return made
 
 
 def named_after(table: TextTable, raw: RawRegisters) -> frozenset[str]:
     """Return the columns of a table that are named after registers, read or not."""
-    return frozenset(_found(table, raw.family).values())
+    return frozenset(_named(table, raw.family))
 
 
 def _plain(name: str) -> str:
@@ -139,43 +140,43 @@ def _names(family: Family) -> dict[str, str]:
         _plain(other): name for other, name in family.other_names.items() if name in family.registers}
 
 
-def _found(table: TextTable, family: Family, taken: Container[str] = ()) -> dict[str, str]:
-    """Return the columns by register; raise where two are one register."""
+def _named(table: TextTable, family: Family, taken: Container[str] = ()) -> dict[str, str]:
+    """Return the registers by the columns that are named after them."""
     names = _names(family)
-    found: dict[str, str] = {}
-    for column in table.header:
-        name = None if column in taken else names.get(_plain(column))
-        if name is not None and found.setdefault(name, column) != column:
-            raise InputError(f"{table.path}: register {name}", got=f"columns {found[name]} and {column}",
-                             allowed="one of them")
-    return found
+    return {column: names[_plain(column)] for column in table.header
+            if column not in taken and _plain(column) in names}
 
 
-def _positions(table: TextTable, found: Mapping[str, str]) -> Iterator[NDArray[np.float64]]:
-    for name in (_GOAL, _POSITION):
-        if name in found:
-            try:
-                values = table.numbers(found[name], missing=math.nan)
-            except InputError:  # words; whoever reads the column says so
-                return
-            yield values[np.isfinite(values)]
+def _only(table: TextTable, named: Mapping[str, str], name: str) -> str:
+    """Return the column of a register; raise where two are."""
+    columns = [column for column, register in named.items() if register == name]
+    if len(columns) > 1:
+        raise InputError(f"{table.path}: register {name}", got=f"columns {' and '.join(columns)}",
+                         allowed="one of them")
+    return columns[0]
 
 
-def _are_raw(table: TextTable, found: Mapping[str, str]) -> bool:
+def _positions(table: TextTable, named: Mapping[str, str]) -> NDArray[np.float64]:
+    """Return all goals and positions; none where they are not whole numbers."""
+    columns = [column for column, name in named.items() if name in (_GOAL, _POSITION)]
+    try:
+        values = np.concatenate([np.empty(0), *(table.numbers(column, missing=math.nan) for column in columns)])
+    except InputError:  # words; whoever reads the column says so
+        return np.empty(0)
+    values = values[np.isfinite(values)]
+    return values if (values == np.round(values)).all() else np.empty(0)
+
+
+def _are_raw(table: TextTable, named: Mapping[str, str]) -> bool:
     """Return whether positions are counts; raise where they may as well be degrees."""
-    values = np.concatenate([np.empty(0), *_positions(table, found)])
-    if not values.size or not (values == np.round(values)).all():
-        return False
-    if np.abs(values).max() > MOST_DEGREES:
-        return True
-    raise InputError(f"{table.path}: {found.get(_POSITION, found.get(_GOAL))}", got=f"whole numbers up to "
-                     f"{np.abs(values).max():g}", allowed=f"{OPTION} feetech-sts or the like, if they are counts of "
-                     f'registers, or --columns "{_degrees(found)}"')
-
-
-def _degrees(found: Mapping[str, str]) -> str:
-    return " ".join(f"{signal}={found[name]}:deg" for signal, name in (("command", _GOAL), ("angle", _POSITION))
-                    if name in found)
+    values = np.abs(_positions(table, named))
+    if not values.size or values.max() > MOST_DEGREES:
+        return bool(values.size)
+    words = {_GOAL: "command", _POSITION: "angle"}
+    said = [f"{words[name]}={column}:deg" for column, name in named.items() if name in words]
+    raise InputError(f"{table.path}: {', '.join(column for column, name in named.items() if name in words)}",
+                     got=f"whole numbers up to {values.max():g}", allowed=f"{OPTION} feetech-sts or the like, if they "
+                     f'are counts of registers, or {SAID} "{" ".join(said)}"')
 
 
 def _ask(table: TextTable, taken: Container[str]) -> None:
@@ -183,17 +184,15 @@ def _ask(table: TextTable, taken: Container[str]) -> None:
     fitting: dict[str, list[str]] = {}
     for word in register_words():
         family = register_family(word)
-        found = _found(table, family, taken)
-        values = np.concatenate([np.empty(0), *_positions(table, found)])
-        low, high = _range(family, family.registers[_POSITION])
-        if values.size and (values == np.round(values)).all() and values.max() > MOST_DEGREES \
-                and low <= values.min() and values.max() <= high:
-            fitting[word] = list(found.values())
+        named = _named(table, family, taken)
+        values, (low, high) = _positions(table, named), _range(family, family.registers[_POSITION])
+        if values.size and values.max() > MOST_DEGREES and low <= values.min() and values.max() <= high:
+            fitting[word] = list(named)
     most = max(map(len, fitting.values()), default=0)
     if best := [word for word, columns in fitting.items() if len(columns) == most]:
         raise InputError(f"{table.path}: {', '.join(fitting[best[0]])}", got="names of registers of a bus servo, and "
                          "counts", allowed=f"{OPTION} {' or '.join(best)}, or a model such as XM430-W350, which says "
-                         "counts, signs and steps")
+                         f"counts, signs and steps; or {SAID}, which says them of each column")
 
 
 def _range(family: Family, one: Register) -> tuple[int, int]:
@@ -214,7 +213,7 @@ def _check(table: TextTable, column: str, name: str, family: Family) -> None:
     if wrong.size:
         row = table.rows[wrong[0]]
         raise InputError(f"{table.path}: line {row.line}, {column}", got=f"{values[wrong[0]]:g}",
-                         allowed=f"a whole number from {low} to {high}, as register {name} holds; or --columns, which "
+                         allowed=f"a whole number from {low} to {high}, as register {name} holds; or {SAID}, which "
                          "says the unit of a column")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from typing import Any, NamedTuple
@@ -223,10 +223,13 @@ def wire_rows(model: ListedModel) -> list[WireRow]:
     return found
 
 
-def _models() -> Iterator[ListedModel]:
+@cache
+def _models() -> tuple[ListedModel, ...]:
+    made = []
     for name, (make, models) in _FAMILIES.items():
         for model in models:
             family = make(model)
             shown = [key for key, register in family.registers.items() if not register.reading]
-            yield ListedModel(name, model.name, model.number, len(shown),
-                              sum(not family.document(key) for key in shown), model.page, family)
+            made.append(ListedModel(name, model.name, model.number, len(shown),
+                                    sum(not family.document(key) for key in shown), model.page, family))
+    return tuple(made)
