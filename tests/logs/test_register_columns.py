@@ -96,6 +96,8 @@ def test_of_a_family_alone_a_step_that_differs_within_it_is_not_read_and_not_gue
     log = read_logs(path, registers="dynamixel-x")[0]
     assert set(log.measured) == {"output_angle"}
     assert log.reading.unread == ("Present_Current",)
+    other = read_logs(sts(tmp_path / "other.csv"), registers="dynamixel-x")[0]
+    assert {"Present_Speed", "Present_Voltage", "Present_Current"} < set(other.reading.unread)  # names of an STS
 
 
 @pytest.mark.parametrize(("registers", "middle", "count", "rpm"), [

@@ -14,7 +14,7 @@ from servotwin.logs.columns import COMMANDS, SWITCH, TIME, Column, columns_of, d
 from servotwin.logs.defined import checked_definition, is_defined
 from servotwin.logs.log import ANGLES
 from servotwin.logs.reading import ReadColumn
-from servotwin.logs.register_columns import RawRegisters, named_after, register_columns
+from servotwin.logs.register_columns import RawRegisters, named_after_any, register_columns
 from servotwin.logs.stamps import clock_of
 from servotwin.logs.unknown_step import step_of
 from servotwin.tables import TextTable
@@ -103,7 +103,7 @@ def layout_of(table: TextTable, sidecar: Mapping[str, Column] | None, wanted: Ma
         for signal, held in counts.items():
             if signal not in made and not (told and signal in COMMANDS):
                 made[signal] = held
-        passed = named_after(table, raw) if raw is not None and counts else frozenset()  # their steps are no guess
+        passed = named_after_any(table) if counts else frozenset()  # whose steps nobody guesses
         taken = {column.column for column, _ in made.values()}
         others = [name for name in table.header if name not in taken and name not in passed]
         told = any(name in made for name in COMMANDS)

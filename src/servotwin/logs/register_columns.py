@@ -126,9 +126,9 @@ def register_columns(table: TextTable, raw: RawRegisters | None, taken: Containe
     return made
 
 
-def named_after(table: TextTable, raw: RawRegisters) -> frozenset[str]:
-    """Return the columns of a table that are named after registers, read or not."""
-    return frozenset(_named(table, raw.family))
+def named_after_any(table: TextTable) -> frozenset[str]:
+    """Return the columns of a table that are named after a register of any family, read or not."""
+    return frozenset(column for word in register_words() for column in _named(table, register_family(word)))
 
 
 def _plain(name: str) -> str:
