@@ -90,6 +90,20 @@ def test_a_dynamixel_x_has_its_own_current_and_twos_complements(tmp_path, regist
     assert log.reading.unread == ("Realtime_Tick",)
 
 
+def test_speeds_of_an_sts_have_the_step_that_its_phase_says(tmp_path):
+    """50 counts/s where bit 2 is not set, as the bench has it."""
+    slow = st.feetech_sts({"Phase": 8, "Goal_Velocity": 60}, servo=STS)
+    one, other = (read_logs(sts(tmp_path / "raw.csv", Present_Speed=40), registers=servo)[0].measured["output_speed"][0]
+                  for servo in (st.load_servo(STS), slow))
+    assert (one, other) == pytest.approx((math.radians(40 * 360.0 / 4096.0), math.radians(2000 * 360.0 / 4096.0)))
+
+
+def test_the_load_of_a_dynamixel_is_no_duty(tmp_path):
+    path = write(tmp_path / "raw.csv", t=TIME, Goal_Position=GOAL, Present_Position=POSITION, Present_Load=LOAD)
+    log = read_logs(path, registers="XL430-W250")[0]
+    assert (set(log.measured), log.reading.unread) == ({"output_angle"}, ("Present_Load",))
+
+
 def test_of_a_family_alone_a_step_that_differs_within_it_is_not_read_and_not_guessed(tmp_path):
     """The current of an X servo would be 1 to 3.36 mA a count; values up to 100 look like milliamperes."""
     path = write(tmp_path / "raw.csv", t=TIME, Goal_Position=GOAL, Present_Position=POSITION, Present_Current=CURRENT)

@@ -24,14 +24,15 @@ from servotwin.units.words import unit_word
 
 OPTION = "--registers"
 _GOAL, _POSITION = "Goal_Position", "Present_Position"
-# What a log holds of a servo's registers, of several for one signal the first: a servo tells its duty as PWM or as load
+# What a log holds of a servo's registers, of several for one signal the first that the family has: the load of an STS
+# is its duty, that of a Dynamixel, which has a register of its own for PWM, something estimated
 _SIGNALS = {"command_angle": (_GOAL,), "output_angle": (_POSITION,),
             "output_speed": ("Present_Velocity", "Present_Speed"),
             "current": ("Present_Current",), "bus_voltage": ("Present_Voltage", "Present_Input_Voltage"),
             "duty": ("Present_PWM", "Present_Load"), "housing_temperature": ("Present_Temperature",)}
 _SENSED = {"motor": "armature_current", "bus": "supply_current"}
 _BETWEEN = re.compile(r"[\s_-]+")
-_STEP = re.compile(r"(?P<over>[\d.]+)?(?:/(?P<under>\d+))?\s*(?P<unit>[^\d,]*)(?:, assumed)?")
+_STEP = re.compile(r"(?P<over>[\d.]+)?(?:/(?P<under>\d+))?\s*(?P<unit>[^\d,]*)(?:, assumed)?")  # "0.1 V", "1/885"
 _ZERO_CELSIUS = 273.15
 
 
@@ -116,8 +117,8 @@ def register_columns(table: TextTable, raw: RawRegisters | None, taken: Containe
     known = f"{OPTION} {raw.said}" if raw.said else f"register of {raw.family.model}"
     made: dict[str, RegisterColumn] = {}
     for signal, registers in _SIGNALS.items():
-        name = next((name for name in registers if name in named.values() and raw.family.registers[name].unit), None)
-        if name is not None:
+        name = next((name for name in registers if name in raw.family.registers), "")
+        if name in named.values() and raw.family.registers[name].unit:
             column, one = _only(table, named, name), raw.family.registers[name]
             _check(table, column, name, raw.family)
             own = _SENSED[raw.family.current_sense] if signal == "current" else signal
@@ -219,16 +220,13 @@ def _check(table: TextTable, column: str, name: str, family: Family) -> None:
 
 def _column(column: str, family: Family, one: Register) -> Column:
     """Return what the numbers of a register mean."""
+    match = _STEP.fullmatch(one.unit)
+    if match is None:
+        raise InputError("unit of a register", got=one.unit, allowed="a number and a unit")
     degrees = round(math.degrees(family.count), 12)  # 360/4096 is exact so
-    unit, scale, offset = {"count": ("deg", degrees, -family.middle * degrees), "count/s": ("deg/s", degrees, 0.0),
-                           "°C": ("K", 1.0, _ZERO_CELSIUS)}.get(one.unit) or _step(one.unit)
-    return Column(column, unit, scale, offset, sign_bit=one.sign_bit, bits=8 * one.size if one.signed else None)
-
-
-def _step(text: str) -> tuple[str, float, float]:
-    """Return unit and scale of a step such as "6.5 mA", "1/885" or "0.1 %"; the offset is none."""
-    match = _STEP.fullmatch(text)
-    unit = None if match is None else unit_word(match["unit"])
-    if match is None or (unit is None and match["unit"]):
-        raise InputError("unit of a register", got=text, allowed="a number and a unit")
-    return unit[0] if unit else "1", float(match["over"] or 1.0) / float(match["under"] or 1.0), 0.0
+    unit, scale, offset = {
+        "count": ("deg", degrees, -family.middle * degrees), "count/s": ("deg/s", degrees, 0.0),
+        "°C": ("K", 1.0, _ZERO_CELSIUS), "": ("1", 1.0, 0.0)}.get(match["unit"]) or (
+        (unit_word(match["unit"]) or ("",))[0], 1.0, 0.0)
+    return Column(column, unit, float(match["over"] or 1.0) / float(match["under"] or 1.0) * scale, offset,
+                  sign_bit=one.sign_bit, bits=8 * one.size if one.signed else None)
