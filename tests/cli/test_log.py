@@ -167,6 +167,31 @@ def test_a_lift_without_header_and_command(cli):
         "--commanded 153deg@0s") == 1
 
 
+RAW = ["t,Goal_Position,Present_Position,Present_Speed,Present_Voltage,Present_Current", *(
+    f"{0.02 * k:.2f},{2048 + 100 * (k > 5)},{2048 + min(10 * max(k - 7, 0), 100)},{32768 + k},74,{k % 9}"
+    for k in range(60)), ""]
+
+
+def test_raw_registers_are_asked_for_and_read_when_they_are_said(cli):
+    Path("raw.csv").write_text("\n".join(RAW))
+    assert "allowed: --registers feetech-sts, or a model" in cli("log", "raw.csv", "--out", "si.csv").error
+    assert "did you mean 'feetech-sts'" in cli("log", "raw.csv", "--out", "si.csv", "--registers", "feetech").error
+    assert [path.name for path in Path().iterdir()] == ["raw.csv"]
+    shown = cli("log", "raw.csv", "--out", "si.csv", "--registers", "feetech-sts").out
+    assert "Present_Current   armature_current  6.5mA               --registers feetech-sts" in shown
+    log, = read_logs("si.csv")
+    np.testing.assert_allclose(np.degrees(log.command[-1]), 100 * 360.0 / 4096.0, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(np.degrees(log.measured["output_speed"]), -np.arange(60) * 360.0 / 4096.0, atol=1e-9)
+    np.testing.assert_allclose(log.measured["bus_voltage"], 7.4)
+
+
+def test_a_servo_says_whose_raw_registers_they_are(cli):
+    Path("raw.csv").write_text("\n".join(RAW))
+    shown = cli("validate", "feetech-sts3215-7v4", "raw.csv").out
+    assert "Present_Current   armature_current  6.5mA               register of STS3215-7V4" in shown
+    assert [path.name for path in Path().iterdir()] == ["raw.csv"]
+
+
 def test_a_clean_log_is_left_as_it_is(cli):
     rows = clean_rows(4)
     Path("run.csv").write_text(rows.text())

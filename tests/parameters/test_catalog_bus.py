@@ -10,9 +10,10 @@ import servotwin as st
 from servotwin.identification import motor_range, servo_file_text, servo_from_sheet, sheet_contradictions, sheet_of
 from servotwin.parameters import REGISTER_FAMILIES, catalog_names, load_servo, unit_of
 
-BUS = ("dynamixel-ax-12a", "dynamixel-mx-106", "dynamixel-mx-28", "dynamixel-mx-64", "dynamixel-xl-320",
-       "dynamixel-xl330-m077", "dynamixel-xl330-m288", "dynamixel-xl430-w250", "feetech-sts3215-12v",
-       "feetech-sts3215-7v4", "feetech-sts3250")
+BUS = ("dynamixel-2xl430-w250", "dynamixel-ax-12a", "dynamixel-mx-106", "dynamixel-mx-28", "dynamixel-mx-64",
+       "dynamixel-xc330-t288", "dynamixel-xc430-w240", "dynamixel-xl-320", "dynamixel-xl330-m077",
+       "dynamixel-xl330-m288", "dynamixel-xl430-w250", "dynamixel-xm430-w210", "dynamixel-xm430-w350",
+       "feetech-sts3215-12v", "feetech-sts3215-7v4", "feetech-sts3250")
 DIGITAL = ("dsservo-ds3218", "dsservo-rds3115", "emax-es08md", "feetech-ft-15m0", "feetech-ft-2806", "feetech-ft-7235",
            "hitec-hs-5485hb", "jx-pdi-6221mg", "towerpro-mg995", "towerpro-mg996r", "towerpro-sg92r")
 FITTED = ("miuzei-25kg",)  # to logs, without a sheet
@@ -37,9 +38,14 @@ PLANTS = {
 OF_LITERATURE = ("dynamixel-xl-320",)  # published, and not checked by logs
 # Speed at full duty over the sheet's: of plants that were identified (BAM's XL-320 turns half as fast, as its notes
 # say), and of sheets whose numbers no motor has all together
-FULL_SPEED = {"dynamixel-mx-106": 1.1323, "dynamixel-mx-28": 0.9870, "dynamixel-mx-64": 1.0914,
-              "dynamixel-xl-320": 0.5023, "dynamixel-xl330-m077": 0.9936, "dynamixel-xl330-m288": 1.0725,
-              "dynamixel-xl430-w250": 1.0121, "feetech-sts3215-7v4": 0.9920}
+FULL_SPEED = {"dynamixel-2xl430-w250": 1.0054, "dynamixel-mx-106": 1.1323, "dynamixel-mx-28": 0.9870,
+              "dynamixel-mx-64": 1.0914, "dynamixel-xc330-t288": 1.0021, "dynamixel-xc430-w240": 1.0059,
+              "dynamixel-xl-320": 0.5023, "dynamixel-xl330-m077": 0.9913, "dynamixel-xl330-m288": 1.0725,
+              "dynamixel-xl430-w250": 1.0054, "dynamixel-xm430-w210": 0.9924, "dynamixel-xm430-w350": 1.0031,
+              "feetech-sts3215-7v4": 0.9920}
+# Coulomb friction that others identified [N m]: ToddlerBot's of each, and of the XM430-W350 also that of a ROBOTIS OP3
+FRICTIONS = {"dynamixel-xc330-t288": (0.006,), "dynamixel-xc430-w240": (0.014,), "dynamixel-2xl430-w250": (0.069,),
+             "dynamixel-xm430-w210": (0.038,), "dynamixel-xm430-w350": (0.03, 0.105)}
 TOLD_BY_LOGS = {  # and nothing else: the rest of a file that was fitted is assumed, or said of the rig
     "motor.armature_resistance", "motor.torque_constant", "motor.back_emf_constant", "motor.rotor_inertia",
     "friction.coulomb_torque_forward", "friction.coulomb_torque_backward", "friction.load_friction_external",
@@ -164,6 +170,15 @@ def test_each_turns_about_as_fast_as_its_sheet_says(name):
     found = full_speed(servo if servo.firmware.duty_limit is None else servo.replace({"firmware.duty_limit": 1.0}))
     assert found == pytest.approx(printed * FULL_SPEED.get(name, 1.0), rel=1e-5 if name not in FULL_SPEED else 5e-4)
     assert servo.supply.open_circuit_voltage == sheet_of(servo).nominal.supply_voltage
+
+
+@pytest.mark.parametrize("name", FRICTIONS)
+def test_the_friction_of_an_x_servo_is_assumed_as_wide_as_others_identified_it(name):
+    servo = load_servo(name)
+    known, N = servo.source("friction.coulomb_torque_forward"), servo.gear.gear_reduction
+    assert known.origin == "assumed"
+    for friction in FRICTIONS[name]:
+        assert N * known.lower <= friction <= N * known.upper
 
 
 @pytest.mark.long

@@ -118,10 +118,11 @@ def test_duties_at_rest_are_those_that_an_sts_shows(P, zone, startup, duties):
     (XL330, {}, {"proportional_gain": 400 / (256 * 885 * COUNT), "derivative_gain": 0.0, "undervoltage": 3.5,
                  "trip_temperature": 343.15, "duty_slew": 140 * 1.977 / 5.0, "duty_quantum": 1 / 885,
                  "control_period": 1e-3, "compute_delay": 0.0, "angle_quantum": COUNT, "whole_counts": None}),
-    (XL430, {}, {"proportional_gain": 640 / (256 * 885 * COUNT), "derivative_gain": 4000 * T_c / (32 * 885 * COUNT),
+    (XL430, {"Position_I_Gain": 10}, {"integral_gain": 10 / (65536 * 885 * COUNT * T_c)}),
+    (XL430, {}, {"proportional_gain": 640 / (128 * 885 * COUNT), "derivative_gain": 4000 * T_c / (16 * 885 * COUNT),
                  "trip_temperature": 345.15, "undervoltage": None, "duty_slew": None, "current_limit": None}),
     (st.servo_from_values("my-xm430", {}), {"Operating_Mode": 5, "Goal_Current": 100},
-     {"proportional_gain": 800 / (256 * 885 * COUNT), "current_limit": 0.269, "current_sense": "motor"}),
+     {"proportional_gain": 800 / (128 * 885 * COUNT), "current_limit": 0.269, "current_sense": "motor"}),
     (st.servo_from_values("mine", {}), {"Model_Number": 1200}, {"proportional_gain": 400 / (256 * 885 * COUNT)}),
 ], ids=str)
 def test_dynamixel_x(servo, registers, expected):
@@ -215,11 +216,22 @@ def test_the_source_names_the_registers_and_what_is_guessed():
     for name in arm.names():
         if name.startswith("firmware."):
             assert (arm.source(name).origin == "assumed") is (name in guessed), name
-    for servo, sure in ((XL330, True), (XL430, False)):
-        gain = st.dynamixel_x({"Position_P_Gain": 100}, servo=servo).source("firmware.proportional_gain")
-        assert (gain.origin == "literature") is sure
-        assert sure or (gain.lower, gain.upper) == pytest.approx((gain.value, 2 * gain.value), rel=1e-14)
     assert "literature" in ORIGINS
+
+
+@pytest.mark.parametrize(("model", "divisor", "least", "most"), [
+    ("XL330-M288", 256, None, None), ("XC330-T288", 256, 128, 256), ("XC330-M288", 256, 128, 256),
+    ("XL430-W250", 128, 128, 150), ("XC430-W240", 128, 128, 150), ("2XL430-W250", 128, 128, 150),
+    ("XM430 W350", 128, 128, 150), ("xm540_w270", 128, 128, 150), ("MX-64", 128, 128, 150), ("my-xm430", 128, 128, 150),
+    ("2XC430-W250", 128, 128, 256), ("mine", 128, 128, 256)])
+def test_the_divisor_of_the_gain_p_is_that_of_the_model(model, divisor, least, most):
+    """Measured of an XL330, else assumed within a range; of a model whose page was not read the XL330's is in it."""
+    gain = st.dynamixel_x({"Position_P_Gain": 100}, servo=st.servo_from_values("a", {}, title=model)).source(
+        "firmware.proportional_gain")
+    assert gain.value == pytest.approx(100 / (divisor * 885 * COUNT), rel=1e-14)
+    assert gain.origin == ("literature" if least is None else "assumed")
+    assert (gain.lower, gain.upper) == ((None, None) if least is None else pytest.approx(
+        (100 / (most * 885 * COUNT), 100 / (least * 885 * COUNT)), rel=1e-14))
 
 
 @pytest.mark.parametrize(("change", "servo", "one", "two", "name"), [

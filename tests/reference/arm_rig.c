@@ -136,9 +136,9 @@ static double tick(Mind *m, const Servo *s, double angle) {
         }
         u = cut(s->P * z / 4.0) + m->held;
     } else {
-        m->held = cut(s->D * (z - m->z[0]) / 32.0);
+        m->held = cut(s->D * (z - m->z[0]) * 8.0 / s->dynamixel);
         m->z[0] = z;
-        u = cut(s->P * z / 256.0) + m->held;
+        u = cut(s->P * z / s->dynamixel) + m->held;
     }
     if (u != 0.0) u += sign_of(u) * s->startup;
     double d = clip(clip(u / full, s->torque_limit), s->limit);

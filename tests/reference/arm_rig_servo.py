@@ -35,7 +35,7 @@ class Servo(NamedTuple):
     damping: float = 2.0  # N m s/rad
     wheel: float = 2e-6  # kg m², behind the play
     zero: float = 0.0  # rad, the encoder's angle less that of the joint
-    dynamixel: float = 0.0  # 1: Dynamixel X, else Feetech STS
+    dynamixel: float = 0.0  # of a Dynamixel X the divisor of P, and 8 times that of D; 0: Feetech STS
     P: float = 16.0
     D: float = 32.0
     zone: float = 1.0  # counts
@@ -55,10 +55,13 @@ def feetech(P: float = 16.0, D: float = 32.0, acceleration: float = 254.0, **mor
     return Servo(P=P, D=D, acceleration=100.0 * min(acceleration, 254.0))._replace(**more)
 
 
-def dynamixel(P: float, D: float = 0.0, slew: float = 0.0, **more: float) -> Servo:
-    """Return an X servo without profile; `slew` is register 62 times 1.977 V/s over the supply."""
+def dynamixel(P: float, D: float = 0.0, slew: float = 0.0, divisor: float = 128.0, **more: float) -> Servo:
+    """Return an X servo without profile; `slew` is register 62 times 1.977 V/s over the supply.
+
+    The divisor of P is the manual's, and 256 of an XL330.
+    """
     return Servo(P=P, D=D, zone=0.0, startup=0.0, limit=1.0, speed=0.0, acceleration=0.0, least_speed=0.0, wait=0.0,
-                 dynamixel=1.0, slew=slew)._replace(**more)
+                 dynamixel=divisor, slew=slew)._replace(**more)
 
 
 USUAL: dict[str, Servo] = {
@@ -70,8 +73,8 @@ USUAL: dict[str, Servo] = {
                                    load_external=0.21),
     "dynamixel-xl430-w250": dynamixel(P=640.0, R=8.37, K=1.559, J=0.00726, forward=0.208, load_motor=0.13,
                                       load_external=0.13, drop=0.4),
-    "dynamixel-xl330-m288": dynamixel(P=400.0, slew=1.977 * 140.0 / 5.0, R=3.04, K=0.381, J=1.96e-3, B=4.4e-3,
-                                      forward=0.0113, load_motor=0.123, load_external=0.123),
+    "dynamixel-xl330-m288": dynamixel(P=400.0, slew=1.977 * 140.0 / 5.0, divisor=256.0, R=3.04, K=0.381, J=1.96e-3,
+                                      B=4.4e-3, forward=0.0113, load_motor=0.123, load_external=0.123),
 }
 """Servos about which truths are drawn; each turns alike both ways."""
 

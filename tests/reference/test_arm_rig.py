@@ -85,7 +85,8 @@ def test_the_file_of_a_robot_has_the_same_dynamics(robot):
 
 
 @pytest.mark.parametrize(("servo", "full", "share"), [(feetech(), 1000.0, 4.0), (feetech(P=32.0), 1000.0, 4.0),
-                                                      (dynamixel(P=400.0), 885.0, 256.0)])
+                                                      (dynamixel(P=400.0), 885.0, 128.0),
+                                                      (dynamixel(P=400.0, divisor=256.0), 885.0, 256.0)])
 def test_it_droops_as_its_registers_say(servo, full, share):
     """At rest: duty = P (e - zone) / share + start, cut; motor and load differ by no more than friction holds."""
     truth = arm([POLE], [servo._replace(R=4.3, K=2.3, J=0.03, forward=0.05, backward=0.05)])

@@ -77,8 +77,9 @@ OF_CATALOG = {
         "unbranded-micro-13g"),
     "by_ticks": "dsservo-ds3218 dsservo-rds3115 dynamixel-xl330-m077 feetech-ft-7235 towerpro-mg995",
     "by_legs": (
-        "dynamixel-ax-12a dynamixel-mx-106 dynamixel-mx-28 dynamixel-mx-64 dynamixel-xl-320 dynamixel-xl330-m288 "
-        "dynamixel-xl430-w250 emax-es08md feetech-ft-15m0 feetech-ft-2806 feetech-sts3215-12v feetech-sts3215-7v4 "
+        "dynamixel-2xl430-w250 dynamixel-ax-12a dynamixel-mx-106 dynamixel-mx-28 dynamixel-mx-64 dynamixel-xc330-t288 "
+        "dynamixel-xc430-w240 dynamixel-xl-320 dynamixel-xl330-m288 dynamixel-xl430-w250 dynamixel-xm430-w210 "
+        "dynamixel-xm430-w350 emax-es08md feetech-ft-15m0 feetech-ft-2806 feetech-sts3215-12v feetech-sts3215-7v4 "
         "feetech-sts3250 hitec-hs-5485hb jx-pdi-6221mg miuzei-25kg towerpro-mg996r towerpro-sg92r"),
     "by_gaps": "geekservo-2kg miuzei-ms18",
     "side_by_side_float64": "futaba-s3003 hitec-hs-311 hitec-hs-755hb towerpro-mg90s towerpro-sg90",

@@ -297,7 +297,7 @@ def _footnotes(shown: list[Judged], asked: _Asked) -> list[str]:
     if shown and task and any(each.candidate.servo.thermal.winding_capacity is None for each in shown):
         notes[-1] += "; thermal numbers assumed by mass"
     if any(each.rest is not None and each.rest.move_span is not None for each in looked):
-        notes.append("ranges in brackets: with what no source gives at the ends of its range")
+        notes.append("ranges in brackets: with what is assumed at the ends of its range")
     return notes
 
 

@@ -248,7 +248,7 @@ def notes(sheet: DataSheet) -> list[str]:
         found += [f"guessed of its program: {', '.join(guessed)}"] if guessed else []
     behind = guesses(sheet.model) if not sheet.model.endless else ()
     if behind:
-        found.append(f"ranges in brackets: with {', '.join(behind)}, which no source gives, at the ends of theirs; "
+        found.append(f"ranges in brackets: with {', '.join(behind)}, assumed within a range, at the ends of theirs; "
                      "bandwidths have none")
     slow = slow_rotor(servo)
     found += [slow] if slow is not None else []

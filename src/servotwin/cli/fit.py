@@ -36,6 +36,7 @@ def fit(
     file_format: log_reading.FormatOption = "auto",
     columns: log_reading.ColumnsOption = None,
     joint: log_reading.JointOption = None,
+    raw: log_reading.RegistersOption = None,
     rate: log_reading.RateOption = None,
     commanded: log_reading.CommandedOption = None,
     change: Annotated[list[str] | None, typer.Option(
@@ -123,7 +124,7 @@ def fit(
         "--json", help="Print JSON, in SI units.", rich_help_panel=shared.OUTPUT)] = False,
 ) -> None:
     """Find the parameters of a servo, with intervals."""
-    _check_words(logs, servo, table, report, scheduler, advise=advise, registers=bool(register))
+    _check_words(logs, servo, table, report, scheduler, raw, advise=advise, registers=bool(register))
     if table is not None:
         from servotwin.cli.fit_table import calibrate_from
 
@@ -143,7 +144,7 @@ def fit(
                "diagnose": diagnose, "accuracy": accuracy, "within": within}
     chosen = _options(options)
     given = log_reading.read(logs, file_format, columns, joint, leave_out or [], mend=mend, rate=rate,
-                             commanded=commanded, force=force, quiet=as_json, registers=bool(register),
+                             commanded=commanded, force=force, quiet=as_json, registers=bool(register), raw=raw,
                              model=search.model)
     climbs = _climber(search, asked=bool(free), ladder=ladder, structures=structures, springs=spring)
     found = _run(search, given, chosen, scheduler, climbs)
@@ -172,12 +173,13 @@ class _Found:
 
 
 def _check_words(logs: list[Path] | None, servo: str | None, table: Path | None, report: Path | None,
-                 scheduler: str | None, *, advise: bool, registers: bool) -> None:
+                 scheduler: str | None, raw: str | None, *, advise: bool, registers: bool) -> None:
     from servotwin.errors import InputError
 
     if table is not None:
         for given, what in ((bool(logs), "logs"), (report is not None, "--report"), (advise, "--advise"),
-                            (scheduler is not None, "--scheduler"), (registers, "--register")):
+                            (scheduler is not None, "--scheduler"), (registers, "--register"),
+                            (raw is not None, "--registers")):
             if given:
                 raise InputError("--table", got=f"also {what}", allowed="a table alone; it is calibrated, not fitted")
         return

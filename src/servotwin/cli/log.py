@@ -29,6 +29,7 @@ def log(
     file_format: log_reading.FormatOption = "auto",
     columns: log_reading.ColumnsOption = None,
     joint: log_reading.JointOption = None,
+    registers: log_reading.RegistersOption = None,
     rate: log_reading.RateOption = None,
     commanded: log_reading.CommandedOption = None,
     mend: Annotated[list[str] | None, typer.Option(
@@ -54,7 +55,8 @@ def log(
         _check(files, out, plot, 1, force=force)
     with patience("reading"):
         logs = [one for path in files for one in read_logs(
-            path, file_format, columns=said, joints=",".join(joint) if joint else None, mend=mends, unknown_step=True)]
+            path, file_format, columns=said, joints=",".join(joint) if joint else None, mend=mends, unknown_step=True,
+            registers=registers)]
         targets = _check(files, out, plot, len(logs), force=force)
         found = [survey_of(one) for one in logs]
     written = _write(found, targets, force=force)

@@ -39,6 +39,10 @@ MendOption = Annotated[list[str] | None, typer.Option(
     metavar="KIND", help="What to put right in the logs first, of what is said to be wrong with them: wrap, stamps, "
     f"sign, span, rows, not-followed; and in their files {', '.join(MENDS)}; repeatable or with commas.",
     rich_help_panel=PANEL)]
+RegistersOption = Annotated[str | None, typer.Option(
+    "--registers", metavar="FAMILY|MODEL", help="Whose registers the columns of a table are named after and hold raw: "
+    "feetech-sts, dynamixel-x, -mx, -ax, -xl320, or a model such as XM430-W350 (default: those of the servo, where the "
+    "numbers cannot be degrees).", rich_help_panel=PANEL)]
 RateOption = Annotated[str | None, typer.Option(
     metavar="RATE", help="Rows per second of tables without times, such as 50Hz.", rich_help_panel=PANEL)]
 CommandedOption = Annotated[str | None, typer.Option(
@@ -49,12 +53,12 @@ CommandedOption = Annotated[str | None, typer.Option(
 def read(paths: Sequence[Path], file_format: str, columns: Sequence[str] | None, joints: Sequence[str] | None,
          leave_out: Sequence[str], *, mend: Sequence[str] | None = None, rate: str | None = None,
          commanded: str | None = None, force: bool = False, quiet: bool = False, registers: bool = False,
-         model: Model) -> list[Log]:
+         raw: str | None = None, model: Model) -> list[Log]:
     """Return the logs of files and folders, with commands that count from the middle of the servo's travel.
 
     What was guessed, said or found of columns is shown, unless `quiet`, and what was said or found is written into
     sidecars. Where the user says the registers of the servo (`registers`), those that a dataset's robot has are not
-    assumed.
+    assumed. Columns that are named after registers hold those of the family or model `raw`, else of the servo.
 
     Raises
     ------
@@ -72,14 +76,15 @@ def read(paths: Sequence[Path], file_format: str, columns: Sequence[str] | None,
     mends = fit_words.reading_mends(mend)
     chosen = None if not joints else ",".join(joints)
     with patience("reading"):
-        given = [(path, read_logs(path, file_format, columns=said, joints=chosen, mend=mends)) for path in paths]
+        given = [(path, read_logs(path, file_format, columns=said, joints=chosen, mend=mends,
+                                  registers=raw or model.servo)) for path in paths]
         logs = fit_words.without([log for _, some in given for log in some], windows)
     found = centred(logs, model)
     parts = _parts(logs)
     lines = list(found.sentences)
     rest = iter(found.logs)
     for path, some in given:
-        lines += _kept(some, list(islice(rest, len(some))), path, said=said is not None, force=force)
+        lines += _kept(some, list(islice(rest, len(some))), path, said=_option(said, raw), force=force)
     if (parts or lines) and not quiet:
         show(*parts, *lines, "")
     for line in lines if quiet else ():
@@ -87,12 +92,17 @@ def read(paths: Sequence[Path], file_format: str, columns: Sequence[str] | None,
     return of_no_robot(found.logs) if registers else list(found.logs)
 
 
-def _kept(read: Sequence[Log], found: Sequence[Log], path: Path, *, said: bool, force: bool) -> list[str]:
+def _option(said: str | None, raw: str | None) -> str:
+    """Return the option that said something of columns; empty where none did."""
+    return "--columns" if said is not None else "--registers" if raw is not None else ""
+
+
+def _kept(read: Sequence[Log], found: Sequence[Log], path: Path, *, said: str, force: bool) -> list[str]:
     """Write what was said or found of columns into sidecars, and return what to say of it."""
     from servotwin.errors import InputError, OutputError
     from servotwin.identification import keep_columns
 
-    what = "--columns" if said else "this"
+    what = said or "this"
     try:
         return [f"written  {file}, which keeps {what}" for file in keep_columns(
             found, path if path.is_dir() else None, overwrite=force, instead_of=read)]

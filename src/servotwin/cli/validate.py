@@ -38,6 +38,7 @@ def validate(
     file_format: log_reading.FormatOption = "auto",
     columns: log_reading.ColumnsOption = None,
     joint: log_reading.JointOption = None,
+    raw: log_reading.RegistersOption = None,
     rate: log_reading.RateOption = None,
     commanded: log_reading.CommandedOption = None,
     change: Annotated[list[str] | None, typer.Option(
@@ -70,7 +71,7 @@ def validate(
     changed = servo_of(servo, change or [], register or [], supply)
     found = _run(changed, model, nuisance, sensors, mend, lambda nominal: log_reading.read(
         logs, file_format, columns, joint, leave_out or [], mend=mend, rate=rate, commanded=commanded, force=force,
-        quiet=as_json, registers=bool(register), model=nominal))
+        quiet=as_json, registers=bool(register), raw=raw, model=nominal))
     limits = _limits(found, max_error or [])
     files = _write(found, targets, force=force)
     above = exceeded(found, limits)

@@ -150,7 +150,11 @@ def _plays() -> tuple[Number, ...]:
 
 
 def _frictions() -> tuple[Number, ...]:
-    usual = _stall_share(0.04, 0.3, "4 to 30 % of the stall torque, as the catalog assumes")
+    def usual(patient: Patient) -> Usual:
+        low, high = (0.005, 0.1) if patient.model.servo.sheet.get("registers") == "dynamixel-x" else (0.04, 0.3)
+        return _stall_share(low, high, f"{100.0 * low:g} to {100.0 * high:g} % of the stall torque, as the catalog "
+                            "assumes")(patient)
+
     rubs = _stall_share(0.0, 0.1, "a tenth of the stall torque at most, assumed")
     return (
         Number("friction", "friction", False, friction_now, usual, lambda patient: usual(patient).low, with_friction,

@@ -13,7 +13,8 @@ from servotwin.logs.stamps import stamps_of
 from servotwin.tables import TextTable
 
 _SINCE_1970 = 1e8  # s; times that are larger count from no start of a run
-_CIRCLE = 400.0  # above it no angle of one turn is in degrees
+MOST_DEGREES = 400.0
+"""The largest angle in degrees that is one without being said."""
 _TURN = 7.0  # above it no angle of one turn is in radians
 _PULSES = (300.0, 3000.0)  # us; what receivers send, and servos take, is 500 to 2500
 _STEPS = (5e-4, 0.2)  # s, between samples: one unit of time only puts a step between these
@@ -44,7 +45,7 @@ def guess(table: TextTable, column: str, role: str) -> Guess | None:
                      if sent.size and _PULSES[0] <= by * sent.min() and by * sent.max() <= _PULSES[1]
                      and (role == names.PULSE or name == "us")), None)
     if unit is None and role in (names.COMMAND, names.COMMAND_ANGLE, names.ANGLE):
-        unit = ("angle", "deg") if _TURN < largest <= _CIRCLE else None
+        unit = ("angle", "deg") if _TURN < largest <= MOST_DEGREES else None
     elif role in (names.SUPPLY_CURRENT, names.ARMATURE_CURRENT):
         whole = bool((values == np.round(values)).all())
         unit = ("current", "mA") if largest > 30.0 else None if whole else ("current", "A")
@@ -84,7 +85,7 @@ def are_counts(table: TextTable, column: str) -> bool:
     """Return whether the values of a column look like counts of a converter: whole, none below 0, beyond a turn."""
     values = _values(table, column) if column in table.header else None
     return values is not None and bool((values == np.round(values)).all() and values.min() >= 0.0
-                                       and values.max() > _CIRCLE)
+                                       and values.max() > MOST_DEGREES)
 
 
 def range_of(table: TextTable, column: str) -> str:

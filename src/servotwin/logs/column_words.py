@@ -11,6 +11,7 @@ from servotwin.logs.columns import COMMANDS, NAMES, SWITCH, Column, dimension_of
 from servotwin.logs.stamps import CLOCKS
 from servotwin.units.words import scaled_unit, units_written
 
+SAID = "--columns"
 COMMAND = "command"  # its kind is told by its unit
 SHORT = {"pulse": "pulse_width", "angle": "output_angle", "feedback": "feedback_voltage", "current": "supply_current",
          "voltage": "bus_voltage", "speed": "output_speed"}

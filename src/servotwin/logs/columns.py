@@ -42,6 +42,8 @@ _NANOSECOND = 1e-9
 class Column:
     """Where a file holds a signal, and what its numbers mean: (scale · number + offset) in `unit`.
 
+    Raw numbers of a program's memory may say minus in a bit, or be written without the sign that they had.
+
     Parameters
     ----------
     column : str
@@ -52,6 +54,10 @@ class Column:
         Of raw numbers, such as counts.
     from_first : bool
         Times count from the first row; for stamps that count from 1970.
+    sign_bit : int, optional
+        Bit of the number that says minus, the lower bits the magnitude.
+    bits : int, optional
+        Of a two's complement: numbers of the upper half are negative.
     """
 
     column: str
@@ -59,9 +65,15 @@ class Column:
     scale: float = 1.0
     offset: float = 0.0
     from_first: bool = False
+    sign_bit: int | None = None
+    bits: int | None = None
 
     def to_si(self, values: NDArray[np.float64], name: str) -> NDArray[np.float64]:
         """Return the values of the signal `name` in SI; exact where they are in SI already."""
+        if self.sign_bit is not None:
+            values = np.where(values >= 2.0**self.sign_bit, 2.0**self.sign_bit - values, values)
+        if self.bits is not None:
+            values = np.where(values >= 2.0 ** (self.bits - 1), values - 2.0**self.bits, values)
         if self.scale != 1.0 or self.offset != 0.0:
             values = self.scale * values + self.offset
         if self.unit == "ns":

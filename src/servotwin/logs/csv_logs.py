@@ -24,8 +24,9 @@ from servotwin.logs.log import Log
 from servotwin.logs.mend_names import DROP, SPREAD, TORN
 from servotwin.logs.mends import checked_mends, say, sound, without_text, without_thousands, without_torn
 from servotwin.logs.reading import Reading
+from servotwin.logs.register_columns import raw_registers
 from servotwin.logs.sidecar import FOLDER_FILE, Sidecar, sidecar_of, sidecar_path, sidecar_words
-from servotwin.parameters import write_file
+from servotwin.parameters import Servo, write_file
 from servotwin.tables import TextTable, csv_text, read_table
 from servotwin.tables.text import NUL
 
@@ -74,11 +75,11 @@ def read_csv_log(path: str | Path, *, sidecar: str | Path | None = None,
 
 
 def logs_of(path: Path, *, sidecar: str | Path | None, columns: str | Mapping[str, str] | None,
-            mend: Sequence[str] = (), unknown_step: bool = False) -> list[Log]:
+            mend: Sequence[str] = (), unknown_step: bool = False, registers: str | Servo | None = None) -> list[Log]:
     """Return the logs of a table: one, or where its clock begins again and that is mended as many as there are."""
     mends = checked_mends(mend)
     table, layout, said = read_log_table(path, mends, wanted_columns(columns), sidecar=sidecar,
-                                         unknown_step=unknown_step)
+                                         unknown_step=unknown_step, registers=registers)
     if said.drop_repeated and SPREAD not in mends:
         mends = tuple(dict.fromkeys((*mends, DROP)))
     parts = timed(table, layout.columns[TIME], mends)
@@ -95,7 +96,7 @@ class LogTable(NamedTuple):
 
 def read_log_table(path: Path, mends: Sequence[str], wanted: Mapping[str, Wanted], *,
                    sidecar: str | Path | None = None, needs: Sequence[str] = NEEDS,
-                   unknown_step: bool = False) -> LogTable:
+                   unknown_step: bool = False, registers: str | Servo | None = None) -> LogTable:
     """Read a table as that of a log.
 
     Parameters
@@ -111,6 +112,8 @@ def read_log_table(path: Path, mends: Sequence[str], wanted: Mapping[str, Wanted
         What there has to be: "time", "command", "angle".
     unknown_step : bool
         Whether a command that lacks may be the one step that the angle shows.
+    registers : str or Servo, optional
+        Whose registers columns may be named after: a family, a model, or a servo.
 
     Raises
     ------
@@ -127,7 +130,8 @@ def read_log_table(path: Path, mends: Sequence[str], wanted: Mapping[str, Wanted
         raise InputError(error.what, error.got, f"{error.allowed}; {say(TORN, mends)}") from None
     said = sidecar_of(path, None if sidecar is None else Path(sidecar))
     table = without_thousands(without_text(table), mends)
-    layout = layout_of(sound(table), said.columns, wanted, needs=needs, unknown_step=unknown_step)
+    layout = layout_of(sound(table), said.columns, wanted, needs=needs, unknown_step=unknown_step,
+                       raw=raw_registers(registers))
     table = without_torn(table, layout, mends)
     check_said(table, layout)
     return LogTable(table, layout, said)

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
+from servotwin.logs.column_words import SAID
 from servotwin.logs.columns import UNITS, Column, dimension_of_signal
 from servotwin.logs.defined import is_defined
-from servotwin.logs.layout import SAID
 from servotwin.logs.log_checks import largest_of
 from servotwin.units import from_si
 

@@ -7,17 +7,18 @@ from pathlib import Path
 from typing import Any
 
 from servotwin.errors import InputError
+from servotwin.logs.column_words import SAID
 from servotwin.logs.columns import Column, si_unit_of
 from servotwin.logs.json_file import read_json, write_json
-from servotwin.logs.layout import SAID
 from servotwin.logs.log import Log
+from servotwin.logs.register_columns import OPTION
 from servotwin.logs.sidecar import FOLDER_FILE, FORMAT, column_entries, sidecar_path
 from servotwin.units.words import unit_shown
 
 
 def keep_columns(logs: Sequence[Log], folder: Path | None = None, *, overwrite: bool = False,
                  instead_of: Sequence[Log] = ()) -> list[Path]:
-    """Write what was said of columns (`columns=` of `read_logs`) into sidecars, so that it need not be said again.
+    """Write what was said of columns (`columns=` or `registers=` of `read_logs`) into sidecars, to be said once.
 
     A sidecar that is there keeps all else that it says. The logs of one folder share its `logs.json` if their columns
     are the same ones; else each has a sidecar of its own.
@@ -47,7 +48,8 @@ def keep_columns(logs: Sequence[Log], folder: Path | None = None, *, overwrite: 
         If one cannot be written.
     """
     files = {Path(log.reading.file): dict(log.reading.layout) for log in logs
-             if log.reading is not None and any(one.known == SAID for one in log.reading.columns)}
+             if log.reading is not None and any(
+                 one.known == SAID or one.known.startswith(OPTION) for one in log.reading.columns)}
     before = {sidecar_path(Path(log.reading.file)): dict(log.reading.layout) for log in instead_of
               if log.reading is not None}
     made = {}

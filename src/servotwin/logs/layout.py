@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 from servotwin.errors import InputError, UnitError
 from servotwin.logs import column_names as names
 from servotwin.logs.column_values import Guess, are_counts, guess, is_increasing, range_of
-from servotwin.logs.column_words import COMMAND, SHORT, Wanted, column_said
+from servotwin.logs.column_words import COMMAND, SAID, SHORT, Wanted, column_said
 from servotwin.logs.columns import COMMANDS, SWITCH, TIME, Column, columns_of, dimension_of_signal, si_unit_of
 from servotwin.logs.defined import checked_definition, is_defined
 from servotwin.logs.log import ANGLES
 from servotwin.logs.reading import ReadColumn
+from servotwin.logs.register_columns import RawRegisters, named_after_any, register_columns
 from servotwin.logs.stamps import clock_of
 from servotwin.logs.unknown_step import step_of
 from servotwin.tables import TextTable
@@ -21,7 +22,7 @@ from servotwin.tables.dialect import MISSING
 from servotwin.tables.serial import ARRIVAL
 from servotwin.units.words import COUNTS, unit_shown, units_written
 
-NAMED, SAID, SIDECAR = "named", "--columns", "sidecar"
+NAMED, SIDECAR = "named", "sidecar"
 NEEDS = (TIME, COMMAND, "angle")
 """What a table has to have to be a log."""
 _SHORT = {**{name: short for short, name in SHORT.items()}, TIME: TIME}
@@ -63,12 +64,12 @@ def is_known_name(column: str) -> bool:
 
 
 def layout_of(table: TextTable, sidecar: Mapping[str, Column] | None, wanted: Mapping[str, Wanted], *,
-              needs: Sequence[str] = NEEDS, unknown_step: bool = False) -> Layout:
+              needs: Sequence[str] = NEEDS, unknown_step: bool = False, raw: RawRegisters | None = None) -> Layout:
     """Return which column of a table is which signal.
 
-    What `wanted` says counts before the sidecar, that before the names of `servotwin`; what these leave out is guessed
-    from names, units and values: time, a command and an angle where they lack, currents, voltage and speed if there is
-    one of each.
+    What `wanted` says counts before the sidecar, that before raw registers and the names of `servotwin`; what these
+    leave out is guessed from names, units and values: time, a command and an angle where they lack, currents, voltage
+    and speed if there is one of each.
 
     Parameters
     ----------
@@ -79,6 +80,8 @@ def layout_of(table: TextTable, sidecar: Mapping[str, Column] | None, wanted: Ma
         What there has to be, of `NEEDS`.
     unknown_step : bool
         Whether a command that lacks may be the one step that the angle shows.
+    raw : RawRegisters, optional
+        Whose registers columns may be named after.
 
     Raises
     ------
@@ -95,8 +98,14 @@ def layout_of(table: TextTable, sidecar: Mapping[str, Column] | None, wanted: Ma
             made.pop(other, None)
         made[signal] = (column, SAID)
     if sidecar is None:
+        told = any(name in made for name in COMMANDS)
+        counts = register_columns(table, raw, {column.column for column, _ in made.values()})
+        for signal, held in counts.items():
+            if signal not in made and not (told and signal in COMMANDS):
+                made[signal] = held
+        passed = named_after_any(table) if counts else frozenset()  # whose steps nobody guesses
         taken = {column.column for column, _ in made.values()}
-        others = [name for name in table.header if name not in taken]
+        others = [name for name in table.header if name not in taken and name not in passed]
         told = any(name in made for name in COMMANDS)
         for signal, column in (_named(table, others, made) if table.has_header else {}).items():
             if signal not in made and not (told and signal in COMMANDS):
@@ -104,7 +113,7 @@ def layout_of(table: TextTable, sidecar: Mapping[str, Column] | None, wanted: Ma
         if made.get(TIME, (None, ""))[1] == NAMED and made[TIME][0].column == TIME and not table.units and not (
                 any(name in made for name in COMMANDS) and any(name in made for name in ANGLES)):
             del made[TIME]  # among foreign names it is one of them, and need not be in seconds
-        _guess_rest(table, made, needs, unknown_step=unknown_step)
+        _guess_rest(table, made, needs, passed, unknown_step=unknown_step)
     _check(table, made, needs)
     shown = tuple(ReadColumn(column.column, signal, "" if signal == SWITCH else unit_shown(
         column.unit, column.scale, column.offset), known)
@@ -180,14 +189,14 @@ def _below(table: TextTable, column: str) -> str:
     return table.units[table.header.index(column)] if table.units else ""
 
 
-def _guess_rest(table: TextTable, made: dict[str, tuple[Column, str]], needed: Sequence[str], *,
+def _guess_rest(table: TextTable, made: dict[str, tuple[Column, str]], needed: Sequence[str], passed: Container[str], *,
                 unknown_step: bool) -> None:
-    """Add what is not known yet and can be guessed."""
+    """Add what is not known yet and can be guessed, but of columns that are passed over."""
     taken = {column.column for column, _ in made.values()}
     found: list[tuple[str, names.Meaning]] = []
     for name in dict.fromkeys(table.header if table.has_header else ()):
         meaning = names.meaning_of(name, _below(table, name))
-        if name not in taken and meaning is not None:
+        if name not in taken and name not in passed and meaning is not None:
             table.cells(name)  # raises where the header has it twice
             found.append((name, meaning))
     needs = {TIME: TIME not in made, COMMAND: not any(name in made for name in COMMANDS),

@@ -13,6 +13,7 @@ from servotwin.logs.log import Log
 from servotwin.logs.mends import checked_mends
 from servotwin.logs.name_values import values_in
 from servotwin.logs.sidecar import FOLDER_FILE, FORMAT, patterns_of
+from servotwin.parameters import Servo
 from servotwin.signals.time_base import warn_of_time_base
 
 _CSV_ENDINGS = (".csv", ".tsv")
@@ -20,7 +21,7 @@ _CSV_ENDINGS = (".csv", ".tsv")
 
 def read_logs(path: str | Path, format: str = "auto", *, sidecar: str | Path | None = None,
               columns: str | Mapping[str, str] | None = None, joints: str | Mapping[str, str] | None = None,
-              mend: Sequence[str] = (), unknown_step: bool = False) -> list[Log]:
+              mend: Sequence[str] = (), unknown_step: bool = False, registers: str | Servo | None = None) -> list[Log]:
     r"""Return the logs in a file or folder, in the order of the file names.
 
     Parameters
@@ -42,6 +43,10 @@ def read_logs(path: str | Path, format: str = "auto", *, sidecar: str | Path | N
         "clock16", "thousands".
     unknown_step : bool
         Whether the command of a table without one may be the one step that its angle shows.
+    registers : str or Servo, optional
+        Whose registers the columns of tables are named after where they hold raw numbers: a family such as
+        ``"feetech-sts"``, a model such as ``"XM430-W350"``, or the servo itself, of which only what cannot be degrees
+        is taken for counts.
 
     Raises
     ------
@@ -72,11 +77,14 @@ def read_logs(path: str | Path, format: str = "auto", *, sidecar: str | Path | N
             if columns is not None:
                 raise InputError(f"--columns for {path}", got=f"a dataset ({name})",
                                  allowed="--joint (joints=), which says the units of its joints")
+            if isinstance(registers, str):
+                raise InputError(f"--registers for {path}", got=f"a dataset ({name})", allowed="tables")
             return list(dataset.room.logs_of(path, joints=joints))
     if joints is not None:
         raise InputError(f"--joint for {path}", got="no dataset", allowed="--columns (columns=) for tables")
     files = _files(path, format) if _is_folder(path) else [path]
-    given = {"sidecar": sidecar, "columns": columns, "mend": mends, "unknown_step": unknown_step}
+    given = {"sidecar": sidecar, "columns": columns, "mend": mends, "unknown_step": unknown_step,
+             "registers": registers}
     logs = [log for file in files for log in _logs(file, format, given, alone=file is path)]
     if not logs:
         raise InputError(f"{path}", got="a folder without logs", allowed="*.csv, *.json of a known format ("
@@ -117,8 +125,9 @@ def _logs(file: Path, format: str, given: Mapping[str, Any], *, alone: bool) -> 
     name = "csv" if format == "auto" and not _is_json(file) else format
     if name != "auto" and LOG_FORMATS[name].holds == "table":
         return list(LOG_FORMATS[name].room.logs_of(file, **given))
-    if alone and given["columns"] is not None:
-        raise InputError(f"--columns for {file}", got="JSON", allowed="tables; JSON says what it holds")
+    for said in ("columns", "registers"):
+        if alone and isinstance(given[said], str | Mapping):
+            raise InputError(f"--{said} for {file}", got="JSON", allowed="tables; JSON says what it holds")
     content: Any = read_json(file)
     if name != "auto":
         return list(LOG_FORMATS[name].room.logs_of(file, content))

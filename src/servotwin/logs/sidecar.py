@@ -23,7 +23,9 @@ _TEXTS = ("name", "motion", "source")
 _KEYS = (*_TEXTS, "conditions", "load", "parameters", "leave_out", "command_hold", "command", "columns",
          "drop_repeated", "recorded")
 _MERGED = ("conditions", "parameters")  # entry by entry, where folder and file both speak
-_COLUMN_KEYS = ("column", "unit", "scale", "offset")
+_SIGNS = ("sign_bit", "bits")
+_COLUMN_KEYS = ("column", "unit", "scale", "offset", *_SIGNS)
+_MOST_BITS = 64
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -193,8 +195,13 @@ def _column(what: str, name: str, entry: object) -> Column:
     for key in ("scale", "offset"):
         if not is_finite(entry.get(key, 1.0)) or (key == "scale" and entry.get(key, 1.0) == 0.0):
             raise InputError(f"{what}, {key}", got=entry[key], allowed="a finite number" + ", not 0" * (key == "scale"))
+    for key in _SIGNS:
+        number = entry.get(key, 1)
+        if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= _MOST_BITS:
+            raise InputError(f"{what}, {key}", got=number, allowed=f"a whole number from 1 to {_MOST_BITS}")
     unit = check_unit(f"{what}, unit", entry.get("unit", si_unit_of(name)), name)
-    return Column(column, unit, float(entry.get("scale", 1.0)), float(entry.get("offset", 0.0)), from_first)
+    return Column(column, unit, float(entry.get("scale", 1.0)), float(entry.get("offset", 0.0)), from_first,
+                  entry.get("sign_bit"), entry.get("bits"))
 
 
 def column_entries(columns: Mapping[str, Column]) -> dict[str, dict[str, Any]]:
@@ -216,6 +223,8 @@ def column_entries(columns: Mapping[str, Column]) -> dict[str, dict[str, Any]]:
             entry["offset"] = column.offset
         if column.from_first:
             entry["from_first"] = True
+        entry |= {key: value for key, value in zip(_SIGNS, (column.sign_bit, column.bits), strict=True)
+                  if value is not None}
         made[name] = entry
     return made
 

@@ -9,9 +9,9 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from servotwin.identification.sheets.motor_range import (
-    FINE_CURRENT_RATIOS,
     FINE_DROPS,
     completed,
+    current_ratios,
     motor_range,
     no_load_current_is_known,
     stall_current_is_known,
@@ -136,7 +136,7 @@ def _efficiency(sheet: Sheet, point: SheetPoint) -> Iterator[Contradiction]:
     if I_s is None:
         return
     filled = completed(sheet, 0.0, (point,))[0].no_load_current
-    ratios = [ratio * I_s for ratio in (0.0, *FINE_CURRENT_RATIOS)]
+    ratios = [ratio * I_s for ratio in (0.0, *current_ratios(sheet))]
     currents = [point.no_load_current] if point.no_load_current is not None else (
         ratios if filled is None else [0.0, min(filled, 0.9 * I_s)])
     found = [_Needed(float(sheet_efficiency(point.supply_voltage, float(point.stall_torque or 0.0), float(

@@ -24,6 +24,13 @@ DROPS, EFFICIENCIES, CURRENT_RATIOS = (0.4, 0.2, 0.0), (0.8, 0.7, 0.9), (0.12, 0
 # Where a stall current tells the efficiency some of them are impossible, and the border has to be found
 FINE_DROPS = tuple(0.01 * n for n in range(40, -1, -5))
 FINE_CURRENT_RATIOS = (0.12, 0.1, 0.08, 0.06, 0.04, *(0.01 * n for n in range(14, 31)))
+# The same of Dynamixel's X series, whose pages print no current without load: 2 %, 0.5 to 10 %. So much makes the
+# Coulomb friction that was identified: 0.5 % of an XC330, 0.7 % of an XC430, 1.2 % of an XM430-W210, 2.2 % of an
+# XM430-W350, 4 % of a 2XL430 (ToddlerBot, toddlerbot/descriptions/default.yml, frictionloss; github.com/tjacobs/
+# toddlerbot, 84e02d1), 0.6 % of the XM430-W350 of a ROBOTIS OP3 (github.com/google-deepmind/mujoco_menagerie,
+# robotis_op3/op3.xml, 361161b). 10 % is the largest current at no torque of the first file: 0.088 A of an XC330
+X_CURRENT_RATIOS = (0.02, 0.005, 0.1)
+FINE_X_CURRENT_RATIOS = (0.02, 0.015, 0.01, 0.0075, 0.005, *(0.01 * n for n in range(3, 11)))
 _MOST_STEPS = 50
 
 
@@ -154,6 +161,21 @@ def no_load_current_is_known(sheet: Sheet) -> bool:
     return any(point.no_load_current is not None for point in sheet.own)
 
 
+def current_ratios(sheet: Sheet) -> tuple[float, ...]:
+    """Return what is assumed of the no-load over the stall current where none is printed, the likelier first.
+
+    Examples
+    --------
+    >>> point = SheetPoint(supply_voltage=12.0, stall_torque=4.1, no_load_speed=4.817)
+    >>> current_ratios(Sheet(name="a", points=(point,), modulation="bus", registers="dynamixel-x"))
+    (0.02, 0.005, 0.1)
+    """
+    fine = stall_current_is_known(sheet)
+    if sheet.registers == "dynamixel-x":
+        return FINE_X_CURRENT_RATIOS if fine else X_CURRENT_RATIOS
+    return FINE_CURRENT_RATIOS if fine else CURRENT_RATIOS
+
+
 def completed(sheet: Sheet, drop: float, points: Sequence[SheetPoint]) -> tuple[SheetPoint, ...]:
     """Return points with the currents that are printed at another voltage only.
 
@@ -189,7 +211,7 @@ def _assumptions(sheet: Sheet) -> Iterator[_Assumed]:
     """Yield the combinations of what the sheet leaves open, the likelier ones first."""
     fine = stall_current_is_known(sheet)
     efficiencies = (None,) if fine else EFFICIENCIES
-    ratios = (None,) if no_load_current_is_known(sheet) else FINE_CURRENT_RATIOS if fine else CURRENT_RATIOS
+    ratios = (None,) if no_load_current_is_known(sheet) else current_ratios(sheet)
     # A lower drop is the smaller step away from what is likely: it goes before another current
     for ratio, efficiency, drop in itertools.product(ratios, efficiencies, FINE_DROPS if fine else DROPS):
         yield _Assumed(drop=drop, efficiency=efficiency, ratio=ratio)

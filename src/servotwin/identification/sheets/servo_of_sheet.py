@@ -18,7 +18,7 @@ from servotwin.identification.sheets.contradictions import (
     torque_question,
 )
 from servotwin.identification.sheets.firmware_of_sheet import digital_firmware
-from servotwin.identification.sheets.motor_range import MotorRange, Range, motor_range
+from servotwin.identification.sheets.motor_range import MotorRange, Range, current_ratios, motor_range
 from servotwin.identification.sheets.rotor import assumed_inertia, rotor_source
 from servotwin.identification.sheets.sheet import Sheet
 from servotwin.identification.sheets.sheet_file import sheet_table
@@ -61,7 +61,9 @@ class _Made:
         if not m.efficiency_from_sheet:
             text += ", gear efficiency 0.8 assumed (0.7 to 0.9)"
         if not m.current_from_sheet:
-            text += ", no-load current assumed (4 to 30 % of the stall current)"
+            ratios = current_ratios(self.sheet)
+            text += (f", no-load current assumed ({100.0 * min(ratios):g} to {100.0 * max(ratios):g} % of the stall "
+                     "current)")
         if self.sheet.others:
             text += "; range over other sources too"
         return text if m.possible else f"{text}; the sheet contradicts itself"

@@ -10,7 +10,7 @@ from servotwin.errors import ParameterError
 from servotwin.parameters.catalog import load_servo
 from servotwin.parameters.registers.dynamixel_one_models import AX_MODELS, MX_MODELS, OneModel
 from servotwin.parameters.registers.model import model_for
-from servotwin.parameters.registers.register import Register
+from servotwin.parameters.registers.register import Register, laid
 from servotwin.parameters.registers.table import Family, Given, Raw, Setting, on, set_registers
 from servotwin.parameters.servo import Servo
 
@@ -20,6 +20,8 @@ _DEG = math.pi / 180.0
 _GUESS = "assumed"
 _BITS = (0, 2, 5)  # of Shutdown: voltage, heat, load
 _SLOPES = (2, 4, 8, 16, 32, 64, 128)  # what the servo takes a compliance slope for, each up to the next
+# Positions of an MX may lie below 0, in its mode of several turns
+_POSITIONS = dict.fromkeys(("Goal_Position", "Present_Position"))
 _OTHER_NAMES = {"Alarm_Shutdown": "Shutdown", "Goal_Speed": "Moving_Speed"}
 
 
@@ -52,7 +54,15 @@ def _common(last: int, *, temperature: int) -> dict[str, Register]:
     }
 
 
-MX_REGISTERS: dict[str, Register] = {
+def _told(registers: dict[str, Register], signs: dict[str, int | None]) -> dict[str, Register]:
+    """Return registers with the units and signs of what the servo tells, as its page has them."""
+    return laid(registers, sizes={2: "Goal_Position Present_Position Present_Speed Present_Load"},
+                signs={"Present_Speed": 10, "Present_Load": 10, **signs},
+                units={"count": "Goal_Position Present_Position", "0.1 V": "Present_Voltage",
+                       "°C": "Present_Temperature"})
+
+
+MX_REGISTERS: dict[str, Register] = _told({
     "P_Gain": Register(28, 1, 254, 32, why="without P the servo does not control its angle"),
     "I_Gain": Register(27, 0, 254, 0),
     "D_Gain": Register(26, 0, 254, 0),
@@ -66,15 +76,15 @@ MX_REGISTERS: dict[str, Register] = {
     "Realtime_Tick": Register(50, 0, 32767, 0, reading=True),
     "Current": Register(68, 0, 4095, 0, reading=True),
     "Goal_Torque": Register(71, 0, 2047, 0),
-}
-AX_REGISTERS: dict[str, Register] = {
+}, _POSITIONS)
+AX_REGISTERS: dict[str, Register] = _told({
     "CW_Compliance_Margin": Register(26, 0, 255, 1),
     "CCW_Compliance_Margin": Register(27, 0, 255, 1),
     "CW_Compliance_Slope": Register(28, 0, 254, 32),
     "CCW_Compliance_Slope": Register(29, 0, 254, 32),
     "Punch": Register(48, 0, 1023, 32),
     **_common(1023, temperature=70),
-}
+}, {})
 _MARGINS = ("CW_Compliance_Margin", "CCW_Compliance_Margin")
 _COMPLIANCE = ("CW_Compliance_Slope", "CCW_Compliance_Slope")
 
@@ -212,7 +222,7 @@ def _slope(raw: Raw) -> int:
 
 
 _MX_GAIN = 4.0 / math.pi  # duty per rad and unit of the manual's K_p = P/8
-_AX_COUNT = 300.0 / 1023.0 * _DEG
+_MX_COUNT, _AX_COUNT = 2.0 * math.pi / 4096.0, 300.0 / 1023.0 * _DEG
 _MX_SETTINGS = (
     Setting("proportional_gain", lambda raw, _: raw["P_Gain"] / (2.0 * math.pi), ("P_Gain",),
             "P/(2 pi) of duty a radian, as an oscilloscope showed the authors of BAM"),
@@ -240,9 +250,10 @@ def mx_family_of(servo: Servo, number: int = 0) -> Family:
 def mx_family(model: OneModel) -> Family:
     """Return the registers of a model of the MX series."""
     return Family(
-        label="Dynamixel MX", model=model.name, reference=model.document, registers=model.registers(MX_REGISTERS),
+        label="Dynamixel MX", model=model.name, reference=model.document, count=_MX_COUNT, middle=2048,
+        registers=model.registers(MX_REGISTERS),
         assumed=model.unseen(MX_REGISTERS), masks=("Shutdown",),
-        settings=(*_MX_SETTINGS, *shared_settings(2.0 * math.pi / 4096.0, 4095, model.speed_unit * _RPM)),
+        settings=(*_MX_SETTINGS, *shared_settings(_MX_COUNT, 4095, model.speed_unit * _RPM)),
         other_names=_OTHER_NAMES, copied={"Torque_Limit": "Max_Torque"},
         check=lambda raw: check_limits("Dynamixel MX", 4095, raw))
 
@@ -255,7 +266,8 @@ def ax_family_of(servo: Servo, number: int = 0) -> Family:
 def ax_family(model: OneModel) -> Family:
     """Return the registers of a model of the AX series."""
     return Family(
-        label="Dynamixel AX", model=model.name, reference=model.document, registers=model.registers(AX_REGISTERS),
+        label="Dynamixel AX", model=model.name, reference=model.document, count=_AX_COUNT, middle=512,
+        registers=model.registers(AX_REGISTERS),
         assumed=model.unseen(AX_REGISTERS), masks=("Shutdown",),
         settings=(*_AX_SETTINGS, *shared_settings(_AX_COUNT, 1023, model.speed_unit * _RPM)),
         other_names=_OTHER_NAMES, copied={"Torque_Limit": "Max_Torque"}, pairs=(_MARGINS, _COMPLIANCE),

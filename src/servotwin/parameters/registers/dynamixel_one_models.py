@@ -31,6 +31,7 @@ def _one(name: str, number: int, place: str, speed_unit: float, *, seen: bool = 
         name=name, number=number, speed_unit=speed_unit, assumed=frozenset(_SPEED) | unprinted,
         document=f"e-manual of the {name}, control table" if seen else "",
         page=f"https://emanual.robotis.com/docs/en/dxl/{place}/{name.lower()}/" if seen else "",
+        units=dict.fromkeys(("Moving_Speed", "Present_Speed"), f"{speed_unit:g} rpm"),
         values={"Model_Number": number, **values})
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from servotwin.errors import ParameterError
 from servotwin.parameters.catalog import load_servo
-from servotwin.parameters.registers.dynamixel_x_models import OF_CURRENT, OF_SLOPE, X_MODELS, XModel
+from servotwin.parameters.registers.dynamixel_x_models import MANUAL, OF_CURRENT, OF_SLOPE, X_MODELS, XModel
 from servotwin.parameters.registers.model import model_for
 from servotwin.parameters.registers.register import Register, laid
 from servotwin.parameters.registers.table import Family, Given, Raw, Setting, on, set_registers
@@ -24,6 +24,9 @@ _SPEED, _ACCELERATION = SPEED * _RPM, 214.577 * _RPM / 60.0  # rad/s and rad/s2 
 _GUESS = "assumed"
 _POSITION, _TURNS, _BY_CURRENT = 3, 4, 5
 _by_voltage, _by_heat, _by_load = on(0, "Shutdown"), on(2, "Shutdown"), on(5, "Shutdown")
+# Divisors of P up to which the range goes, assumed: of a model whose page was read, beyond the 141 of an MX-64(2.0) and
+# the 147 of an MX-106(2.0), which were measured; of one that is not told, that of an XL330
+_MOST, _MOST_OF_ANY = 150.0, 256.0
 _NO_SCALE = "the scale of the feed-forward is not published; set firmware.velocity_feedforward and the like instead"
 _FEEDBACK = tuple((name, address) for name, address in (
     ("Model_Information", 2), ("Firmware_Version", 6), ("Hardware_Error_Status", 70), ("Goal_Velocity", 104),
@@ -146,7 +149,8 @@ def x_family(model: XModel) -> Family:
     settings = tuple(setting for setting in (*_control(model), *_LIMITS, *_TRIPS)
                      if not lacking & set(setting.registers))
     return Family(
-        label="Dynamixel X", model=model.name, reference=model.document, registers=model.registers(REGISTERS),
+        label="Dynamixel X", model=model.name, reference=model.document, count=_COUNT, middle=_MIDDLE,
+        current_sense=model.current_sense, registers=model.registers(REGISTERS),
         assumed=model.unseen(REGISTERS), masks=("Shutdown",), settings=settings,
         other_names={"Secondary_Shadow_ID": "Secondary_ID"},
         copied={"Goal_PWM": "PWM_Limit", **({"Goal_Current": "Current_Limit"} if model.current_unit else {})},
@@ -172,22 +176,34 @@ def _goal(name: str, register: str) -> Setting:
                    (register, "Operating_Mode"), "angle 0 at count 2048; mode 4 turns without end")
 
 
+def _sureness(model: XModel) -> tuple[str, tuple[float, float]]:
+    """Return how the divisor of P is known, and the ends of the range over the gain that it makes."""
+    if model.measured:
+        return "as recordings of an XL330 show; the manual says 128", (1.0, 1.0)
+    if model.divisor != MANUAL:
+        return "as of the XL330; the manual says 128", (1.0, model.divisor / MANUAL)
+    most = _MOST if model.document else _MOST_OF_ANY
+    return f"as the manual says; {MANUAL:g} to {most:g}", (MANUAL / most, 1.0)
+
+
 def _control(model: XModel) -> tuple[Setting, ...]:
     unit, slope = model.current_unit or 0.0, model.slope_unit or 0.0
+    divisor, scale = model.divisor, model.divisor / MANUAL  # the manual's: 128 of P, 65536 of I, 16 of D
+    said, factors = _sureness(model)
     return (
         Setting("control_period", lambda raw, _: _TICK, said="a guess", origin=_GUESS, bounds=(5e-4, 2e-3)),
         Setting("compute_delay", lambda raw, _: 0.0, said="a guess", origin=_GUESS, bounds=(0.0, _TICK)),
         Setting("angle_quantum", lambda raw, _: _COUNT, said="4096 counts a turn"),
         Setting("filter_weight", lambda raw, _: 1.0, said="a guess: no filter", origin=_GUESS, bounds=(0.2, 1.0)),
-        Setting("proportional_gain", lambda raw, _: raw["Position_P_Gain"] / (256.0 * FULL * _COUNT),
-                ("Position_P_Gain",), "P/256 steps of PWM a count, " + (
-                    "as recordings of an XL330 show; the manual says 128" if model.measured else
-                    "as of the XL330; the manual says 128"),
-                *(() if model.measured else (_GUESS, (1.0, 2.0)))),
-        Setting("integral_gain", lambda raw, _: raw["Position_I_Gain"] / (2.0 * 65536.0 * FULL * _COUNT * _TICK),
-                ("Position_I_Gain",), "I/131072 steps of PWM a count and tick, a guess", _GUESS, (0.5, 2.0)),
-        Setting("derivative_gain", lambda raw, _: raw["Position_D_Gain"] * _TICK / (32.0 * FULL * _COUNT),
-                ("Position_D_Gain",), "D/32 steps of PWM a count in a tick, a guess", _GUESS, (0.5, 2.0)),
+        Setting("proportional_gain", lambda raw, _: raw["Position_P_Gain"] / (divisor * FULL * _COUNT),
+                ("Position_P_Gain",), f"P/{divisor:g} steps of PWM a count, {said}",
+                *(() if model.measured else (_GUESS, factors))),
+        Setting("integral_gain", lambda raw, _: raw["Position_I_Gain"] / (scale * 65536.0 * FULL * _COUNT * _TICK),
+                ("Position_I_Gain",), f"I/{scale * 65536.0:.0f} steps of PWM a count and tick, a guess", _GUESS,
+                (0.5, 2.0)),
+        Setting("derivative_gain", lambda raw, _: raw["Position_D_Gain"] * _TICK / (scale * 16.0 * FULL * _COUNT),
+                ("Position_D_Gain",), f"D/{scale * 16.0:g} steps of PWM a count in a tick, a guess", _GUESS,
+                (0.5, 2.0)),
         Setting("duty_quantum", lambda raw, _: 1.0 / FULL, said="PWM in 885 steps"),
         Setting("command_kind", lambda raw, _: "goal", ("Operating_Mode",), "goals on the bus"),
         Setting("current_limit", lambda raw, _: raw["Goal_Current"] * unit

@@ -11,6 +11,9 @@ _OLD = ("Acceleration_Limit",)  # firmware of today has none
 _LATER = (*_OLD, "Startup_Configuration")  # not in the versions of these pages that were read
 _VOLTS = {"v5": (31, 70), "v12": (55, 140), "xl": (60, 140), "xc": (60, 160), "x": (95, 160), "24V": (110, 300)}
 # lowest and highest of both voltage limits [0.1 V], by what shares them
+MANUAL = 128.0
+"""Divisor of Position_P_Gain to PWM steps a count, as the e-manual prints it for all models."""
+_XL330 = 256.0  # as recordings of an XL330 show: github.com/Rhoban/bam, bam/dynamixel/actuator.py, XL330_KP_DIVISOR
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,20 +28,23 @@ class XModel(RegisterModel):
         Where it senses its current.
     slope_unit : float, optional
         Of PWM_Slope [V/s]; None: it has none.
+    divisor : float
+        Of Position_P_Gain to PWM steps a count; those of the other two gains go with it.
     measured : bool
-        Whether the scale of its P was measured.
+        Whether it was measured.
     """
 
     current_unit: float | None = None
     current_sense: str = "motor"
     slope_unit: float | None = None
+    divisor: float = MANUAL
     measured: bool = False
 
 
 def _x(name: str, number: int, volts: tuple[str, int, int], speed: int, velocity: tuple[int, int],
        position: tuple[int, int, int], *, page: str = "", current: tuple[int, float] | None = None, heat: int = 80,
        slope: tuple[int, float] | None = None, speeds: int = 1023, assumed: tuple[str, ...] = _OLD,
-       shutdown: int = 52, threshold: int = 10, seen: bool = True,
+       shutdown: int = 52, threshold: int = 10, seen: bool = True, divisor: float = MANUAL,
        measured: bool = False) -> XModel:
     """Return a model.
 
@@ -76,9 +82,11 @@ def _x(name: str, number: int, volts: tuple[str, int, int], speed: int, velocity
     return XModel(
         name=name, number=number, document=f"e-manual of the {name}, control table" if seen else "",
         page=f"https://emanual.robotis.com/docs/en/dxl/{last}/" if seen else "", values=values, ranges=ranges,
+        units={} if current is None else dict.fromkeys(OF_CURRENT, f"{1e3 * current[1]:.4g} mA"),
         lacks=frozenset((*(() if current else OF_CURRENT), *(() if slope else OF_SLOPE))),
         assumed=frozenset(assumed), current_unit=None if current is None else current[1],
-        current_sense="bus" if slope else "motor", slope_unit=None if slope is None else slope[1], measured=measured)
+        current_sense="bus" if slope else "motor", slope_unit=None if slope is None else slope[1], divisor=divisor,
+        measured=measured)
 
 
 _XL330_CURRENT, _XC330_CURRENT, _XC330_T_CURRENT = (1750, 1e-3), (2352, 1e-3), (910, 1e-3)
@@ -87,19 +95,19 @@ X_MODELS = (
     _x("XM430-W350", 1020, ("x", 160, 95), 200, (1920, 100), (0, 0, 800), current=(1193, 2.69e-3), assumed=_LATER),
     _x("XM430-W210", 1030, ("x", 160, 95), 330, (1920, 100), (0, 0, 800), current=(1193, 2.69e-3)),
     _x("XL330-M288", 1200, ("v5", 70, 35), 445, (1600, 180), (0, 0, 400), current=_XL330_CURRENT, heat=70, speeds=2047,
-       slope=(140, 1.977), shutdown=53, measured=True),
+       slope=(140, 1.977), shutdown=53, divisor=_XL330, measured=True),
     _x("XL330-M077", 1190, ("v5", 70, 35), 1620, (400, 40), (0, 400, 400), current=_XL330_CURRENT, heat=70,
-       speeds=2047, slope=(140, 1.977), shutdown=53, measured=True),
+       speeds=2047, slope=(140, 1.977), shutdown=53, divisor=_XL330, measured=True),
     _x("XC330-M288", 1240, ("v5", 70, 35), 350, (1600, 50), (500, 0, 1100), current=_XC330_CURRENT, heat=70,
-       speeds=2047, slope=(140, 1.977)),
+       speeds=2047, slope=(140, 1.977), divisor=_XL330),
     _x("XC330-M181", 1230, ("v5", 70, 35), 545, (1400, 100), (500, 0, 1200), current=_XC330_CURRENT, heat=70,
-       speeds=2047, slope=(140, 1.977)),
+       speeds=2047, slope=(140, 1.977), divisor=_XL330),
     _x("XC330-T288", 1220, ("v12", 140, 55), 320, (1200, 40), (0, 0, 900), current=_XC330_T_CURRENT, heat=70,
-       speeds=2047, slope=(255, 3.955)),
+       speeds=2047, slope=(255, 3.955), divisor=_XL330),
     _x("XC330-T181", 1210, ("v12", 140, 55), 510, (1200, 40), (0, 0, 900), current=_XC330_T_CURRENT, heat=70,
-       speeds=2047, slope=(255, 3.955)),
+       speeds=2047, slope=(255, 3.955), divisor=_XL330),
     _x("XL430-W250", 1060, ("xl", 140, 60), 265, (1000, 100), (4000, 0, 640), heat=72),
-    _x("2XL430-W250", 1090, ("xl", 140, 60), 265, (1000, 100), (4000, 0, 640), heat=72, seen=False),
+    _x("2XL430-W250", 1090, ("xl", 140, 60), 250, (1800, 100), (2000, 0, 640), heat=72, assumed=_LATER),
     _x("XC430-W150", 1070, ("xc", 160, 60), 460, (1920, 100), (0, 0, 460), threshold=20),
     _x("XC430-W240", 1080, ("xc", 160, 60), 306, (1920, 100), (0, 0, 700)),
     _x("2XC430-W250", 1160, ("xc", 160, 60), 306, (1920, 100), (0, 0, 700), seen=False),

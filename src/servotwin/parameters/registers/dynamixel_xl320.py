@@ -11,7 +11,7 @@ from pathlib import Path
 from servotwin.parameters.catalog import load_servo
 from servotwin.parameters.registers.dynamixel_one import check_limits, shared_settings
 from servotwin.parameters.registers.model import RegisterModel
-from servotwin.parameters.registers.register import Register
+from servotwin.parameters.registers.register import Register, laid
 from servotwin.parameters.registers.table import Family, Given, Setting, set_registers
 from servotwin.parameters.servo import Servo
 
@@ -22,7 +22,7 @@ _GAIN = 0.05048199  # duty per rad and unit of P
 _FEEDBACK = (("Firmware_Version", 2), ("Goal_Position", 30), ("Present_Position", 37), ("Present_Speed", 39),
              ("Present_Load", 41), ("Present_Voltage", 45), ("Present_Temperature", 46),
              ("Registered_Instruction", 47), ("Moving", 49), ("Hardware_Error_Status", 50))
-REGISTERS: dict[str, Register] = {
+REGISTERS: dict[str, Register] = laid({
     "P_Gain": Register(29, 1, 254, 32, why="without P the servo does not control its angle"),
     "I_Gain": Register(28, 0, 254, 0),
     "D_Gain": Register(27, 0, 254, 0),
@@ -46,7 +46,10 @@ REGISTERS: dict[str, Register] = {
     "Torque_Enable": Register(24, 0, 1, 0),
     "LED": Register(25, 0, 7, 0),
     **{name: Register(address, 0, 65535, 0, reading=True) for name, address in _FEEDBACK},
-}
+}, sizes={2: "Goal_Position Present_Position Present_Speed Present_Load"}, signs={
+    "Present_Speed": 10, "Present_Load": 10}, units={
+    "count": "Goal_Position Present_Position", f"{_SPEED} rpm": "Moving_Speed Present_Speed",
+    "0.1 V": "Present_Voltage", "°C": "Present_Temperature"})
 XL320_MODELS = (RegisterModel(
     name="XL-320", number=350, document="e-manual of the XL-320, control table",
     page="https://emanual.robotis.com/docs/en/dxl/x/xl320/", assumed=frozenset({"Moving_Speed"})),)
@@ -96,7 +99,8 @@ def family_of(servo: Servo) -> Family:
 def xl320_family(model: RegisterModel) -> Family:
     """Return the registers of the model."""
     return Family(
-        label="Dynamixel XL320", model=model.name, reference=model.document, registers=model.registers(REGISTERS),
+        label="Dynamixel XL320", model=model.name, reference=model.document, count=_COUNT, middle=(_LAST + 1) // 2,
+        registers=model.registers(REGISTERS),
         assumed=model.unseen(REGISTERS), masks=("Shutdown",), copied={"Torque_Limit": "Max_Torque"},
         settings=(*_CONTROL, *shared_settings(_COUNT, _LAST, _SPEED * _RPM, _BITS)),
         check=lambda raw: check_limits("Dynamixel XL320", _LAST, raw))

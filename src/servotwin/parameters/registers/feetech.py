@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from servotwin.errors import ParameterError
@@ -12,7 +13,7 @@ from servotwin.parameters.registers.feetech_models import STS_MODELS, StsModel
 from servotwin.parameters.registers.model import model_for
 from servotwin.parameters.registers.register import Register, laid
 from servotwin.parameters.registers.sets import LEROBOT_SETS
-from servotwin.parameters.registers.table import Family, Given, Raw, Setting, on, set_registers
+from servotwin.parameters.registers.table import Family, Given, Raw, Setting, on, set_registers, written
 from servotwin.parameters.servo import Servo
 
 _COUNT = 2.0 * math.pi / 4096.0  # rad
@@ -143,13 +144,24 @@ def family_of(servo: Servo, number: int = 0) -> Family:
     return sts_family(model_for(STS_MODELS, servo, number, REGISTERS))
 
 
+def family_as_set(servo: Servo) -> Family:
+    """Return the registers of a servo with the step of its speeds: 50 counts/s where bit 2 of its Phase is not set."""
+    family = family_of(servo)
+    if _in_counts(written(family, servo)):
+        return family
+    return replace(family, registers={name: replace(one, unit="50 count/s") if one.unit == "count/s" else one
+                                      for name, one in family.registers.items()})
+
+
 def sts_family(model: StsModel) -> Family:
     """Return the registers of a model."""
     return Family(
-        label="Feetech STS", model=model.name, reference=model.document, registers=model.registers(REGISTERS),
+        label="Feetech STS", model=model.name, reference=model.document, count=_COUNT, middle=_MIDDLE,
+        registers=model.registers(REGISTERS),
         assumed=model.unseen(REGISTERS), elsewhere=model.elsewhere, masks=(_MASK,), sets=LEROBOT_SETS,
         settings=(*_CONTROL, *_profile(model), *_trips(model)),
-        other_names={"Hts": "Minimum_Velocity_Limit", "Moving_Velocity": "Moving_Velocity_Threshold"},
+        other_names={"Hts": "Minimum_Velocity_Limit", "Moving_Velocity": "Moving_Velocity_Threshold",
+                     "Goal_Speed": "Goal_Velocity", "Present_Speed": "Present_Velocity"},
         copied={"Torque_Limit": "Max_Torque_Limit"}, pairs=(("CW_Dead_Zone", "CCW_Dead_Zone"),), check=_check,
         served=_SERVED)
 

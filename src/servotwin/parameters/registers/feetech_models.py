@@ -41,6 +41,7 @@ STS_MODELS = (
              elsewhere={**_ELSEWHERE, "Max_Voltage_Limit": _DUMP}),
     StsModel(name="STS3250", number=2825, document=_TABLE, page=_PAGE,
              values={"Maximum_Velocity_Limit": 254}, current_unit=3.8 / 310.0, unit_assumed=True,
+             units=dict.fromkeys(("Protection_Current", "Present_Current"), f"{3800.0 / 310.0:.4g} mA, assumed"),
              assumed=_UNITS | {"Maximum_Velocity_Limit", "Max_Voltage_Limit", *_DUMPED}),
 )
 """The first is what counts for a servo that does not tell its model."""

@@ -8,13 +8,13 @@ from typing import NamedTuple
 from servotwin.parameters.registers.dynamixel_one import ax_family_of, mx_family_of
 from servotwin.parameters.registers.dynamixel_x import family_of as family_of_x
 from servotwin.parameters.registers.dynamixel_xl320 import family_of as family_of_xl320
-from servotwin.parameters.registers.feetech import family_of as family_of_sts
+from servotwin.parameters.registers.feetech import family_as_set
 from servotwin.parameters.registers.register import Register
 from servotwin.parameters.registers.table import Family, family_label, written
 from servotwin.parameters.servo import Servo
 
 _FAMILIES: dict[str, Callable[[Servo], Family]] = {
-    "Feetech STS": family_of_sts, "Dynamixel X": family_of_x, "Dynamixel MX": mx_family_of,
+    "Feetech STS": family_as_set, "Dynamixel X": family_of_x, "Dynamixel MX": mx_family_of,
     "Dynamixel AX": ax_family_of, "Dynamixel XL320": family_of_xl320}
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
 from typing import Any, NamedTuple
 
 from servotwin.errors import UnknownNameError
@@ -19,6 +21,51 @@ _FAMILIES: dict[str, tuple[Callable[[Any], Family], tuple[Any, ...]]] = {
     "feetech-sts": (sts_family, STS_MODELS), "dynamixel-x": (x_family, X_MODELS),
     "dynamixel-mx": (mx_family, MX_MODELS), "dynamixel-ax": (ax_family, AX_MODELS),
     "dynamixel-xl320": (xl320_family, XL320_MODELS)}
+
+
+def register_words() -> tuple[str, ...]:
+    """Return the words of the families with registers.
+
+    Examples
+    --------
+    >>> register_words()[:2]
+    ('feetech-sts', 'dynamixel-x')
+    """
+    return tuple(_FAMILIES)
+
+
+@cache
+def register_family(word: str) -> Family:
+    """Return registers by the word of a family, such as feetech-sts, or by the name of a model.
+
+    Of a family alone, steps that differ between its models have no unit; one that is only assumed of a model does not
+    count.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no family and no model of this name.
+
+    Examples
+    --------
+    >>> [register_family(word).registers["Present_Current"].unit for word in (
+    ...     "feetech-sts", "dynamixel-x", "xl330-m288")]
+    ['6.5 mA', '', '1 mA']
+    """
+    plain = word.strip().lower()
+    if plain not in _FAMILIES:
+        models = {model.name.lower(): model for model in _models()}
+        if plain not in models:
+            raise UnknownNameError("registers", word, [*_FAMILIES, *(model.name for model in models.values())])
+        return models[plain].table
+    make, models_of = _FAMILIES[plain]
+    tables = [make(model).registers for model in models_of]
+    units = {name: {table[name].unit for table in tables if name in table and "assumed" not in table[name].unit}
+             for name in tables[0]}
+    family = make(models_of[0])
+    return replace(family, model=plain, registers={
+        name: replace(one, unit=next(iter(units[name])) if len(units[name]) == 1 else "")
+        for name, one in family.registers.items()})
 
 
 class ListedModel(NamedTuple):
@@ -176,10 +223,13 @@ def wire_rows(model: ListedModel) -> list[WireRow]:
     return found
 
 
-def _models() -> Iterator[ListedModel]:
+@cache
+def _models() -> tuple[ListedModel, ...]:
+    made = []
     for name, (make, models) in _FAMILIES.items():
         for model in models:
             family = make(model)
             shown = [key for key, register in family.registers.items() if not register.reading]
-            yield ListedModel(name, model.name, model.number, len(shown),
-                              sum(not family.document(key) for key in shown), model.page, family)
+            made.append(ListedModel(name, model.name, model.number, len(shown),
+                                    sum(not family.document(key) for key in shown), model.page, family))
+    return tuple(made)

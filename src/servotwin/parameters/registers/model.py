@@ -29,6 +29,8 @@ class RegisterModel:
         What its registers hold when it is new, where that is not what most of the family hold.
     ranges : mapping of str to tuple of int
         Lowest and highest value of registers, where these are not the family's.
+    units : mapping of str to str
+        Of a raw step of registers, where these are not the family's.
     lacks : frozenset of str
         Registers of the family that it does not have.
     elsewhere : mapping of str to str
@@ -43,6 +45,7 @@ class RegisterModel:
     page: str = ""
     values: Mapping[str, int] = field(default_factory=dict)
     ranges: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
     lacks: frozenset[str] = frozenset()
     elsewhere: Mapping[str, str] = field(default_factory=dict)
     assumed: frozenset[str] = frozenset()
@@ -59,7 +62,8 @@ class RegisterModel:
             if name in self.lacks:
                 continue
             lower, upper = self.ranges.get(name, (register.lower, register.upper))
-            made[name] = replace(register, factory=self.values.get(name, register.factory), lower=lower, upper=upper)
+            made[name] = replace(register, factory=self.values.get(name, register.factory), lower=lower, upper=upper,
+                                 unit=self.units.get(name, register.unit))
         return made
 
     def unseen(self, common: Mapping[str, Register]) -> frozenset[str]:
@@ -87,7 +91,7 @@ def model_for(models: Sequence[M], servo: Servo, number: int, common: Mapping[st
         Registers of the family.
     """
     told = [model for model in models if number and model.number == number]
-    text = f"{servo.name} {servo.title}".lower().replace("_", "-")
+    text = re.sub(r"[\s_]+", "-", f"{servo.name}|{servo.title}".lower())  # "XM430 W210" is an XM430-W210
     named = [model for model in told or models if _told(model.name.partition("(")[0], text)]
     if named:
         return max(named, key=lambda model: len(model.name))

@@ -71,6 +71,12 @@ class Family:
     settings : tuple of Setting
     reference : str
         Where the registers are described; empty where no page was seen.
+    count : float
+        Angle of a count of positions [rad].
+    middle : int
+        Count at angle 0.
+    current_sense : {"motor", "bus"}
+        Whose current Present_Current is.
     assumed : frozenset of str
         Registers whose factory value no page prints.
     elsewhere : mapping of str to str
@@ -100,6 +106,9 @@ class Family:
     registers: Mapping[str, Register]
     settings: tuple[Setting, ...]
     reference: str
+    count: float
+    middle: int
+    current_sense: str = "motor"
     assumed: frozenset[str] = frozenset()
     elsewhere: Mapping[str, str] = field(default_factory=dict)
     masks: tuple[str, ...] = ()
