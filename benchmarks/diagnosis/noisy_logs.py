@@ -15,9 +15,10 @@ doctor is given the healthy servo's file, its load, and the log:
   0.3 to 1.5 counts; a magnetic encoder of 12 bit with 0.015 to 0.043 deg (the AS5600's sheet); a camera with 0.1 to
   0.5 deg and no counts. Noise is Gaussian and white, 20 to 1000 samples a second, their times off by up to a tenth of
   the period; the rest is assumed. Every second log has a current with 5 to 50 mA of noise.
-- truth: what the noiseless motion shows within the log, by the measures of `shown_by`. Of a healthy log no symptom is
-  above 0.8 of its threshold; of an ill one the wanted symptom is at 1.1 times it or more, and none is above 0.8 under
-  the same moves without the fault. Faults: a swing, a sag, an overshoot, a shaft that does not move.
+- truth: what the noiseless motion shows, by the measures of `shown_by`. Of a healthy log no symptom is above 0.8 of its
+  threshold in all that the controller sends, recorded or not; of an ill one the wanted symptom is at 1.1 times it or
+  more within the log, and without the fault it is healthy. Faults: a swing, a sag, an overshoot, a shaft that does not
+  move.
 
 A healthy log is right where nothing is found, an ill one where its symptom is found in the log.
 """
@@ -57,6 +58,10 @@ class Moves(NamedTuple):
     target: np.ndarray
     begin: float
     end: float
+
+    def whole(self) -> Moves:
+        """Return all that the controller sends, also what is not recorded."""
+        return self._replace(begin=0.0, end=TICK * len(self.target))
 
     def at(self, clock: np.ndarray) -> np.ndarray:
         """Return the target that was sent last at some times."""
@@ -139,10 +144,11 @@ def motion(case: Case, made: Moves, clock: np.ndarray) -> dict[str, np.ndarray]:
     """Return the noiseless angle [rad] and current [A] of a servo under its load at some times."""
     ticks = TICK * np.arange(len(made.target))
     command = st.signals.samples(ticks, made.target, unit="rad", hold="previous")
-    batch = st.simulate_many(default_model(case.servo), [command], duration=made.end, load=case.load,
-                             output_times=clock, seeds=0, outputs=("output_angle", "armature_current"),
-                             ).raise_if_failed()
-    return {name: batch[name][0] for name in ("output_angle", "armature_current")}
+    model = default_model(case.servo)
+    names = ("output_angle", "armature_current", "duty" if isinstance(model, DigitalServo) else "drive")
+    batch = st.simulate_many(model, [command], duration=made.end, load=case.load, output_times=clock, seeds=0,
+                             outputs=names).raise_if_failed()
+    return dict(zip(("output_angle", "armature_current", "driven"), (batch[name][0] for name in names), strict=True))
 
 
 def shown_by(case: Case, finest: float, made: Moves) -> dict[str, float]:
@@ -161,15 +167,17 @@ def shown_by(case: Case, finest: float, made: Moves) -> dict[str, float]:
         last = angle[b - round(HALF_SECOND / LOOK):b]
         rests, final = np.ptp(last) < LEAST_SWING, float(last.mean())
         way = target[a] - (target[a - 1] if a else target[a])
-        if clock[b - 1] > made.begin + HALF_SECOND:
+        if clock[b - 1] >= made.begin + HALF_SECOND:
             late = angle[max(a, b - round(1.0 / LOOK)):b]
             if not rests and len(late) * LOOK >= 0.9:
                 strong["buzzes"] = max(strong["buzzes"], swing(late))
             farthest = float(np.abs(angle[max(0, a - round(3.0 / LOOK)):b] - target[a]).max())
+            if rests and switches_on(np.abs(run["driven"][b - len(last):b])):
+                strong["buzzes"] = max(strong["buzzes"], 1.0)
             if rests:
                 strong["sags"] = max(strong["sags"], abs(final - target[a]) / max(
                     math.radians(1.0), 0.05 * farthest, 2.0 * finest))
-        if rests and jumped and stood is not None and clock[a] > made.begin + HALF_SECOND:
+        if rests and jumped and stood is not None and clock[a] >= made.begin + HALF_SECOND - LOOK:
             if abs(way) >= math.radians(3.0):
                 past = float((math.copysign(1.0, way) * (angle[a:b] - final)).max())
                 strong["overshoots"] = max(strong["overshoots"], past / (0.1 * abs(way)))
@@ -180,6 +188,12 @@ def shown_by(case: Case, finest: float, made: Moves) -> dict[str, float]:
     squared = float(np.mean(run["armature_current"][clock >= 0.5 * (made.begin + made.end)]**2))
     strong["gets warm"] = warmth(default_model(case.servo), squared * case.servo.motor.armature_resistance)
     return strong
+
+
+def switches_on(driven: np.ndarray) -> bool:
+    """Tell whether a bridge switches on in each tenth of a second while the shaft stands: no log shows it, a run does."""
+    begins = (driven[1:] > 0.0) & (driven[:-1] == 0.0)
+    return all(each.any() for each in np.array_split(begins, 5))
 
 
 def swing(angle: np.ndarray) -> float:
@@ -232,8 +246,8 @@ def drawn(seed: int, number: int, wanted: str) -> Drawn:
                     break
                 made = moves(rng, how, mid_travel(quietly(default_model, case.servo)), number)
                 try:
-                    sound = quietly(shown_by, case, finest, made)
-                    strong = quietly(shown_by, ill, finest, made) if wanted else sound
+                    sound = quietly(shown_by, case, finest, made.whole())
+                    strong = quietly(shown_by, ill, finest, made) if wanted else {}
                 except (st.errors.ServotwinError, ArithmeticError, ValueError):
                     continue
                 if max(sound.values()) > HEALTHY or (wanted and strong[wanted] < SHOWS):

@@ -93,6 +93,8 @@ class Hold(NamedTuple):
     ----------
     way : float
         From the target before to this one; 0 where the target did not go there straight from a shaft at rest [rad].
+    jumps : bool
+        Whether it went there at once.
     farthest : float
         How far from its target the shaft was since the stretch before [rad].
     before, end : End
@@ -106,6 +108,7 @@ class Hold(NamedTuple):
     """
 
     way: float
+    jumps: bool
     farthest: float
     before: End
     end: End
@@ -271,7 +274,8 @@ def holds_of(time: Array, target: Array, angle: Array, noise: Noise | None = Non
         end = end_of(time[a:b], angle[a:b], noise, swings=swing > 0.0)
         farthest = float(np.abs(angle[min(last, a):b] - target[a]).max())
         found.append(Hold(
-            way=way if straight else 0.0, before=before, end=end, target=float(target[a]), swing=swing,
+            way=way if straight else 0.0, jumps=a - last == 1 or bool(time[a] - time[last] <= _SLOWEST), before=before,
+            end=end, target=float(target[a]), swing=swing,
             farthest=max(farthest, float(np.ptp(target))) if begins else farthest,
             highest=float((math.copysign(1.0, way) * (angle[a:b] - end.angle)).max()) - noise.swing / 2.0 * (not known)))
         before, last = end, b - 1

@@ -98,7 +98,7 @@ def _sags(record: Record, masses: Masses | None) -> Judged:
 
 
 def _overshoots(record: Record, masses: Masses | None) -> Judged:
-    wide = [hold for hold in record.holds if abs(hold.way) >= _LEAST_WAY]
+    wide = [hold for hold in record.holds if hold.jumps and abs(hold.way) >= _LEAST_WAY]
     if not wide:
         return Judged(math.nan, _OVERSHOOT)
     return max(Judged(max(0.0, hold.highest - hold.end.doubt) / abs(hold.way)
