@@ -40,7 +40,7 @@ from servotwin.logs import Log
 from servotwin.models import DigitalServo, default_model, mid_travel
 from servotwin.simulation.arrival import resolution
 
-TICK, LOOK = 0.01, 2e-3  # s: of the controller; between two looks at the truth
+TICK, LOOK = 0.01, 0.5e-3  # s: of the controller; between two looks at the truth, shorter than a bridge's pulses
 HALF_SECOND = 0.5  # s: what stands still for less is no rest
 MOVES = ("still", "steps", "ramps", "sines")
 RECORDERS = ("bus", "converter", "magnetic", "camera")

@@ -102,7 +102,7 @@ class Hold(NamedTuple):
     target : float
         [rad].
     highest : float
-        How far beyond its end the shaft went, in the sense of the way and less its noise [rad].
+        How far beyond its end the shaft went, seen from where it was before, less its noise [rad].
     swing : float
         From end to end; 0 of a shaft that does not swing, or by no more than noise [rad].
     """
@@ -273,11 +273,12 @@ def holds_of(time: Array, target: Array, angle: Array, noise: Noise | None = Non
         swing = swing_of(time[a:b:every], angle[a:b:every], noise.swing).swing
         end = end_of(time[a:b], angle[a:b], noise, swings=swing > 0.0)
         farthest = float(np.abs(angle[min(last, a):b] - target[a]).max())
+        sense = math.copysign(1.0, target[a] - before.angle)
         found.append(Hold(
             way=way if straight else 0.0, jumps=a - last == 1 or bool(time[a] - time[last] <= _SLOWEST), before=before,
             end=end, target=float(target[a]), swing=swing,
             farthest=max(farthest, float(np.ptp(target))) if begins else farthest,
-            highest=float((math.copysign(1.0, way) * (angle[a:b] - end.angle)).max()) - noise.swing / 2.0 * (not known)))
+            highest=float((sense * (angle[a:b] - end.angle)).max()) - (0.0 if known else 0.5 * noise.swing)))
         before, last = end, b - 1
     return tuple(found)
 

@@ -98,10 +98,11 @@ def _sags(record: Record, masses: Masses | None) -> Judged:
 
 
 def _overshoots(record: Record, masses: Masses | None) -> Judged:
-    wide = [hold for hold in record.holds if hold.jumps and abs(hold.way) >= _LEAST_WAY]
+    wide = [hold for hold in record.holds if hold.jumps and min(
+        abs(hold.way), abs(hold.target - hold.before.angle)) >= _LEAST_WAY]
     if not wide:
         return Judged(math.nan, _OVERSHOOT)
-    return max(Judged(max(0.0, hold.highest - hold.end.doubt) / abs(hold.way)
+    return max(Judged(max(0.0, hold.highest - hold.end.doubt) / abs(hold.target - hold.before.angle)
                       if not (hold.swing > 0.0 or _off(hold, record).found) else 0.0, _OVERSHOOT) for hold in wide)
 
 
