@@ -156,7 +156,7 @@ def shown_by(case: Case, finest: float, made: Moves) -> dict[str, float]:
     clock = np.arange(0.0, made.end, LOOK)
     run = motion(case, made, clock)
     target, angle = made.at(clock), run["output_angle"]
-    strong = dict.fromkeys(("buzzes", "sags", "overshoots", "does not move"), 0.0)
+    strong = dict.fromkeys(("buzzes", "sags", "overshoots", "may overshoot", "does not move"), 0.0)
     bounds = [0, *(np.flatnonzero(np.diff(target)) + 1).tolist(), len(clock)]
     stood = None  # target and angle of the rest before
     jumped = False  # right from that one to this
@@ -172,16 +172,19 @@ def shown_by(case: Case, finest: float, made: Moves) -> dict[str, float]:
             if not rests and len(late) * LOOK >= 0.9:
                 strong["buzzes"] = max(strong["buzzes"], swing(late))
             farthest = float(np.abs(angle[max(0, a - round(3.0 / LOOK)):b] - target[a]).max())
-            if rests and switches_on(np.abs(run["driven"][b - len(last):b])):
+            if rests and switches_on(run["driven"][b - len(last):b]):
                 strong["buzzes"] = max(strong["buzzes"], 1.0)
             if rests:
                 strong["sags"] = max(strong["sags"], abs(final - target[a]) / max(
                     math.radians(1.0), 0.05 * farthest, 2.0 * finest))
-        if rests and jumped and stood is not None and clock[a] >= made.begin + HALF_SECOND - LOOK:
-            if abs(way) >= math.radians(3.0):
-                past = float((math.copysign(1.0, way) * (angle[a:b] - final)).max())
-                strong["overshoots"] = max(strong["overshoots"], past / (0.1 * abs(way)))
-            if abs(way) >= math.radians(1.0):
+        if a and clock[a] >= made.begin + HALF_SECOND - LOOK:
+            gone = target[a] - (angle[a] if stood is None else stood)
+            sense = math.copysign(1.0, gone)
+            if abs(gone) >= math.radians(3.0):
+                past = (sense * angle[a:b]).max() - (sense * final if rests else min(sense * final, sense * target[a]))
+                name = "overshoots" if rests and jumped and stood is not None else "may overshoot"
+                strong[name] = max(strong[name], past / (0.1 * abs(gone)))
+            if rests and jumped and stood is not None and abs(way) >= math.radians(1.0):
                 missing = 1.0 - (final - stood) / way
                 strong["does not move"] = max(strong["does not move"], missing / 0.5)
         stood, jumped = (final if rests else None), True
@@ -192,7 +195,7 @@ def shown_by(case: Case, finest: float, made: Moves) -> dict[str, float]:
 
 def switches_on(driven: np.ndarray) -> bool:
     """Tell whether a bridge switches on in each tenth of a second while the shaft stands: no log shows it, a run does."""
-    begins = (driven[1:] > 0.0) & (driven[:-1] == 0.0)
+    begins = (driven[1:] != 0.0) & (driven[1:] * driven[:-1] <= 0.0)
     return all(each.any() for each in np.array_split(begins, 5))
 
 

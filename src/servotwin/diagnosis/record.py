@@ -264,8 +264,8 @@ def holds_of(time: Array, target: Array, angle: Array, noise: Noise | None = Non
     known = noise is None
     noise = NO_NOISE if noise is None else noise
     first = int(np.argmax(target != target[0])) or len(target)
-    last = 0 if known else first - 1  # sample at which what was before has ended
-    before = End(float(angle[0]), 0.0, True) if known else end_of(time[:first], angle[:first], noise)
+    last = first - 1  # sample at which what was before has ended
+    before = End(float(angle[0]), 0.0, True) if known and first < 3 else end_of(time[:first], angle[:first], noise)
     for a, b in stretches(time, target):
         begins = a == 0 and not known
         way, gone = float(target[a] - target[last]), target[min(last, a):a + 1]
