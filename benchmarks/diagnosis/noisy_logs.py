@@ -6,7 +6,7 @@ Each seed makes 20 logs of healthy servos and 10 of ill ones, all drawn by the r
 log is judged. Servos, loads and faults are those of `planted.py`, a third each of pulse, digital and bus servos. The
 doctor is given the healthy servo's file, its load, and the log:
 
-- moves, in turn: stands still after one step; steps of up to 90 deg every 0.6 to 4 s; ramps of 20 to 150 deg/s with
+- moves, in turn: stands still after one step; steps of 10 to 90 deg every 0.6 to 4 s; ramps of 20 to 150 deg/s with
   rests of 1 to 4 s; two to five periods of a sine of 5 to 30 deg and 0.1 to 0.6 Hz, rests of 1 to 4 s and a step. A
   controller sends them every 10 ms. The record lasts 10 to 60 s; every second log begins and every second one ends
   within 0.8 s after the target was changed, in the middle of a move; the command is
@@ -29,6 +29,7 @@ import math
 import random
 import sys
 import time
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -46,6 +47,7 @@ MOVES = ("still", "steps", "ramps", "sines")
 RECORDERS = ("bus", "converter", "magnetic", "camera")
 FAULTS = ("buzzes", "sags", "overshoots", "does not move", "buzzes", "sags", "overshoots", "does not move", "buzzes",
           "sags")
+HEALTHY_LOGS = 20
 KINDS = ("pulse", "digital", "bus")
 TRIES = 400  # of servos and moves, until the next cause is taken
 LEAST_SWING = math.radians(0.1)
@@ -58,10 +60,6 @@ class Moves(NamedTuple):
     target: np.ndarray
     begin: float
     end: float
-
-    def whole(self) -> Moves:
-        """Return all that the controller sends, also what is not recorded."""
-        return self._replace(begin=0.0, end=TICK * len(self.target))
 
     def at(self, clock: np.ndarray) -> np.ndarray:
         """Return the target that was sent last at some times."""
@@ -101,7 +99,10 @@ def moves(rng: random.Random, kind: str, middle: float, number: int) -> Moves:
         sent.extend(sent[-1:] * round(seconds / TICK))
 
     def jump() -> None:
-        sent.append(rng.uniform(-45.0, 45.0))
+        to = sent[-1]
+        while abs(to - sent[-1]) < 10.0:
+            to = rng.uniform(-45.0, 45.0)
+        sent.append(to)
 
     while len(sent) * TICK < lasts + 5.0:
         if kind == "still":
@@ -141,60 +142,61 @@ def recorder(rng: random.Random, number: int) -> Recorder:
 
 
 def motion(case: Case, made: Moves, clock: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the noiseless angle [rad] and current [A] of a servo under its load at some times."""
+    """Return the noiseless angle [rad], current [A] and drive of a servo under its load at some times."""
     ticks = TICK * np.arange(len(made.target))
     command = st.signals.samples(ticks, made.target, unit="rad", hold="previous")
     model = default_model(case.servo)
     names = ("output_angle", "armature_current", "duty" if isinstance(model, DigitalServo) else "drive")
-    batch = st.simulate_many(model, [command], duration=made.end, load=case.load, output_times=clock, seeds=0,
+    batch = st.simulate_many(model, [command], duration=float(clock[-1]), load=case.load, output_times=clock, seeds=0,
                              outputs=names).raise_if_failed()
     return dict(zip(("output_angle", "armature_current", "driven"), (batch[name][0] for name in names), strict=True))
 
 
-def shown_by(case: Case, finest: float, made: Moves) -> dict[str, float]:
-    """Return how strong each symptom is within the log, 1 at its threshold, by the noiseless motion."""
-    clock = np.arange(0.0, made.end, LOOK)
+def shown_by(case: Case, finest: float, made: Moves, whole: bool) -> dict[str, float]:
+    """Return how strong each symptom is, 1 at its threshold, in the noiseless motion within the log, or in all of it."""
+    begin, end = (0.0, TICK * len(made.target)) if whole else (made.begin, made.end)
+    clock = np.arange(0.0, end, LOOK)
     run = motion(case, made, clock)
     target, angle = made.at(clock), run["output_angle"]
     strong = dict.fromkeys(("buzzes", "sags", "overshoots", "may overshoot", "does not move"), 0.0)
     bounds = [0, *(np.flatnonzero(np.diff(target)) + 1).tolist(), len(clock)]
-    stood = None  # target and angle of the rest before
-    jumped = False  # right from that one to this
+    stood = None  # angle of the rest right before
     for a, b in pairwise(bounds):
-        if (b - a) * LOOK < HALF_SECOND:
-            jumped = False
+        lasts = (b - a) * LOOK + 0.5 * LOOK
+        if lasts < HALF_SECOND:
+            stood = None
             continue
         last = angle[b - round(HALF_SECOND / LOOK):b]
         rests, final = np.ptp(last) < LEAST_SWING, float(last.mean())
-        way = target[a] - (target[a - 1] if a else target[a])
-        if clock[b - 1] >= made.begin + HALF_SECOND:
+        if clock[b - 1] >= begin + HALF_SECOND:
             late = angle[max(a, b - round(1.0 / LOOK)):b]
             if not rests and len(late) * LOOK >= 0.9:
                 strong["buzzes"] = max(strong["buzzes"], swing(late))
-            farthest = float(np.abs(angle[max(0, a - round(3.0 / LOOK)):b] - target[a]).max())
-            if rests and switches_on(run["driven"][b - len(last):b]):
-                strong["buzzes"] = max(strong["buzzes"], 1.0)
             if rests:
+                farthest = float(np.abs(angle[max(0, a - round(3.0 / LOOK)):b] - target[a]).max())
                 strong["sags"] = max(strong["sags"], abs(final - target[a]) / max(
                     math.radians(1.0), 0.05 * farthest, 2.0 * finest))
-        if a and clock[a] >= made.begin + HALF_SECOND - LOOK:
-            gone = target[a] - (angle[a] if stood is None else stood)
+        ends = min(b, round(made.end / LOOK))  # of the log, where a run's bridge is looked at
+        if clock[a] + HALF_SECOND <= made.end <= clock[b - 1] + TICK and switches_on(
+                run["driven"][ends - len(last):ends]):
+            strong["buzzes"] = max(strong["buzzes"], 1.0)
+        if stood is not None and clock[a] >= begin + HALF_SECOND - LOOK:
+            gone, way = target[a] - stood, target[a] - target[a - 1]
             sense = math.copysign(1.0, gone)
             if abs(gone) >= math.radians(3.0):
                 past = (sense * angle[a:b]).max() - (sense * final if rests else min(sense * final, sense * target[a]))
-                name = "overshoots" if rests and jumped and stood is not None else "may overshoot"
-                strong[name] = max(strong[name], past / (0.1 * abs(gone)))
-            if rests and jumped and stood is not None and abs(way) >= math.radians(1.0):
-                missing = 1.0 - (final - stood) / way
-                strong["does not move"] = max(strong["does not move"], missing / 0.5)
-        stood, jumped = (final if rests else None), True
-    squared = float(np.mean(run["armature_current"][clock >= 0.5 * (made.begin + made.end)]**2))
+                name = "overshoots" if rests else "may overshoot"
+                strong[name] = max(strong[name], float(past) / (0.1 * abs(gone)))
+            if rests and abs(way) >= math.radians(1.0):
+                strong["does not move"] = max(strong["does not move"], (1.0 - (final - stood) / way) / 0.5)
+        stood = final if rests else None
+    squared = float(np.mean(run["armature_current"][clock >= 0.5 * (begin + end)]**2))
     strong["gets warm"] = warmth(default_model(case.servo), squared * case.servo.motor.armature_resistance)
     return strong
 
 
 def switches_on(driven: np.ndarray) -> bool:
-    """Tell whether a bridge switches on in each tenth of a second while the shaft stands: no log shows it, a run does."""
+    """Tell whether a bridge switches on in each tenth of a second: no log shows that, but the run beside it does."""
     begins = (driven[1:] != 0.0) & (driven[1:] * driven[:-1] <= 0.0)
     return all(each.any() for each in np.array_split(begins, 5))
 
@@ -249,8 +251,8 @@ def drawn(seed: int, number: int, wanted: str) -> Drawn:
                     break
                 made = moves(rng, how, mid_travel(quietly(default_model, case.servo)), number)
                 try:
-                    sound = quietly(shown_by, case, finest, made.whole())
-                    strong = quietly(shown_by, ill, finest, made) if wanted else {}
+                    sound = quietly(shown_by, case, finest, made, True)
+                    strong = quietly(shown_by, ill, finest, made, False) if wanted else {}
                 except (st.errors.ServotwinError, ArithmeticError, ValueError):
                     continue
                 if max(sound.values()) > HEALTHY or (wanted and strong[wanted] < SHOWS):
@@ -262,8 +264,10 @@ def drawn(seed: int, number: int, wanted: str) -> Drawn:
                 return Drawn(case.servo, case.load, log, wanted, words)
 
 
-def sample(seed: int) -> list[Drawn]:
-    return [*(drawn(seed, k, "") for k in range(20)), *(drawn(seed, k, each) for k, each in enumerate(FAULTS))]
+def sample(seed: int) -> Iterator[Drawn]:
+    """Return the logs of a seed, the healthy ones first."""
+    yield from (drawn(seed, k, "") for k in range(HEALTHY_LOGS))
+    yield from (drawn(seed, k, each) for k, each in enumerate(FAULTS))
 
 
 def found_in(one: Drawn) -> tuple[str, ...]:
@@ -276,8 +280,7 @@ def found_in(one: Drawn) -> tuple[str, ...]:
 def main(seeds: list[int]) -> None:
     for seed in seeds:
         quiet = seen = 0
-        logs = sample(seed)
-        for one in logs:
+        for one in sample(seed):
             began = time.process_time()
             found = found_in(one)
             right = one.wanted in found if one.wanted else not found
@@ -285,8 +288,8 @@ def main(seeds: list[int]) -> None:
             took = time.process_time() - began
             print(f"{'right' if right else 'WRONG'}  {one.wanted or 'healthy':13s} {took:5.1f} s  "
                   f"{one.words}; says {', '.join(found) or 'nothing'}", flush=True)
-        ill = sum(bool(one.wanted) for one in logs)
-        print(f"seed {seed}: nothing found in {quiet} of {len(logs) - ill} healthy logs, the fault in {seen} of {ill}")
+        print(f"seed {seed}: nothing found in {quiet} of {HEALTHY_LOGS} healthy logs, "
+              f"the fault in {seen} of {len(FAULTS)}")
 
 
 if __name__ == "__main__":
