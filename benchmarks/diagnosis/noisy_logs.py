@@ -153,7 +153,7 @@ def motion(case: Case, made: Moves, clock: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def shown_by(case: Case, finest: float, made: Moves, whole: bool) -> dict[str, float]:
-    """Return how strong each symptom is, 1 at its threshold, in the noiseless motion within the log, or in all of it."""
+    """Return how strong each symptom is, 1 at its threshold, in the noiseless motion within the log or in all."""
     begin, end = (0.0, TICK * len(made.target)) if whole else (made.begin, made.end)
     clock = np.arange(0.0, end, LOOK)
     run = motion(case, made, clock)

@@ -20,7 +20,6 @@ from servotwin.errors import InputError
 from servotwin.loads import as_load
 from servotwin.models import BoundedServo, DigitalServo, PulseServo, PulseServoInductive, default_model, mid_travel
 from servotwin.parameters import Servo
-from servotwin.simulation import simulate
 from servotwin.simulation.watched_run import watched
 from servotwin.units import is_finite
 

@@ -1,4 +1,4 @@
-"""What a symptom is looked for in: a run, or a log with its noise, as targets that stand still and what the shaft does."""
+"""What a symptom is looked for in: a run, or a log with its noise, by what the shaft does where its target stands still."""
 
 from __future__ import annotations
 
@@ -57,10 +57,10 @@ class Noise(NamedTuple):
         Its standard error is √(12/n) of the noise, by least squares; rounding makes 1.5 counts of it at most, where the
         reading changes by one in the middle.
         """
-        return max(AT_REST, self.reach * self.size * math.sqrt(12.0 / n) + 1.5 * self.count)
+        return self.reach * self.size * math.sqrt(12.0 / n) + 1.5 * self.count
 
     def end(self, n: int) -> float:
-        """Return how far off a straight line through n samples may end: twice the noise over √n, and half a count [rad]."""
+        """Return how far off a straight line through n samples may end: by 2/√n of the noise and half a count [rad]."""
         return 2.0 * self.reach * self.size / math.sqrt(n) + 0.5 * self.count
 
 
@@ -75,8 +75,8 @@ class End(NamedTuple):
     angle : float
         [rad].
     doubt : float
-        How far off that may be: by noise, and of a shaft on its way by as much as it would go if it moved on as fast for
-        as long again [rad].
+        How far off that may be: by noise, and by what it would still go: in half a second as fast as its noise hides,
+        or, if it is seen to move, as fast as it does for as long again as the stretch has lasted [rad].
     rests : bool
         Whether its speed has sunk into its noise, or it swings and goes no further.
     """
@@ -248,8 +248,8 @@ def holds_of(time: Array, target: Array, angle: Array, noise: Noise | None = Non
              every: int = 1) -> tuple[Hold, ...]:
     """Return the stretches in which a target [rad] stands still, and what the shaft did there.
 
-    Without a noise it is a run, which begins at rest. What a log's shaft did before is not known: it may have come as far
-    as its targets lie apart.
+    Without a noise it is a run, which begins at rest. What the shaft of a log did before is not known: it may have come as
+    far as the targets lie apart.
 
     Parameters
     ----------
@@ -305,9 +305,9 @@ def end_of(time: Array, angle: Array, noise: Noise, *, swings: bool = False) -> 
         if (n := int(np.count_nonzero(some))) < 3:
             return found or End(float(angle[-1]), math.inf, False)
         slope, end = np.polyfit(time[some] - time[-1], angle[some], 1)
-        if abs(slope) * span > noise.drift(n):
+        if abs(slope) * span > max(AT_REST, noise.drift(n)):
             return found or End(float(end), abs(float(slope)) * whole + noise.end(n), False)
-        found = End(float(end), noise.end(n), True)
+        found = End(float(end), noise.end(n) + noise.drift(n) * min(1.0, LEAST_REST / span), True)
         if span >= whole:
             return found
         span = min(2.0 * span, whole)

@@ -152,8 +152,8 @@ class Rest(NamedTuple):
 def swing_of(time: Array, angle: Array, least: float = AT_REST) -> Swing:
     """Return the swing of a shaft that goes to and fro until the end, at angles [rad] since nothing changes any more.
 
-    It has to turn back several times by more than `least`, the last time not long ago, and its ways not to get smaller: a
-    shaft that overshoots, or arrives at the very end, does not swing.
+    It has to turn back several times by more than `least`, the last time not long ago, and its ways not to get
+    smaller: a shaft that overshoots, or arrives at the very end, does not swing.
 
     Parameters
     ----------
