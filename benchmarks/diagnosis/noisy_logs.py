@@ -177,9 +177,9 @@ def shown_by(case: Case, finest: float, made: Moves, whole: bool) -> dict[str, f
                 strong["sags"] = max(strong["sags"], abs(final - target[a]) / max(
                     math.radians(1.0), 0.05 * farthest, 2.0 * finest))
         ends = min(b, round(made.end / LOOK))  # of the log, where a run's bridge is looked at
-        if clock[a] + HALF_SECOND <= made.end <= clock[b - 1] + TICK and switches_on(
-                run["driven"][ends - len(last):ends]):
-            strong["buzzes"] = max(strong["buzzes"], 1.0)
+        window = slice(ends - len(last), ends)
+        if clock[a] + HALF_SECOND <= made.end <= clock[b - 1] + TICK and np.ptp(angle[window]) < LEAST_SWING:
+            strong["buzzes"] = max(strong["buzzes"], 1.0 * switches_on(run["driven"][window]))
         if stood is not None and clock[a] >= begin + HALF_SECOND - LOOK:
             gone, way = target[a] - stood, target[a] - target[a - 1]
             sense = math.copysign(1.0, gone)
@@ -196,9 +196,8 @@ def shown_by(case: Case, finest: float, made: Moves, whole: bool) -> dict[str, f
 
 
 def switches_on(driven: np.ndarray) -> bool:
-    """Tell whether a bridge switches on in each tenth of a second: no log shows that, but the run beside it does."""
-    begins = (driven[1:] != 0.0) & (driven[1:] * driven[:-1] <= 0.0)
-    return all(each.any() for each in np.array_split(begins, 5))
+    """Tell whether a bridge begins to drive or reverses: no log shows that, but the run beside it does."""
+    return bool(((driven[1:] != 0.0) & (driven[1:] * driven[:-1] <= 0.0)).any())
 
 
 def swing(angle: np.ndarray) -> float:

@@ -1,4 +1,4 @@
-"""What a symptom is looked for in: a run, or a log with its noise, by what the shaft does where its target stands still."""
+"""What a symptom is looked for in: a run, or a log with its noise, where the target stands still."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ class Hold(NamedTuple):
     highest : float
         How far beyond its end the shaft went, seen from where it was before, less its noise [rad].
     swing : float
-        From end to end; 0 of a shaft that does not swing, or by no more than noise [rad].
+        From end to end in its later half; 0 of a shaft that does not swing, or by no more than noise [rad].
     """
 
     way: float
@@ -248,8 +248,8 @@ def holds_of(time: Array, target: Array, angle: Array, noise: Noise | None = Non
              every: int = 1) -> tuple[Hold, ...]:
     """Return the stretches in which a target [rad] stands still, and what the shaft did there.
 
-    Without a noise it is a run, which begins at rest. What the shaft of a log did before is not known: it may have come as
-    far as the targets lie apart.
+    Without a noise it is a run, which begins at rest. What the shaft of a log did before is not known: it may have come
+    as far as the targets lie apart.
 
     Parameters
     ----------
@@ -270,7 +270,8 @@ def holds_of(time: Array, target: Array, angle: Array, noise: Noise | None = Non
         begins = a == 0 and not known
         way, gone = float(target[a] - target[last]), target[min(last, a):a + 1]
         straight = before.rests and not begins and np.ptp(gone) <= abs(way)
-        swing = swing_of(time[a:b:every], angle[a:b:every], noise.swing).swing
+        late = slice((a + b) // 2, b, every)  # what comes before may still be on its way
+        swing = swing_of(time[late], angle[late], noise.swing).swing
         end = end_of(time[a:b], angle[a:b], noise, swings=swing > 0.0)
         farthest = float(np.abs(angle[min(last, a):b] - target[a]).max())
         sense = math.copysign(1.0, target[a] - before.angle)
