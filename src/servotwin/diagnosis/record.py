@@ -25,6 +25,7 @@ SIGNALS = ("command_angle", "output_angle", "armature_current")
 LOOK = 2e-3  # s between two looks at a run
 _SLOWEST = 10e-3  # s over which samples of a log are averaged, at most: shafts do not swing faster than some 30 Hz
 _CHANCE = 0.01  # assumed: of all logs of a shaft at rest, in which noise may once go beyond what is taken for noise
+_LEAST_MEANS = 8  # that two periods and the way there take
 _BENT = 3  # ordinates of a spectrum that a parabola and a taper change
 _TRIPS = "trips by "  # begins the events of a protection
 
@@ -39,7 +40,8 @@ class Noise(NamedTuple):
     count : float
         Step of what is read; 0 where it does not count [rad].
     reach : float
-        How many standard deviations none of the log's samples goes beyond, but in one of a hundred logs [1].
+        How many standard deviations none of the log's samples, and of their means, goes beyond but in one of a hundred
+        logs [1].
     """
 
     size: float
@@ -50,6 +52,10 @@ class Noise(NamedTuple):
     def swing(self) -> float:
         """From end to end, as far as noise goes: what swings by less cannot be told from rest [rad]."""
         return max(AT_REST, 2.0 * self.reach * self.size + self.count)
+
+    def of_means(self, many: int) -> Noise:
+        """Return that of means of so many samples each."""
+        return self._replace(size=self.size / math.sqrt(many))
 
     def drift(self, n: int) -> float:
         """Return by how much a straight line through n samples of a shaft at rest rises or falls [rad].
@@ -184,9 +190,7 @@ def of_log(log: Log, model: Model, target: Array, finest: float) -> Record:
     there = np.isfinite(angle)
     time, target, angle = time[there], target[there], angle[there]
     count, many = step_of(angle), max(1, int(_SLOWEST / float(np.median(np.diff(time))))) if len(time) > 1 else 1
-    whole = len(time) // many * many
-    time, angle = (each[:whole].reshape(-1, many).mean(axis=1) for each in (time, angle))
-    target = target[:whole:many]
+    time, angle, target = _means(time, many), _means(angle, many), target[:len(time) // many * many:many]
     noise = noise_of(angle, stretches(time, target), count)
     holds = holds_of(time, target, angle, noise) if math.isfinite(noise.size) else ()
     heat = math.nan
@@ -218,7 +222,8 @@ def noise_of(angle: Array, spans: list[tuple[int, int]], count: float) -> Noise:
     if not power:
         return Noise(math.inf, count, 1.0)
     mean = float(np.median(power)) / math.log(2.0) * (1.0 + 2.0 / math.log(2.0) / math.sqrt(len(power)))
-    return Noise(math.sqrt(mean), count, NormalDist().inv_cdf(1.0 - 0.5 * _CHANCE / len(angle)))
+    looks = 2 * len(angle)  # samples, means of two, of four, ...
+    return Noise(math.sqrt(mean), count, NormalDist().inv_cdf(1.0 - 0.5 * _CHANCE / looks))
 
 
 def angle_of(log: Log, model: Model) -> Array:
@@ -265,13 +270,13 @@ def holds_of(time: Array, target: Array, angle: Array, noise: Noise | None = Non
     noise = NO_NOISE if noise is None else noise
     first = int(np.argmax(target != target[0])) or len(target)
     last = first - 1  # sample at which what was before has ended
-    before = End(float(angle[0]), 0.0, True) if known and first < 3 else end_of(time[:first], angle[:first], noise)
+    before = End(float(angle[0]), 0.0, True) if known else end_of(time[:first], angle[:first], noise)
     for a, b in stretches(time, target):
         begins = a == 0 and not known
         way, gone = float(target[a] - target[last]), target[min(last, a):a + 1]
         straight = before.rests and not begins and np.ptp(gone) <= abs(way)
         late = slice((a + b) // 2, b, every)  # what comes before may still be on its way
-        swing = swing_of(time[late], angle[late], noise.swing).swing
+        swing = _swing(time[late], angle[late], noise)
         end = end_of(time[a:b], angle[a:b], noise, swings=swing > 0.0)
         farthest = float(np.abs(angle[min(last, a):b] - target[a]).max())
         sense = math.copysign(1.0, target[a] - before.angle)
@@ -282,6 +287,20 @@ def holds_of(time: Array, target: Array, angle: Array, noise: Noise | None = Non
             highest=float((sense * (angle[a:b] - end.angle)).max()) - (0.0 if known else 0.5 * noise.swing)))
         before, last = end, b - 1
     return tuple(found)
+
+
+def _swing(time: Array, angle: Array, noise: Noise) -> float:
+    """Return a swing from end to end that stands out of noise, as slow ones do in means of many samples; 0 without."""
+    swing, many = swing_of(time, angle, noise.swing).swing, 2
+    while swing == 0.0 and noise.size > 0.0 and len(time) // many >= _LEAST_MEANS:
+        swing = swing_of(_means(time, many), _means(angle, many), noise.of_means(many).swing).swing
+        many *= 2
+    return swing
+
+
+def _means(values: Array, many: int) -> Array:
+    """Return the means of so many values each; the last few that make no more one are left out."""
+    return values[:len(values) // many * many].reshape(-1, many).mean(axis=1)
 
 
 def end_of(time: Array, angle: Array, noise: Noise, *, swings: bool = False) -> End:
