@@ -106,7 +106,7 @@ def _looked_words(looked: Looked) -> str:
 def _threshold_words(one: Measured) -> str:
     """Return how near run and log come to a threshold, in the units of people, and what that is."""
     symptom = one.symptom
-    judged = {"run": one.run} | ({} if one.log is None else {"log": one.log})
+    judged = {"the run": one.run} | ({} if one.log is None else {"the log": one.log})
     near = [f"{figure(symptom.factor * each.value)} of {figure(symptom.factor * each.limit)} {symptom.unit} in {name}"
             for name, each in judged.items() if math.isfinite(each.value) and each.limit > 0.0]
     return "; ".join([*near, f"{symptom.threshold} ({symptom.source})"])

@@ -37,21 +37,21 @@ class Noise(NamedTuple):
     ----------
     size : float
         Standard deviation; inf where the log does not tell [rad].
-    count : float
-        Step of what is read; 0 where it does not count [rad].
+    step : float
+        Of what is read; 0 where the recorder does not count [rad].
     reach : float
         How many standard deviations none of the log's samples, and of their means, goes beyond but in one of a hundred
         logs [1].
     """
 
     size: float
-    count: float
+    step: float
     reach: float
 
     @property
     def swing(self) -> float:
         """From end to end, as far as noise goes: what swings by less cannot be told from rest [rad]."""
-        return max(AT_REST, 2.0 * self.reach * self.size + self.count)
+        return max(AT_REST, 2.0 * self.reach * self.size + self.step)
 
     def of_means(self, many: int) -> Noise:
         """Return that of means of so many samples each."""
@@ -63,11 +63,11 @@ class Noise(NamedTuple):
         Its standard error is √(12/n) of the noise, by least squares; rounding makes 1.5 counts of it at most, where the
         reading changes by one in the middle.
         """
-        return self.reach * self.size * math.sqrt(12.0 / n) + 1.5 * self.count
+        return self.reach * self.size * math.sqrt(12.0 / n) + 1.5 * self.step
 
     def end(self, n: int) -> float:
         """Return how far off a straight line through n samples may end: by 2/√n of the noise and half a count [rad]."""
-        return 2.0 * self.reach * self.size / math.sqrt(n) + 0.5 * self.count
+        return 2.0 * self.reach * self.size / math.sqrt(n) + 0.5 * self.step
 
 
 NO_NOISE = Noise(0.0, 0.0, 0.0)
@@ -300,7 +300,7 @@ def _swing(time: Array, angle: Array, noise: Noise) -> float:
 
 def _means(values: Array, many: int) -> Array:
     """Return the means of so many values each; the last few that make no more one are left out."""
-    return values[:len(values) // many * many].reshape(-1, many).mean(axis=1)
+    return np.asarray(values[:len(values) // many * many].reshape(-1, many).mean(axis=1))
 
 
 def end_of(time: Array, angle: Array, noise: Noise, *, swings: bool = False) -> End:
