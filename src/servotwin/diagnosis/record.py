@@ -27,6 +27,7 @@ _SLOWEST = 10e-3  # s over which samples of a log are averaged, at most: shafts 
 _CHANCE = 0.01  # assumed: of all logs of a shaft at rest, in which noise may once go beyond what is taken for noise
 _LEAST_MEANS = 8  # that two periods and the way there take
 _BENT = 3  # ordinates of a spectrum that a parabola and a taper change
+_ARRIVES = 5.0  # s, assumed: what has not arrived by then stands off its target, however it creeps on
 _TRIPS = "trips by "  # begins the events of a protection
 
 
@@ -82,7 +83,7 @@ class End(NamedTuple):
         [rad].
     doubt : float
         How far off that may be: by noise, and by what it would still go: in half a second as fast as its noise hides,
-        or, if it is seen to move, as fast as it does for as long again as the stretch has lasted [rad].
+        or, if it is seen to move, as fast as it does for as long again as the stretch has lasted, up to 5 s in all [rad].
     rests : bool
         Whether its speed has sunk into its noise, or it swings and goes no further.
     """
@@ -326,7 +327,8 @@ def end_of(time: Array, angle: Array, noise: Noise, *, swings: bool = False) -> 
             return found or End(float(angle[-1]), math.inf, False)
         slope, end = np.polyfit(time[some] - time[-1], angle[some], 1)
         if abs(slope) * span > max(AT_REST, noise.drift(n)):
-            return found or End(float(end), abs(float(slope)) * whole + noise.end(n), False)
+            goes_on = max(0.0, min(whole, _ARRIVES - whole))
+            return found or End(float(end), abs(float(slope)) * goes_on + noise.end(n), False)
         found = End(float(end), noise.end(n) + noise.drift(n) * min(1.0, LEAST_REST / span), True)
         if span >= whole:
             return found
