@@ -179,10 +179,10 @@ def _shown(case: Case) -> dict[str, float]:
     }
 
 
-def swinging(angle: np.ndarray) -> bool:
+def swinging(angle: np.ndarray, least: float = math.radians(1.0 / 6.0)) -> bool:
     """Tell whether a shaft goes to and fro by a sixth of a degree or more, several times, without getting smaller."""
     around = angle - np.median(angle)
-    if np.ptp(around) < math.radians(1.0 / 6.0):
+    if np.ptp(around) < least:
         return False
     side, turns = 0.0, 0
     for value in around:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from servotwin.logs import Log
     from servotwin.models import Model
 
-_LONGEST = 60.0  # s: every cause asks for a run of as much
+_LONGEST = 60.0  # s, without a log: every cause asks for a run of as much
 _MODELS = ("digital", "pulse", "pulse-inductive", "bounded")
 
 
@@ -58,7 +58,8 @@ def doctor(
     seed: Annotated[int, typer.Option(
         metavar="NUMBER", help="Seed for the noise of the potentiometer.", rich_help_panel=shared.PLANT)] = 0,
     duration: Annotated[float | None, typer.Option(
-        metavar="SECONDS", help="Time to simulate (default 6, or more where a protection waits longer).",
+        metavar="SECONDS", help="Time to simulate (default 6, or more where a protection waits longer); of a log, how "
+        "much of it is looked at (default all).",
         rich_help_panel=shared.OUTPUT)] = None,
     file_format: log_reading.FormatOption = "auto",
     columns: log_reading.ColumnsOption = None,
@@ -67,6 +68,9 @@ def doctor(
     mend: Annotated[list[str] | None, typer.Option(
         metavar="KIND", help=f"What to put right in the log's file first: {', '.join(MENDS)}; repeatable or with "
         "commas.", rich_help_panel=log_reading.PANEL)] = None,
+    verbose: Annotated[bool, typer.Option(
+        "--verbose", help="Print all thresholds, also those that nothing comes near.", rich_help_panel=shared.OUTPUT)]
+    = False,
     as_json: shared.JsonOption = False,
 ) -> None:
     """Say why a servo buzzes, sags, overshoots, gets warm, trips or does not move; alone: look at this installation."""
@@ -77,13 +81,13 @@ def doctor(
                          command=command, unit=unit, at=at, over=over, hold=hold, column=column)
     if servo is None:
         _look_at_installation(given=words != CommandWords() or bool(load or change or register or supply or model
-                                                                    or duration), as_json=as_json)
+                                                                    or duration or verbose), as_json=as_json)
         return
     made = model_of(servo, model, change or [], _MODELS, register or [], supply)
     read = None if log is None else _log(log, lambda: log_reading.read(
         [log], file_format, columns, None, [], mend=mend, rate=rate, commanded=commanded, quiet=as_json,
         registers=bool(register), model=made))
-    _diagnose(made, read, words, load or [], duration, seed, as_json=as_json)
+    _diagnose(made, read, words, load or [], duration, seed, verbose=verbose, as_json=as_json)
 
 
 def _look_at_installation(*, given: bool, as_json: bool) -> None:
@@ -110,14 +114,15 @@ def _log(path: Path, read: Callable[[], list[Log]]) -> Log:
 
 
 def _diagnose(made: Model, log: Log | None, words: CommandWords, load: list[str], duration: float | None, seed: int, *,
-              as_json: bool) -> None:
+              verbose: bool, as_json: bool) -> None:
     from servotwin.cli import doctor_words, load_words
     from servotwin.cli.command_words import CommandWords
     from servotwin.diagnosis import diagnose
     from servotwin.errors import CommandError, InputError
 
-    if duration is not None and not (math.isfinite(duration) and 0.0 < duration <= _LONGEST):
-        raise InputError("--duration", got=duration, allowed=f"a positive number of seconds up to {_LONGEST:g}")
+    longest = _LONGEST if log is None else max(_LONGEST, log.duration)
+    if duration is not None and not (math.isfinite(duration) and 0.0 < duration <= longest):
+        raise InputError("--duration", got=duration, allowed=f"a positive number of seconds up to {longest:g}")
     if log is not None and words != CommandWords():
         raise CommandError("a command beside a log", got=f"--{words.shape}", allowed="one of them: a log has its own")
     signal = None if words == CommandWords() else words.signal(duration or _LONGEST)
@@ -129,4 +134,4 @@ def _diagnose(made: Model, log: Log | None, words: CommandWords, load: list[str]
     if as_json:
         emit_json(facts)
         return
-    show(*doctor_words.parts(found, facts))
+    show(*doctor_words.parts(found, facts, verbose=verbose))

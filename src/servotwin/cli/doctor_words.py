@@ -11,7 +11,7 @@ from servotwin.cli.terminal import pairs, table
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from servotwin.diagnosis import Cause, Diagnosis, Finding
+    from servotwin.diagnosis import Cause, Diagnosis, Finding, Looked, Measured
 
 _COMMANDS = {"wide": "in a step of 60 deg", "small": "in a step of 3 deg", "given": "in the run"}
 
@@ -19,15 +19,16 @@ _COMMANDS = {"wide": "in a step of 60 deg", "small": "in a step of 3 deg", "give
 def facts(found: Diagnosis, *, command: str | None, load: str, log: str | None) -> dict[str, Any]:
     """Return a diagnosis in SI, ready for JSON."""
     from servotwin.cli.summary import model_name
-    from servotwin.diagnosis import SYMPTOMS
 
     return {
         "servo": found.model.servo.name, "title": found.model.servo.title, "model": model_name(found.model),
         "command": command or ("of the log" if log else "steps of 60 and of 3 deg"), "load": load, "log": log,
         "findings": [_finding(each) for each in found.findings],
         "log_only": list(found.log_only), "untold": list(found.untold),
-        "thresholds": {symptom.name: {"threshold": symptom.threshold, "source": symptom.source}
-                       for symptom in SYMPTOMS},
+        "looked_at": None if found.looked is None else found.looked._asdict(),
+        "thresholds": {each.symptom.name: {
+            "threshold": each.symptom.threshold, "source": each.symptom.source, "run": each.run._asdict(),
+            "log": None if each.log is None else each.log._asdict(), "near": each.near} for each in found.measured},
     }
 
 
@@ -62,10 +63,15 @@ def seen_words(found: Finding) -> str:
     return ", ".join(filter(None, (said, _COMMANDS[found.command])))
 
 
-def parts(found: Diagnosis, said: dict[str, Any]) -> list[RenderableType]:
-    """Return a diagnosis as it is shown: symptoms, causes with their cures, and where nothing is found, thresholds."""
+def parts(found: Diagnosis, said: dict[str, Any], *, verbose: bool) -> list[RenderableType]:
+    """Return a diagnosis as it is shown: what was looked at, symptoms, causes with their cures, and thresholds.
+
+    Of the thresholds those that run or log come near; if `verbose`, all.
+    """
     head = f"{said['title']} ({said['servo']}), model {said['model']}; {said['command']}; load {said['load']}"
     shown: list[RenderableType] = [head]
+    if found.looked is not None:
+        shown.append(_looked_words(found.looked))
     for each in found.findings:
         shown += ["", *_shown(each)]
     if any(each.causes for each in found.findings):
@@ -79,8 +85,31 @@ def parts(found: Diagnosis, said: dict[str, Any]) -> list[RenderableType]:
                       "whether the log is at fault (servotwin log)"]
     if found.untold:
         shown += ["", f"cannot be told here: {', '.join(found.untold)}"]
-    return [*shown, "", "thresholds", pairs([(name, f"{each['threshold']} ({each['source']})")
-                                             for name, each in said["thresholds"].items()])]
+    told = [each for each in found.measured if verbose or each.near]
+    if not told:
+        return [*shown, "", "no threshold is near, half of it or more; --verbose prints them all"]
+    return [*shown, "", "thresholds" if verbose else "thresholds that are near, half of them or more (--verbose: all)",
+            pairs([(each.symptom.name, _threshold_words(each)) for each in told])]
+
+
+def _looked_words(looked: Looked) -> str:
+    part = (f"all {looked.whole:.1f} s" if looked.seconds >= looked.whole else
+            f"the first {looked.seconds:.1f} of {looked.whole:.1f} s")
+    if not looked.stretches:
+        return f"looked at {part} of the log: its target never stands still for half a second, or its noise is not told"
+    moves = looked.stretches - looked.rests
+    return (f"looked at {part} of the log: the target rests for half a second or more {looked.stretches} times, the "
+            f"shaft at the end of {looked.rests}" + (f" (of {moves} it is still on its way)" if moves else "")
+            + f"; fast swings of less than {math.degrees(looked.swing):.2f} deg are not told from noise")
+
+
+def _threshold_words(one: Measured) -> str:
+    """Return how near run and log come to a threshold, in the units of people, and what that is."""
+    symptom = one.symptom
+    judged = {"the run": one.run} | ({} if one.log is None else {"the log": one.log})
+    near = [f"{figure(symptom.factor * each.value)} of {figure(symptom.factor * each.limit)} {symptom.unit} in {name}"
+            for name, each in judged.items() if math.isfinite(each.value) and each.limit > 0.0]
+    return "; ".join([*near, f"{symptom.threshold} ({symptom.source})"])
 
 
 def _shown(found: Finding) -> list[RenderableType]:

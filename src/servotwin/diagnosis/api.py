@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from servotwin.errors import InputError
 from servotwin.loads import as_load
 from servotwin.models import BoundedServo, DigitalServo, PulseServo, PulseServoInductive, default_model, mid_travel
 from servotwin.parameters import Servo
-from servotwin.simulation import simulate
 from servotwin.simulation.watched_run import watched
 from servotwin.units import is_finite
 
@@ -41,7 +40,7 @@ _AT, _LATER = 0.1, 2.0  # s
 _OTHERS = (math.radians(-7.3), math.radians(4.1))  # targets beside the middle, where a buzz has to be gone too
 _DURATION = 6.0  # s
 _TRIPS_BY = 2.0  # s longer than the protection waits
-_LONGEST = 20.0  # s of a log that are run
+_NEAR = 0.5  # assumed: of a threshold, from where on a symptom is near
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,6 +78,51 @@ class Finding:
         return odd if len(odd) > 1 else ()
 
 
+class Measured(NamedTuple):
+    """How strong a symptom is, found or not.
+
+    Parameters
+    ----------
+    symptom : Symptom
+        Row of `SYMPTOMS`.
+    run, log : Judged or None
+        In the run that shows most of it, and in the log; None without a log. Of a log it is what is certain beside its
+        noise.
+    """
+
+    symptom: Symptom
+    run: Judged
+    log: Judged | None
+
+    @property
+    def near(self) -> bool:
+        """Whether run or log come to half of the threshold or more."""
+        return any(each is not None and each.value > _NEAR * each.limit for each in (self.run, self.log))
+
+
+class Looked(NamedTuple):
+    """How much of a log was looked at.
+
+    Parameters
+    ----------
+    seconds, whole : float
+        Of how long a log [s].
+    stretches : int
+        In which its target stands still for half a second or more.
+    rests : int
+        At the end of how many of them the shaft is at rest, or swings; in the others it is still on its way.
+    swing : float
+        What swings by less, fast, cannot be told from noise; slow swings can, in means of several samples; nan without
+        such a stretch [rad].
+    """
+
+    seconds: float
+    whole: float
+    stretches: int
+    rests: int
+    swing: float
+
+
 @dataclass(frozen=True, kw_only=True)
 class Diagnosis:
     """What a servo suffers from.
@@ -92,12 +136,18 @@ class Diagnosis:
         Symptoms that the log shows and the servo does not.
     untold : tuple of str
         Symptoms that neither run nor log can show.
+    measured : tuple of Measured
+        All symptoms.
+    looked : Looked or None
+        How much of the log was looked at; None without one.
     """
 
     model: Model
     findings: tuple[Finding, ...]
     log_only: tuple[str, ...]
     untold: tuple[str, ...]
+    measured: tuple[Measured, ...]
+    looked: Looked | None
 
 
 def diagnose(servo: Model | Servo, command: Signal | None = None, *, load: Load | Part | None = None,
@@ -116,9 +166,10 @@ def diagnose(servo: Model | Servo, command: Signal | None = None, *, load: Load 
     load : Load, optional
         Nothing unless given; of a log its own.
     duration : float, optional
-        Of the run; unless given 6 s, or more where a protection waits longer [s].
+        Of the run; unless given 6 s, or more where a protection waits longer. Of a log, how much of it is looked at,
+        all unless given [s].
     log : Log, optional
-        Symptoms are looked for in it too; the run then has its command, of the first 20 s.
+        Symptoms are looked for in it too; the run then has its command.
     seed : int
         Of the noise of the potentiometer.
 
@@ -136,7 +187,8 @@ def diagnose(servo: Model | Servo, command: Signal | None = None, *, load: Load 
     ('buzzes', 'gain')
     """
     model = default_model(servo) if isinstance(servo, Servo) else servo
-    duration = _lasts(model) if duration is None else duration
+    if duration is None:
+        duration = _lasts(model) if log is None else log.duration
     _check(model, command, duration, log)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
@@ -161,33 +213,37 @@ def _check(model: Model, command: Signal | None, duration: float, log: Log | Non
 
 def _diagnosed(model: Model, command: Signal | None, load: Load, duration: float, log: Log | None,
                seed: int) -> Diagnosis:
-    initial, seen = None, None
+    initial, seen, looked = None, None, None
     if log is not None:
-        load, duration = (load if load != as_load(None) else log.load), min(duration, log.duration, _LONGEST)
-        log = log.part(log.start, log.start + duration)
+        load, whole = (load if load != as_load(None) else log.load), log.duration
+        if duration < whole:
+            log = log.part(log.start, log.start + duration)
         command, duration = log.signal(), log.duration
         angle = angle_of(log, model)
         initial = {"output_angle": float(angle[np.isfinite(angle)][0])}
-        target = simulate(model, command, duration=duration, load=load, initial=initial,
-                          output_times=log.time - log.start)["command_angle"]
+        target = watched(model, command, duration=duration, outputs=("command_angle",), times=log.time - log.start,
+                         load=load, initial=initial).at("command_angle", log.time - log.start)
         seen = of_log(log, model, target, finest_of(patient_of(model, load)))
+        looked = Looked(duration, whole, len(seen.holds), sum(hold.end.rests for hold in seen.holds),
+                        seen.noise.swing if seen.holds else math.nan)
     own = command is None or (command.edges is None and command.frame_period is None)
     runs = _Runs(_commands(model, command), duration, seed, initial)
-    return _judged(patient_of(model, load, own_frames=own), runs, seen)
+    return _judged(patient_of(model, load, own_frames=own), runs, seen, looked)
 
 
-def _judged(patient: Patient, runs: _Runs, seen: Record | None) -> Diagnosis:
+def _judged(patient: Patient, runs: _Runs, seen: Record | None, looked: Looked | None) -> Diagnosis:
     """Return which symptoms the runs of a patient show, each with its causes, beside those of a log."""
     finest = finest_of(patient)
     records = {name: runs.record(patient, name, finest) for name in runs.commands if name in _SHOWN}
     masses = thermal_masses(patient.model.servo)
-    findings, log_only, untold = [], [], []
+    findings, log_only, untold, measured = [], [], [], []
     hidden: set[tuple[str, str]] = set()
     for symptom in SYMPTOMS:
         judged = {name: symptom.judge(record, masses) for name, record in records.items()
                   if name != "small" or symptom.name == "does not move"}
         name = max(judged, key=lambda each: -math.inf if math.isnan(judged[each].value) else judged[each].value)
         in_log = None if seen is None else symptom.judge(seen, masses)
+        measured.append(Measured(symptom, judged[name], in_log))
         told = (name, symptom.name) not in hidden
         if judged[name].found and told:
             causes, pair = ranked(Trials(patient, runs.strength(symptom, name, finest)))
@@ -198,7 +254,8 @@ def _judged(patient: Patient, runs: _Runs, seen: Record | None) -> Diagnosis:
             log_only.append(symptom.name)
         if math.isnan(judged[name].value) and (in_log is None or math.isnan(in_log.value)):
             untold.append(symptom.name)
-    return Diagnosis(model=patient.model, findings=tuple(findings), log_only=tuple(log_only), untold=tuple(untold))
+    return Diagnosis(model=patient.model, findings=tuple(findings), log_only=tuple(log_only), untold=tuple(untold),
+                     measured=tuple(measured), looked=looked)
 
 
 def _commands(model: Model, command: Signal | None) -> dict[str, Signal]:

@@ -74,20 +74,22 @@ def _trips(record: Record, masses: Masses | None) -> Judged:
 
 
 def _stuck(record: Record, masses: Masses | None) -> Judged:
-    return max((Judged(1.0 - (hold.final - hold.before) / hold.way, 1.0 - _MOVED) for hold in record.holds
+    return max((Judged(1.0 - (hold.end.angle - hold.before.angle) / hold.way
+                       - (hold.end.doubt + hold.before.doubt) / abs(hold.way), 1.0 - _MOVED) for hold in record.holds
                 if abs(hold.way) >= _NEAR), default=Judged(math.nan, 1.0 - _MOVED))
 
 
 def _buzzes(record: Record, masses: Masses | None) -> Judged:
     rest = record.rest
-    if rest is None:
+    if rest is None or record.swing > 0.0:
         return Judged(record.swing, 0.0)
     return Judged((max(rest.duty, rest.swing) if math.isfinite(rest.duty) else rest.swing) if rest.restless else 0.0,
                   0.0)
 
 
 def _off(hold: Hold, record: Record) -> Judged:
-    return Judged(abs(hold.target - hold.final), max(_NEAR, float(tolerance(hold.way, record.finest))))
+    return Judged(max(0.0, abs(hold.target - hold.end.angle) - hold.end.doubt),
+                  max(_NEAR, float(tolerance(hold.farthest, record.finest))))
 
 
 def _sags(record: Record, masses: Masses | None) -> Judged:
@@ -96,11 +98,12 @@ def _sags(record: Record, masses: Masses | None) -> Judged:
 
 
 def _overshoots(record: Record, masses: Masses | None) -> Judged:
-    wide = [hold for hold in record.holds if abs(hold.way) >= _LEAST_WAY]
+    wide = [hold for hold in record.holds if hold.jumps and min(
+        abs(hold.way), abs(hold.target - hold.before.angle)) >= _LEAST_WAY]
     if not wide:
         return Judged(math.nan, _OVERSHOOT)
-    return max(Judged(hold.highest / abs(hold.way) if not (record.swing > 0.0 or _off(hold, record).found) else 0.0,
-                      _OVERSHOOT) for hold in wide)
+    return max(Judged(max(0.0, hold.highest - hold.end.doubt) / abs(hold.target - hold.before.angle)
+                      if not (hold.swing > 0.0 or _off(hold, record).found) else 0.0, _OVERSHOOT) for hold in wide)
 
 
 def _warms(record: Record, masses: Masses | None) -> Judged:

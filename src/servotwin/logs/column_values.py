@@ -1,4 +1,4 @@
-"""What the values of a column say of its unit, where its name says nothing."""
+"""What the values of a column say: of its unit, where its name says nothing, and of the step of what counts."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ MOST_DEGREES = 400.0
 _TURN = 7.0  # above it no angle of one turn is in radians
 _PULSES = (300.0, 3000.0)  # us; what receivers send, and servos take, is 500 to 2500
 _STEPS = (5e-4, 0.2)  # s, between samples: one unit of time only puts a step between these
+_SAME = 0.8  # of the values differ from all others: nobody counts so finely that it matters
+_WHOLE = 0.02  # of a step
 _TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
@@ -114,3 +116,23 @@ def _values(table: TextTable, column: str) -> NDArray[np.float64] | None:
         return None
     finite = values[np.isfinite(values)]
     return finite if finite.size else None
+
+
+def step_of(values: NDArray[np.float64]) -> float:
+    """Return the step of an instrument that counts; 0 where none is seen.
+
+    All differences are then whole multiples of it, and many values are the same.
+
+    Examples
+    --------
+    >>> angle = np.sin(np.arange(100) / 20.0)
+    >>> round(step_of(0.05 * np.round(angle / 0.05)), 3), step_of(angle)
+    (0.05, 0.0)
+    """
+    apart = np.diff(np.unique(values))
+    apart = apart[apart > 1e-9 * max(float(np.abs(values).max(initial=0.0)), 1e-12)]
+    if not len(apart) or len(apart) > _SAME * len(values):
+        return 0.0
+    step = float(np.median(apart[apart < 1.5 * apart.min()]))
+    off = np.abs(apart / step - np.round(apart / step))
+    return step if float(np.quantile(off, 0.98)) < _WHOLE * max(1.0, float(np.median(apart / step))) else 0.0

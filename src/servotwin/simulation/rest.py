@@ -149,16 +149,18 @@ class Rest(NamedTuple):
         return self.swing == 0.0 and self.travel >= AT_REST
 
 
-def swing_of(time: Array, angle: Array) -> Swing:
+def swing_of(time: Array, angle: Array, least: float = AT_REST) -> Swing:
     """Return the swing of a shaft that goes to and fro until the end, at angles [rad] since nothing changes any more.
 
-    It has to turn back several times by more than `AT_REST`, the last time not long ago, and its ways not to get
+    It has to turn back several times by more than `least`, the last time not long ago, and its ways not to get
     smaller: a shaft that overshoots, or arrives at the very end, does not swing.
 
     Parameters
     ----------
     time, angle : ndarray, shape (n,)
         [s], [rad].
+    least : float
+        What swings by less is at rest; of measured angles no less than their noise reaches from end to end [rad].
 
     Examples
     --------
@@ -170,9 +172,9 @@ def swing_of(time: Array, angle: Array) -> Swing:
     Swing(swing=0.0, frequency=0.0)
     """
     half = len(time) // 2  # what comes before may still be on its way
-    if len(time) < 2 * _LEGS or not np.ptp(angle[half:]) > AT_REST:
+    if len(time) < 2 * _LEGS or not np.ptp(angle[half:]) > least:
         return NONE
-    at = _turns(angle)
+    at = _turns(angle, least)
     ways, spans = np.abs(np.diff(angle[at])), np.diff(time[at])
     if len(ways) < _LEGS + 1:  # the first one leads there
         return NONE
@@ -183,17 +185,17 @@ def swing_of(time: Array, angle: Array) -> Swing:
     return Swing(float(np.ptp(angle[at[-_LEGS - 1]:])), float(0.5 / spans.mean()))
 
 
-def _turns(angle: Array) -> list[int]:
-    """Return the places between which the angle goes one way, but for what is at rest, the first place included."""
+def _turns(angle: Array, least: float) -> list[int]:
+    """Return the places between which the angle goes one way, but for less than `least`, the first place included."""
     found, low, high, far, way = [0], 0, 0, 0, 0
     values = angle.tolist()
     for k, value in enumerate(values):
         if way == 0:
             low, high = (k if value < values[low] else low), (k if value > values[high] else high)
-            way, far = (value - values[low] > AT_REST) - (values[high] - value > AT_REST), k
+            way, far = (value - values[low] > least) - (values[high] - value > least), k
         elif way * (value - values[far]) >= 0.0:
             far = k
-        elif way * (values[far] - value) > AT_REST:
+        elif way * (values[far] - value) > least:
             found.append(far)
             way, far = -way, k
     return found

@@ -8,31 +8,9 @@ from numpy.typing import NDArray
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.point import OFFSET_SCALE
 from servotwin.identification.fitting.uncertainty import Counts
+from servotwin.logs.column_values import step_of
 
 Array = NDArray[np.float64]
-
-_FEW = 0.8  # of the values differ from all others: nobody counts so finely that it matters
-_WHOLE = 0.02  # of a step
-
-
-def step_of(values: Array) -> float:
-    """Return the step of an instrument that counts; 0 where none is seen.
-
-    All differences are then whole multiples of it, and many values are the same.
-
-    Examples
-    --------
-    >>> angle = np.sin(np.arange(100) / 20.0)
-    >>> round(step_of(0.05 * np.round(angle / 0.05)), 3), step_of(angle)
-    (0.05, 0.0)
-    """
-    apart = np.diff(np.unique(values))
-    apart = apart[apart > 1e-9 * max(float(np.abs(values).max(initial=0.0)), 1e-12)]
-    if not len(apart) or len(apart) > _FEW * len(values):
-        return 0.0
-    step = float(np.median(apart[apart < 1.5 * apart.min()]))
-    off = np.abs(apart / step - np.round(apart / step))
-    return step if float(np.quantile(off, 0.98)) < _WHOLE * max(1.0, float(np.median(apart / step))) else 0.0
 
 
 def counts_of(forecast: Forecast, k: int) -> Counts | None:

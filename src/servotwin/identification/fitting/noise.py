@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.counts import step_of
+from servotwin.logs.column_values import step_of
 from servotwin.logs.log import Log
 
 Array = NDArray[np.float64]
