@@ -126,7 +126,7 @@ def test_which_servos_lift_is_what_each_of_them_says():
     known = [mass for mass in weights if not math.isnan(mass)]
     assert known == sorted(known) == weights[:len(known)]  # unknown ones last
     assert all(each.margin > 1.0 and each.time <= 0.5 for each in found.found)
-    assert {each.kind for each in found.refused} == {"torque", "time"}
+    assert {each.kind for each in found.refused} == {"torque", "time", "voltage"}
     best = found.found[0]
     drive = st.datasheet.FullDrive(at_voltage(st.models.default_model(best.servo), 5.0))
     assert best.most_torque == min(drive.stall_torque, drive.starting_torque)

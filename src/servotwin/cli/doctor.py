@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from servotwin.logs import Log
     from servotwin.models import Model
 
+_LOOKED_AT = 2.0  # s in which a board is looked at
 _LONGEST = 60.0  # s, without a log: every cause asks for a run of as much
 _MODELS = ("digital", "pulse", "pulse-inductive", "bounded")
 
@@ -55,6 +56,9 @@ def doctor(
         "repeatable; with a unit, or in SI units.", rich_help_panel=shared.PLANT)] = None,
     register: shared.RegisterOption = None,
     supply: shared.SupplyOption = None,
+    board: Annotated[str | None, typer.Option(
+        metavar="BOARD", help="Say whether a board on the same supply browns out, and what would keep it running: uno, "
+        "nano, esp32 (with an AMS1117) or esp32-ldo.", rich_help_panel=shared.PLANT)] = None,
     seed: Annotated[int, typer.Option(
         metavar="NUMBER", help="Seed for the noise of the potentiometer.", rich_help_panel=shared.PLANT)] = 0,
     duration: Annotated[float | None, typer.Option(
@@ -81,13 +85,13 @@ def doctor(
                          command=command, unit=unit, at=at, over=over, hold=hold, column=column)
     if servo is None:
         _look_at_installation(given=words != CommandWords() or bool(load or change or register or supply or model
-                                                                    or duration or verbose), as_json=as_json)
+                                                                    or duration or verbose or board), as_json=as_json)
         return
     made = model_of(servo, model, change or [], _MODELS, register or [], supply)
     read = None if log is None else _log(log, lambda: log_reading.read(
         [log], file_format, columns, None, [], mend=mend, rate=rate, commanded=commanded, quiet=as_json,
         registers=bool(register), model=made))
-    _diagnose(made, read, words, load or [], duration, seed, verbose=verbose, as_json=as_json)
+    _diagnose(made, read, words, load or [], duration, seed, board=board, verbose=verbose, as_json=as_json)
 
 
 def _look_at_installation(*, given: bool, as_json: bool) -> None:
@@ -114,11 +118,12 @@ def _log(path: Path, read: Callable[[], list[Log]]) -> Log:
 
 
 def _diagnose(made: Model, log: Log | None, words: CommandWords, load: list[str], duration: float | None, seed: int, *,
-              verbose: bool, as_json: bool) -> None:
+              board: str | None, verbose: bool, as_json: bool) -> None:
     from servotwin.cli import doctor_words, load_words
     from servotwin.cli.command_words import CommandWords
     from servotwin.diagnosis import diagnose
     from servotwin.errors import CommandError, InputError
+    from servotwin.loads import Load
 
     longest = _LONGEST if log is None else max(_LONGEST, log.duration)
     if duration is not None and not (math.isfinite(duration) and 0.0 < duration <= longest):
@@ -131,7 +136,15 @@ def _diagnose(made: Model, log: Log | None, words: CommandWords, load: list[str]
                          seed=seed)
     facts = doctor_words.facts(found, command=None if signal is None else words.described(duration or _LONGEST),
                                load=load_words.described(load), log=None if log is None else log.name)
+    more = []
+    if board is not None:
+        from servotwin.diagnosis.brown_out import brown_out
+
+        seen = brown_out(made, signal, board, load=load_words.load_from(load, made) or Load(), log=log,
+                         duration=duration or (_LOOKED_AT if log is None else log.duration))
+        facts["board"] = doctor_words.board_facts(seen)
+        more = doctor_words.board_parts(seen)
     if as_json:
         emit_json(facts)
         return
-    show(*doctor_words.parts(found, facts, verbose=verbose))
+    show(*doctor_words.parts(found, facts, verbose=verbose), *more)

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from servotwin.diagnosis import Cause, Diagnosis, Finding, Looked, Measured
+    from servotwin.diagnosis.brown_out import BrownOut
 
 _COMMANDS = {"wide": "in a step of 60 deg", "small": "in a step of 3 deg", "given": "in the run"}
 
@@ -68,6 +69,8 @@ def parts(found: Diagnosis, said: dict[str, Any], *, verbose: bool) -> list[Rend
 
     Of the thresholds those that run or log come near; if `verbose`, all.
     """
+    from servotwin.datasheet import thermal_masses
+
     head = f"{said['title']} ({said['servo']}), model {said['model']}; {said['command']}; load {said['load']}"
     shown: list[RenderableType] = [head]
     if found.looked is not None:
@@ -85,6 +88,10 @@ def parts(found: Diagnosis, said: dict[str, Any], *, verbose: bool) -> list[Rend
                       "whether the log is at fault (servotwin log)"]
     if found.untold:
         shown += ["", f"cannot be told here: {', '.join(found.untold)}"]
+    masses = thermal_masses(found.model.servo)
+    if masses is not None and masses.assumed and any(
+            each.symptom.name == "gets warm" and not math.isnan(each.run.value) for each in found.measured):
+        shown += ["", "thermal numbers assumed by the servo's mass"]
     told = [each for each in found.measured if verbose or each.near]
     if not told:
         return [*shown, "", "no threshold is near, half of it or more; --verbose prints them all"]
@@ -148,3 +155,28 @@ def _usual(cause: Cause) -> str:
     low, high = (figure(number.factor * value) for value in cause.usual)
     now = figure(number.factor * cause.now)
     return f"{now}, {low} to {high} {number.unit}".strip() + ("" if cause.odd == 1.0 else " *")
+
+
+def board_facts(found: BrownOut) -> dict[str, Any]:
+    """Return what a board on the supply does, in SI, ready for JSON."""
+    return {**found.board._asdict(), "outcome": found.outcome, "voltage": found.voltage, "time": found.time,
+            "log": None if found.log_outcome is None else {
+                "outcome": found.log_outcome, "voltage": found.log_voltage, "time": found.log_time},
+            "cures": [cure._asdict() for cure in found.cures]}
+
+
+def board_parts(found: BrownOut) -> list[RenderableType]:
+    """Return the same as it is shown."""
+    board = found.board
+    seen = [("the run", found.outcome, found.voltage, found.time)]
+    if found.log_outcome is not None:
+        seen.append(("the log", found.log_outcome, found.log_voltage, found.log_time))
+    rows = [(f"in {where}", f"{outcome}: {volts:.2f} V at least, at {time:.3g} s")
+            for where, outcome, volts, time in seen]
+    rows += [("cure", cure.words + ("" if math.isnan(cure.voltage) else f" ({cure.voltage:.2f} V at least)"))
+             for cure in found.cures]
+    if found.cures:
+        rows.append(("capacitor", "no cure: the start of a motor takes some 4 mC (0.2 A for 20 ms), for which 470 uF "
+                     "fall by 8.5 V; it takes spikes under a millisecond"))
+    return ["", f"browns out? {board.title}: its 5 V pin needs {board.lower:.3g} to {board.upper:.3g} V "
+            f"({board.source})", pairs(rows)]

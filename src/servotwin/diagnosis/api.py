@@ -258,11 +258,17 @@ def _judged(patient: Patient, runs: _Runs, seen: Record | None, looked: Looked |
                      measured=tuple(measured), looked=looked)
 
 
+def step_of_60(model: Model) -> Signal:
+    """Return a step of 60° to the middle of the travel."""
+    middle = mid_travel(model)
+    return signals.step(middle - _WIDE, middle, at=_AT, unit="rad")
+
+
 def _commands(model: Model, command: Signal | None) -> dict[str, Signal]:
     if command is not None:
         return {"given": command}
     middle = mid_travel(model)
-    return {"wide": signals.step(middle - _WIDE, middle, at=_AT, unit="rad"),
+    return {"wide": step_of_60(model),
             "small": signals.step(middle, middle + _SMALL, at=_LATER, unit="rad"),
             **{f"wide {k}": signals.step(middle + there + math.copysign(_WIDE, there), middle + there, at=_AT,
                                          unit="rad") for k, there in enumerate(_OTHERS)}}

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from servotwin import signals
+from servotwin.diagnosis.api import step_of_60
 from servotwin.errors import InputError, ServotwinError, UnknownNameError
 from servotwin.simulation import simulate
 
@@ -93,7 +94,7 @@ def _outcome(board: Board, voltage: float) -> str:
     return RESETS if voltage < board.lower else MAY_RESET if voltage < board.upper else RUNS_ON
 
 
-def brown_out(model: Model, command: Signal, board: str, *, load: Load, duration: float,
+def brown_out(model: Model, command: Signal | None, board: str, *, load: Load, duration: float,
               log: Log | None = None) -> BrownOut:
     """Return whether a board on the supply of a servo browns out, and what would keep it running.
 
@@ -101,7 +102,8 @@ def brown_out(model: Model, command: Signal, board: str, *, load: Load, duration
     ----------
     model : Model
         With a supply.
-    command : Signal
+    command : Signal, optional
+        That of the log, or a step of 60° to the middle of the travel, unless given.
     board : str
         A name of `BOARDS`.
     load : Load
@@ -130,6 +132,8 @@ def brown_out(model: Model, command: Signal, board: str, *, load: Load, duration
     if "bus_voltage" not in model.available:
         raise InputError("--board", got=f"a {type(model).__name__}, which has no supply", allowed="a model with one")
     place = BOARDS[board]
+    if command is None:
+        command = step_of_60(model) if log is None else log.signal()
 
     def run(model: Model, command: Signal) -> tuple[float, float]:
         with warnings.catch_warnings():

@@ -83,7 +83,8 @@ class End(NamedTuple):
         [rad].
     doubt : float
         How far off that may be: by noise, and by what it would still go: in half a second as fast as its noise hides,
-        or, if it is seen to move, as fast as it does for as long again as the stretch has lasted, up to 5 s in all [rad].
+        or, if it is seen to move, as fast as it does for as long again as the stretch has lasted, up to 5 s in all
+        [rad].
     rests : bool
         Whether its speed has sunk into its noise, or it swings and goes no further.
     """

@@ -29,7 +29,7 @@ def test_a_horn_gives_way_to_the_mouse_and_says_the_force(page):
     assert torque == pytest.approx(2.0 * turn, abs=0.15)
     assert page.locator("svg.servo0 .hand").get_attribute("d").startswith("M")
     page.mouse.up()
-    page.wait_for_function("document.querySelector('.force').textContent.startsWith('Push')")
+    page.wait_for_function("document.querySelector('.force').textContent.startsWith('Turn')")
     go_on(page, 1.0)
     assert abs(angle(page) - before) < 5.0
 
