@@ -24,7 +24,25 @@ def test_doctor_finds_nothing_in_a_healthy_servo(capsys):
     assert main(["doctor", "hitec-hs-755hb"]) == 0
     told = capsys.readouterr().out
     assert "nothing found" in told
-    assert "51 deg C" in told
+    assert "no threshold is near" in told
+    assert "thermal numbers assumed by the servo's mass" in told
+    assert main(["doctor", "hitec-hs-755hb", "--verbose"]) == 0
+    assert "51 deg C" in capsys.readouterr().out
+
+
+def test_doctor_says_whether_a_board_browns_out(capsys):
+    words = ["doctor", "towerpro-sg90", "--supply", "5V:0.2A", "--step=-60:60", "--board", "uno"]
+    assert main(words) == 0
+    told = capsys.readouterr().out
+    assert "browns out? Arduino Uno: its 5 V pin needs 2.5 to 2.9 V" in told
+    assert "resets: 1.75 V at least, at 0.102 s" in told
+    assert "470 uF fall by 8.5 V" in " ".join(told.split())
+    assert main([*words, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["board"]
+    assert (found["outcome"], found["log"]) == ("resets", None)
+    assert found["cures"][-1]["voltage"] is None
+    assert main(["doctor", "towerpro-sg90", "--board", "esp"]) == 2
+    assert "unknown board 'esp'; did you mean 'esp32'?" in capsys.readouterr().err
 
 
 def test_doctor_alone_looks_at_the_installation(capsys):
