@@ -120,7 +120,7 @@ def test_only_models_have_curves(servo):
 
 @pytest.mark.long
 def test_which_servos_lift_is_what_each_of_them_says():
-    found = st.servos_that_lift(0.3, 0.1, voltage=5.0, time=0.5)
+    found = st.servos_that_lift(0.3, 0.1, voltage=6.0, time=0.5)
     assert len(found.found) + len(found.refused) == len(st.catalog_names())
     weights = [each.mass for each in found.found]
     known = [mass for mass in weights if not math.isnan(mass)]
@@ -128,7 +128,7 @@ def test_which_servos_lift_is_what_each_of_them_says():
     assert all(each.margin > 1.0 and each.time <= 0.5 for each in found.found)
     assert {each.kind for each in found.refused} == {"torque", "time", "voltage"}
     best = found.found[0]
-    drive = st.datasheet.FullDrive(at_voltage(st.models.default_model(best.servo), 5.0))
+    drive = st.datasheet.FullDrive(at_voltage(st.models.default_model(best.servo), 6.0))
     assert best.most_torque == min(drive.stall_torque, drive.starting_torque)
     for kind in ("digital", "bus"):
         those = [each for each in found.found if each.servo.kind == kind]
