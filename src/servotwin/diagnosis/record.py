@@ -83,7 +83,7 @@ class End(NamedTuple):
         [rad].
     doubt : float
         How far off that may be: by noise, and by what it would still go: in half a second as fast as its noise hides,
-        or, if it is seen to move, as fast as it does for as long again as the stretch has lasted, up to 5 s in all [rad].
+        or, if it is seen to move, as fast as it does for as long again as the stretch has lasted, up to 5 s [rad].
     rests : bool
         Whether its speed has sunk into its noise, or it swings and goes no further.
     """
@@ -157,15 +157,18 @@ class Record(NamedTuple):
     noise: Noise = NO_NOISE
 
 
-def of_run(run: WatchedRun, finest: float) -> Record:
-    """Return what a run shows that was looked at at times of `looked_at`, of a servo that tells so much apart [rad]."""
+def of_run(run: WatchedRun, finest: float, *, from_rest: bool) -> Record:
+    """Return what a run shows that was looked at at times of `looked_at`, of a servo that tells so much apart [rad].
+
+    One that begins where a log does, and not at rest, is judged as a log without noise.
+    """
     end = run.ended
     time = looked_at(end)
     target, angle = run.at("command_angle", time), run.at("output_angle", time)
     rest, current = run.rest, run.at("armature_current", time[time >= 0.5 * end])
     first = next((event for event in run.events if event.kind.startswith(_TRIPS)), None)
     every = max(1, round(look_period(run.model, framed=run.command.edges is None) / LOOK))
-    holds = holds_of(time, target, angle, every=every)
+    holds = holds_of(time, target, angle, None if from_rest else NO_NOISE, every=every)
     return Record(
         holds=holds, finest=finest, rest=rest, swing=_widest(holds if rest is None else holds[:-1]),
         heat=float(np.mean(current**2)) * run.model.value("motor.armature_resistance"),
@@ -254,15 +257,15 @@ def holds_of(time: Array, target: Array, angle: Array, noise: Noise | None = Non
              every: int = 1) -> tuple[Hold, ...]:
     """Return the stretches in which a target [rad] stands still, and what the shaft did there.
 
-    Without a noise it is a run, which begins at rest. What the shaft of a log did before is not known: it may have come
-    as far as the targets lie apart.
+    Without a noise it is a run that begins at rest. What the shaft of a log did before is not known: it may have come as
+    far as the targets lie apart.
 
     Parameters
     ----------
     time, target, angle : ndarray, shape (n,)
         [s], [rad].
     noise : Noise, optional
-        Of a log.
+        Of a log, or of a run that begins as one.
     every : int
         Samples of which one is looked at for a swing.
     """
