@@ -238,19 +238,21 @@ def _judged(patient: Patient, runs: _Runs, seen: Record | None, looked: Looked |
     masses = thermal_masses(patient.model.servo)
     findings, log_only, untold, measured = [], [], [], []
     hidden: set[tuple[str, str]] = set()
+    hidden_in_log: set[str] = set()
     for symptom in SYMPTOMS:
         judged = {name: symptom.judge(record, masses) for name, record in records.items()
                   if name != "small" or symptom.name == "does not move"}
         name = max(judged, key=lambda each: -math.inf if math.isnan(judged[each].value) else judged[each].value)
         in_log = None if seen is None else symptom.judge(seen, masses)
         measured.append(Measured(symptom, judged[name], in_log))
-        told = (name, symptom.name) not in hidden
-        if judged[name].found and told:
+        shows = in_log is not None and in_log.found
+        if judged[name].found and (name, symptom.name) not in hidden:
             causes, pair = ranked(Trials(patient, runs.strength(symptom, name, finest)))
             findings.append(Finding(symptom=symptom, run=judged[name], log=in_log, command=name, record=records[name],
                                     causes=tuple(causes), pair=pair))
             hidden |= {(name, each) for each in symptom.hides}
-        elif in_log is not None and in_log.found and told:
+            hidden_in_log |= set(symptom.hides) if shows else set()
+        elif shows and symptom.name not in hidden_in_log:
             log_only.append(symptom.name)
         if math.isnan(judged[name].value) and (in_log is None or math.isnan(in_log.value)):
             untold.append(symptom.name)
@@ -287,7 +289,7 @@ class _Runs:
     def record(self, patient: Patient, name: str, finest: float) -> Record:
         run = watched(patient.model, self.commands[name], duration=self._duration, outputs=SIGNALS,
                       times=looked_at(self._duration), load=patient.load, seed=self._seed, initial=self._initial)
-        return of_run(run, finest)
+        return of_run(run, finest, from_rest=self._initial is None)
 
     def strength(self, symptom: Symptom, name: str, finest: float) -> Callable[[Patient], Strength]:
         """Return what tells how strong a symptom is; a buzz, which hangs by a hair, after other steps too."""

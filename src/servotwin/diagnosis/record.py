@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 SIGNALS = ("command_angle", "output_angle", "armature_current")
 LOOK = 2e-3  # s between two looks at a run
-_SLOWEST = 10e-3  # s over which samples of a log are averaged, at most: shafts do not swing faster than some 30 Hz
+_AVERAGED = 10e-3  # s over which samples of a log are averaged, at most: shafts do not swing faster than some 30 Hz
 _CHANCE = 0.01  # assumed: of all logs of a shaft at rest, in which noise may once go beyond what is taken for noise
 _LEAST_MEANS = 8  # that two periods and the way there take
 _BENT = 3  # ordinates of a spectrum that a parabola and a taper change
@@ -83,8 +83,7 @@ class End(NamedTuple):
         [rad].
     doubt : float
         How far off that may be: by noise, and by what it would still go: in half a second as fast as its noise hides,
-        or, if it is seen to move, as fast as it does for as long again as the stretch has lasted, up to 5 s in all
-        [rad].
+        or, if it is seen to move, as fast as it does for as long again as the stretch has lasted, up to 5 s [rad].
     rests : bool
         Whether its speed has sunk into its noise, or it swings and goes no further.
     """
@@ -158,15 +157,18 @@ class Record(NamedTuple):
     noise: Noise = NO_NOISE
 
 
-def of_run(run: WatchedRun, finest: float) -> Record:
-    """Return what a run shows that was looked at at times of `looked_at`, of a servo that tells so much apart [rad]."""
+def of_run(run: WatchedRun, finest: float, *, from_rest: bool) -> Record:
+    """Return what a run shows that was looked at at times of `looked_at`, of a servo that tells so much apart [rad].
+
+    One that begins where a log does, and not at rest, is judged as a log without noise.
+    """
     end = run.ended
     time = looked_at(end)
     target, angle = run.at("command_angle", time), run.at("output_angle", time)
     rest, current = run.rest, run.at("armature_current", time[time >= 0.5 * end])
     first = next((event for event in run.events if event.kind.startswith(_TRIPS)), None)
     every = max(1, round(look_period(run.model, framed=run.command.edges is None) / LOOK))
-    holds = holds_of(time, target, angle, every=every)
+    holds = holds_of(time, target, angle, None if from_rest else NO_NOISE, every=every)
     return Record(
         holds=holds, finest=finest, rest=rest, swing=_widest(holds if rest is None else holds[:-1]),
         heat=float(np.mean(current**2)) * run.model.value("motor.armature_resistance"),
@@ -191,9 +193,9 @@ def of_log(log: Log, model: Model, target: Array, finest: float) -> Record:
     time, angle = log.time - log.start, angle_of(log, model)
     there = np.isfinite(angle)
     time, target, angle = time[there], target[there], angle[there]
-    count, many = step_of(angle), max(1, int(_SLOWEST / float(np.median(np.diff(time))))) if len(time) > 1 else 1
+    step, many = step_of(angle), max(1, int(_AVERAGED / float(np.median(np.diff(time))))) if len(time) > 1 else 1
     time, angle, target = _means(time, many), _means(angle, many), target[:len(time) // many * many:many]
-    noise = noise_of(angle, stretches(time, target), count)
+    noise = noise_of(angle, stretches(time, target), step)
     holds = holds_of(time, target, angle, noise) if math.isfinite(noise.size) else ()
     heat = math.nan
     if "armature_current" in log.measured:
@@ -202,11 +204,12 @@ def of_log(log: Log, model: Model, target: Array, finest: float) -> Record:
     return Record(holds, finest, None, _widest(holds), heat, math.nan, noise=noise)
 
 
-def noise_of(angle: Array, spans: list[tuple[int, int]], count: float) -> Noise:
+def noise_of(angle: Array, spans: list[tuple[int, int]], step: float) -> Noise:
     """Return the noise of an angle in the later halves of stretches in which its target stands still [rad].
 
-    White noise has the same power at all frequencies, a swing at few: the median of a periodogram is ln 2 of the mean
-    power of noise, whatever swings. It is taken two of its standard errors, 1/√n of the mean power each, higher.
+    White noise has the same power at all frequencies, a swing at few: the ordinates of a periodogram are exponentially
+    distributed, and their median is ln 2 of the mean power, whatever swings. Its standard error is 1/√n of the mean
+    (David and Nagaraja, Order Statistics, section 10.2: 1/(2 f √n) of a density f); it is taken two of them higher.
 
     Examples
     --------
@@ -222,10 +225,10 @@ def noise_of(angle: Array, spans: list[tuple[int, int]], count: float) -> Noise:
             off = late - np.polyval(np.polyfit(place, late, 2), place)
             power += (np.abs(np.fft.rfft(off * taper)[_BENT:])**2 / float(taper @ taper)).tolist()
     if not power:
-        return Noise(math.inf, count, 1.0)
+        return Noise(math.inf, step, 1.0)
     mean = float(np.median(power)) / math.log(2.0) * (1.0 + 2.0 / math.log(2.0) / math.sqrt(len(power)))
-    looks = 2 * len(angle)  # samples, means of two, of four, ...
-    return Noise(math.sqrt(mean), count, NormalDist().inv_cdf(1.0 - 0.5 * _CHANCE / looks))
+    looks = 2 * len(angle)  # samples, and means of two, of four, ...
+    return Noise(math.sqrt(mean), step, NormalDist().inv_cdf(1.0 - 0.5 * _CHANCE / looks))
 
 
 def angle_of(log: Log, model: Model) -> Array:
@@ -255,7 +258,7 @@ def holds_of(time: Array, target: Array, angle: Array, noise: Noise | None = Non
              every: int = 1) -> tuple[Hold, ...]:
     """Return the stretches in which a target [rad] stands still, and what the shaft did there.
 
-    Without a noise it is a run, which begins at rest. What the shaft of a log did before is not known: it may have come
+    Without a noise it is a run that begins at rest. What the shaft of a log did before is not known: it may have come
     as far as the targets lie apart.
 
     Parameters
@@ -263,7 +266,7 @@ def holds_of(time: Array, target: Array, angle: Array, noise: Noise | None = Non
     time, target, angle : ndarray, shape (n,)
         [s], [rad].
     noise : Noise, optional
-        Of a log.
+        Of a log, or of a run that begins as one.
     every : int
         Samples of which one is looked at for a swing.
     """
@@ -283,7 +286,7 @@ def holds_of(time: Array, target: Array, angle: Array, noise: Noise | None = Non
         farthest = float(np.abs(angle[min(last, a):b] - target[a]).max())
         sense = math.copysign(1.0, target[a] - before.angle)
         found.append(Hold(
-            way=way if straight else 0.0, jumps=a - last == 1 or bool(time[a] - time[last] <= _SLOWEST), before=before,
+            way=way if straight else 0.0, jumps=a - last == 1 or bool(time[a] - time[last] <= _AVERAGED), before=before,
             end=end, target=float(target[a]), swing=swing,
             farthest=max(farthest, float(np.ptp(target))) if begins else farthest,
             highest=float((sense * (angle[a:b] - end.angle)).max()) - (0.0 if known else 0.5 * noise.swing)))

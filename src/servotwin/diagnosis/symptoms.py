@@ -74,9 +74,9 @@ def _trips(record: Record, masses: Masses | None) -> Judged:
 
 
 def _stuck(record: Record, masses: Masses | None) -> Judged:
-    return max((Judged(1.0 - (hold.end.angle - hold.before.angle) / hold.way
-                       - (hold.end.doubt + hold.before.doubt) / abs(hold.way), 1.0 - _MOVED) for hold in record.holds
-                if abs(hold.way) >= _NEAR), default=Judged(math.nan, 1.0 - _MOVED))
+    return max((Judged(max(0.0, 1.0 - (hold.end.angle - hold.before.angle) / hold.way
+                           - (hold.end.doubt + hold.before.doubt) / abs(hold.way)), 1.0 - _MOVED)
+                for hold in record.holds if abs(hold.way) >= _NEAR), default=Judged(math.nan, 1.0 - _MOVED))
 
 
 def _buzzes(record: Record, masses: Masses | None) -> Judged:
