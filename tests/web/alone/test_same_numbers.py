@@ -20,7 +20,7 @@ def test_some_benches(folder):
 
 @pytest.mark.long
 def test_benches_with_a_control_circuit(folder):
-    seeds = [seed for seed in range(60) if "[control]" in drawn(seed)["scene"]]
+    seeds = [seed for seed in range(200) if "[control]" in drawn(seed)["scene"]][:4]
     _, moved = compare(partial(benches, folder), seeds)
     assert len(seeds) > 3
     assert moved > 2
