@@ -1,5 +1,7 @@
 """Robot files whose links overlap, or that nothing carries: what touches what, and whether their servos are judged."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ import servotwin as st
 from robots.robots_cases import servo
 from servotwin.errors import InputError
 from servotwin.robots import Motion, run_motion, sizing_of, validate_robot
-from servotwin.robots.contacts import leave_out, overlaps
+from servotwin.robots.contacts import fall_of, leave_out, leave_out_measured, overlaps
 from servotwin.robots.model_file import plant_of, robot_model
 from servotwin.robots.record import FROM_NOWHERE
 
@@ -238,6 +240,23 @@ def test_contacts_in_which_measured_joints_lie_are_left_out():
     assert found.said[0].endswith("mm in palm: left out of contact")
     assert found.rms() == free.rms()
     assert free.said == ()
+
+
+def test_a_thing_that_lies_about_is_no_root_of_a_fixed_robot():
+    """An arm whose measured pose dips 5 mm into a table, beside a cube that is free: the last joint of the model."""
+    text = """<mujoco><worldbody><geom name="table" type="box" size=".3 .3 .02" pos="0 0 -.05"/>
+      <body name="base"><body name="arm"><joint name="lift" axis="0 1 0"/><geom type="capsule" size=".01" mass=".02"
+      fromto="0 0 0 .1 0 0"/></body></body><body name="cube" pos="0 .2 .5"><freejoint/><geom size=".01"/></body>
+      </worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(text)
+    low = np.full(5, math.asin(0.025 / 0.1))  # the tip's middle 25 mm down, the table's top at -30, the tip's radius 10
+    seen = Motion(time=0.1 * np.arange(5), angles={"lift": low}, source="low.csv", measured={"lift": low, "none": low})
+    (said,) = leave_out_measured(model, [seen])
+    assert said == "where joints were measured arm lies 5 mm in table: left out of contact"
+    pose = model.qpos0.copy()
+    pose[0] = low[0]
+    assert overlaps(model, pose) == []
+    assert fall_of(model, np.linspace(0.0, 1.0, 11), np.tile(pose, (11, 1)), ["lift"]) is None
 
 
 def test_the_depth_is_that_of_the_boxes():

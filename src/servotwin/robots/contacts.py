@@ -165,7 +165,8 @@ def leave_out_measured(model: Any, motions: Iterable[Motion]) -> tuple[str, ...]
     deepest: dict[tuple[int, int], Overlap] = {}
     joints: set[str] = set()
     for motion in motions:
-        places = {joint: int(model.jnt_qposadr[model.joint(joint).id]) for joint in motion.measured}
+        places = {name: int(model.jnt_qposadr[k]) for k in range(model.njnt)
+                  if (name := model.joint(k).name) in motion.measured}  # others are refused where the robot is run
         joints |= places.keys()
         for row in np.unique(np.linspace(0, len(motion.time) - 1, _LOOKS).astype(int)).tolist():
             pose = model.qpos0.copy()
@@ -354,4 +355,5 @@ def _roots(model: Any, joints: Iterable[str]) -> list[int]:
     """Return the bodies with a free joint that joints hang on."""
     free = load_mujoco().mjtJoint.mjJNT_FREE
     tops = {_top(model, int(model.jnt_bodyid[model.joint(joint).id])) for joint in joints}
-    return sorted(body for body in tops if model.jnt_type[model.body_jntadr[body]] == free)
+    return sorted(body for body in tops
+                  if model.body_jntnum[body] and model.jnt_type[model.body_jntadr[body]] == free)

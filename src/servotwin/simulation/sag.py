@@ -70,7 +70,9 @@ def sag_of(trajectories: Sequence[Trajectory], voltage: Callable[[Samples], Arra
     if not supply.internal_resistance and math.isinf(limit):
         return None
     different = {tuple(segment.start for segment in one.segments): one for one in reversed(trajectories)}
-    found = [least(one, voltage) for one in different.values()]
+    found = [least(one, voltage) for one in different.values() if one.segments]
+    if not found:  # a run that failed at once
+        return None
     lowest = min(one.value for one in found)
     first = min(one.time for one in found if one.value <= lowest + FLAT)
     if not lowest < V * (1.0 - _SAME):
