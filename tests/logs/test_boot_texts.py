@@ -14,6 +14,7 @@ TEXTS = [
     (ESP.format("8", "TG1WDT_SYS_RESET"), "ESP32", "by its watchdog"),
     (ESP.format("c", "SW_CPU_RESET"), "ESP32", "by its program"),
     ("MCUSR=0x04\n", "AVR", LOW), ("MCUSR: 2\n", "AVR", "by its reset pin"),
+    ("MCUSR=8\n", "AVR", "by its watchdog"),
     ("MCUSR=0b00000101\n", "AVR", "by power that came on and its brown-out detector: its supply was too low"),
     ("Servo logger v1.2\n", None, ""), ("MCUSR=0\n", None, "")]
 

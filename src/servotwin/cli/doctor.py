@@ -141,7 +141,7 @@ def _diagnose(made: Model, log: Log | None, words: CommandWords, load: list[str]
         from servotwin.diagnosis.brown_out import brown_out
 
         own = load_words.load_from(load, made)
-        seen = brown_out(made, signal, board, log=log, load=own or (Load() if log is None else log.load),
+        seen = brown_out(made, signal, board, log=log, load=own if log is None or own != Load() else log.load,
                          duration=duration or (_LOOKED_AT if log is None else log.duration))
         facts["board"] = doctor_words.board_facts(seen)
         more = doctor_words.board_parts(seen)
