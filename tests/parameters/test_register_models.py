@@ -162,7 +162,8 @@ def test_lerobots_registers_are_a_named_set(gripper):
 @pytest.mark.parametrize(("change", "servo", "name", "error", "said"), [
     (st.feetech_sts, "feetech-sts3215-12v", "lerobo", UnknownNameError, "set of registers of Feetech STS 'lerobo'"),
     (st.feetech_sts, "feetech-sts3215-12v", "", UnknownNameError, "set of registers"),
-    (st.dynamixel_x, "dynamixel-xl330-m288", "lerobot", ParameterError, "this family has no named sets")])
+    (st.dynamixel_x, "dynamixel-xl330-m288", "lerobot", UnknownNameError, "lerobot-elbow"),
+    (st.dynamixel_mx, "dynamixel-mx-64", "lerobot", ParameterError, "this family has no named sets")])
 def test_an_unknown_set_is_refused(change, servo, name, error, said):
     with pytest.raises(error, match=said):
         change(name, servo=servo)

@@ -38,6 +38,9 @@ def sections(fit: Fit, files: Sequence[str]) -> list[RenderableType]:
     if fit.interrupted:
         parts.append(f"INTERRUPTED: the best so far; not known are {', '.join(fit.unknown)}")
     parts += ["", _estimates(fit), ""]
+    if fit.register_values:
+        rows = [(one.name, f"{one.value:.3g}", f"{one.lower:.3g} to {one.upper:.3g}") for one in fit.register_values]
+        parts += [table(("register", "raw value", f"{100.0 * fit.level:g} % interval"), rows), ""]
     parts += [f"- {item}" for item in fit.unidentifiable]
     parts += ["- no delay is seen: it ended at 0" if name == "delay" and fit.estimates[name] == 0.0
               else f"- {name} ended at a bound of the search" for name in fit.at_bound]
@@ -122,6 +125,8 @@ def facts(fit: Fit, files: Sequence[str]) -> dict[str, Any]:
             "parameters": list(item.parameters), "direction": list(item.direction),
             "combinations": list(item.combinations), "remedies": list(item.remedies), "words": str(item)}
             for item in fit.unidentifiable],
+        "registers": None if fit.registers is None else {
+            **fit.registers.facts, "values": [one._asdict() for one in fit.register_values]},
         "at_bound": list(fit.at_bound), "yielded": [_yielded(one) for one in fit.yielded],
         "errors": {which.replace(" ", "_"): error_facts(held) for which, held in tables_of(fit).items()},
         "noise": {name: float(value) for name, value in fit.noise.items()}, "warnings": list(fit.warnings),

@@ -148,6 +148,7 @@ def _report(found: Validation, above: Mapping[str, float], limits: Mapping[str |
             "reading": reading_facts([trace.log for trace in found.traces]),
             "nuisance": dict(found.nuisance), "fitted": list(found.fitted),
             "errors": fit_show.error_facts(found.errors), "noise": dict(found.noise), "warnings": list(found.warnings),
+            "registers": None if found.registers is None else found.registers.facts,
             "max_error": {motion or "all": limit for motion, limit in limits.items()}, "above": dict(above),
             "files": files})
         return

@@ -29,6 +29,9 @@ class BamActuator:
         How the ids of the catalog begin of which it is the model.
     source : str
         Where BAM's code says it.
+    writes : tuple of str
+        Which gains of the firmware its recorder writes into the servo, of P, I and D; 0 into I and D. All else is as
+        whoever had the servo before left it.
     """
 
     error_gain: float | None
@@ -37,10 +40,11 @@ class BamActuator:
     sets: str = "duty"
     servos: tuple[str, ...] = ()
     source: str
+    writes: tuple[str, ...] = ("P",)
 
 
 def _driven(sets: str, source: str) -> BamActuator:
-    return BamActuator(error_gain=None, sets=sets, source=source)
+    return BamActuator(error_gain=None, sets=sets, source=source, writes=())
 
 
 # one line here makes an actuator known
@@ -56,7 +60,7 @@ BAM_ACTUATORS = {
     "xc330m288t": BamActuator(error_gain=0.00575504, servos=("dynamixel-xc330-m288",),
                               source="bam/dynamixel/actuator.py, an XC330-M288-T at 5.1 V"),
     "sts3215": BamActuator(error_gain=0.166, largest_duty=0.97, speed=3400.0 * _TURN / 4096.0, servos=_STS,
-                           source="bam/feetech/actuator.py, STS3215Actuator: by oscilloscope"),
+                           source="bam/feetech/actuator.py, STS3215Actuator: by oscilloscope", writes=("P", "D")),
     "waveshare_st3025": BamActuator(error_gain=0.166,
                                     source="bam/waveshare/actuator.py: the STS3215's gain; the duty was not measured"),
     "xl330i": _driven("current", "bam/dynamixel/actuator.py, XL330CurrentActuator"),
@@ -89,6 +93,17 @@ def bam_actuator(name: str) -> BamActuator:
     if name not in BAM_ACTUATORS:
         raise UnknownNameError("actuator of BAM", name, tuple(BAM_ACTUATORS))
     return BAM_ACTUATORS[name]
+
+
+def writes_gain(motor: object) -> bool:
+    """Return whether the gain in a log of BAM is what its recorder wrote into the servo; True of an unknown motor.
+
+    Examples
+    --------
+    >>> writes_gain("sts3215"), writes_gain("sts3250")
+    (True, False)
+    """
+    return not isinstance(motor, str) or motor not in BAM_ACTUATORS or "P" in BAM_ACTUATORS[motor].writes
 
 
 def bam_name_of(servo: str) -> str | None:

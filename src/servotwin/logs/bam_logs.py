@@ -17,6 +17,7 @@ from servotwin.logs.bam_convention import BamConvention
 from servotwin.logs.csv_logs import in_file
 from servotwin.logs.json_file import read_json, write_json
 from servotwin.logs.log import Log
+from servotwin.logs.reading import ReadColumn, Reading
 from servotwin.units import is_finite
 
 GRAVITY = 9.80665  # m/s², as in BAM's test bench
@@ -74,14 +75,31 @@ def _log(path: Path, content: object, convention: BamConvention | None = None) -
     measured = {name: _column(path, entries, key) for key, (name, required) in _MEASURED.items()
                 if required or key in first}
     on = _column(path, entries, "torque_enable", default=True) == 1.0
+    reading = Reading(file=str(path), remarks=tuple(_left_as_found(text["motor"])), columns=(
+        ReadColumn("goal_position", "command_angle", "rad", "BAM's format"),
+        *(ReadColumn(key, name, "V" if name == "bus_voltage" else "rad/s" if name == "output_speed" else "rad",
+                     "BAM's format") for key, (name, _) in _MEASURED.items() if name in measured)))
     with in_file(path, path.stem):
         return Log(
-            name=path.stem, source=str(path), motion=text["trajectory"], time=time, command=command,
+            name=path.stem, source=str(path), motion=text["trajectory"], time=time, command=command, reading=reading,
             command_kind="angle", measured=measured, torque_on=None if on.all() else on,
             load=_pendulum(number["mass"], number["arm_mass"], number["length"]).as_load(),
             parameters=_loop(path, text["motor"], number["kp"], number["vin"], convention),
             conditions={"gain": number["kp"], "voltage": number["vin"],
                         **({"motor": text["motor"]} if text["motor"] else {})})
+
+
+def _left_as_found(motor: str) -> list[str]:
+    """Return what a log says of registers: which gains its recorder wrote, and that all others are as they were."""
+    one = BAM_ACTUATORS.get(motor)
+    if one is None or not (one.writes or motor.startswith("sts")):
+        return []
+    if "P" not in one.writes:
+        return [f"BAM's recorder wrote no register of a {motor}: kp is what it was told, not what the servo had; all "
+                "registers are as whoever had it before left them"]
+    wrote = "P = kp" + (" and D = 0" if "D" in one.writes else "")
+    return [f"BAM's recorder wrote {wrote} into this {motor}; the other registers, its profile too, are as whoever had "
+            "it before left them"]
 
 
 def _loop(path: Path, motor: str, gain: float, voltage: float, convention: BamConvention | None) -> dict[str, float]:

@@ -14,6 +14,7 @@ from servotwin.logs.joint_tables import is_joint_table
 from servotwin.logs.lerobot_data import ACTION, STATE, Joint, Rows, dataset_of, open_dataset
 from servotwin.logs.log import Log
 from servotwin.logs.reading import ReadColumn, Reading
+from servotwin.parameters.registers.robots import left_by_lerobot
 from servotwin.units.words import scaled_unit, unit_shown, units_written
 
 ALL = "*"
@@ -68,6 +69,7 @@ def read_lerobot_logs(path: str | Path, *, joints: str | Mapping[str, str] | Non
     remarks = (*(f"{name} was left out: it has 0 to 100 of its range; {_OPTION} {name}:0.9deg reads it, with what "
                  "one of these is" for name in left), clock)
     robot = str(dataset.info.get("robot_type") or "")
+    remarks += (left_by_lerobot(robot),) if left_by_lerobot(robot) else ()
     return [_log(folder, data, joint, columns[joint.name], (start, stop), {
         "joint": joint.name, "episode": float(episode), **({"robot": robot} if robot else {})}, remarks)
         for start, stop, episode in data.episodes() for joint in chosen]

@@ -25,6 +25,9 @@ class Begin(NamedTuple):
         Numbers of the rig that all logs share (SI), as another fit found them; what is usual unless given.
     own : tuple of ndarray
         Each log's own numbers (scaled), as another fit found them; what was measured unless given.
+    others : tuple of mapping of str to float
+        Searched numbers (SI) with which further searches begin, the others being as the servo has them; where there
+        are none, the further searches begin at random.
     exactly : bool
         False ends the search where lanes that go nearly lead, if there are any; errors are of the engine either way.
         Such a fit is one of several to choose from: it has no verdict.
@@ -34,6 +37,7 @@ class Begin(NamedTuple):
     shared: Mapping[str, float] = {}
     own: tuple[Array, ...] = ()
     exactly: bool = True
+    others: tuple[Mapping[str, float], ...] = ()
 
     @classmethod
     def after(cls, fit: Fit, *, exactly: bool = True) -> Begin:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from servotwin.identification.fitting.choosing import Ladder
     from servotwin.identification.fitting.draws import Allowed
     from servotwin.identification.fitting.intervals import Ends
+    from servotwin.identification.fitting.registers import RegisterSearch, RegisterValue
     from servotwin.identification.fitting.uncertainty import Uncertainty
     from servotwin.identification.fitting.verdict import Verdict
     from servotwin.identification.fitting.yielding import Widened, Yielded
@@ -188,6 +189,8 @@ class Fit:
         What is not known because it was stopped.
     verdict : Verdict, optional
         Whether what is left is noise; None of a fit that was stopped in its search.
+    registers : RegisterSearch, optional
+        Of a bus servo: what stands in registers that logs did not record.
     """
 
     servo: Servo
@@ -223,6 +226,7 @@ class Fit:
     prior_share: Mapping[str, float] = field(default_factory=dict)
     allowed: Allowed | None = field(default=None, repr=False)
     own: tuple[Array, ...] = field(default=(), repr=False)
+    registers: RegisterSearch | None = field(default=None, repr=False)
 
     def intervals(self, level: float | None = None) -> dict[str, Interval]:
         """Return the interval of every name (SI).
@@ -251,6 +255,7 @@ class Fit:
                          f"{spread}{prior}")
         first = () if self.verdict is None else (str(self.verdict),)
         said = [text for text in self.warnings if text not in "\n".join(first).split("\n")]
+        lines += [f"{one.name} = {one.value:.3g} ({one.lower:.3g} to {one.upper:.3g})" for one in self.register_values]
         return "\n".join((*first, *lines, *map(str, self.unidentifiable), *said))
 
     def _interval(self, k: int, name: str, level: float) -> Interval:
@@ -273,6 +278,16 @@ class Fit:
             p = self.space.parameters[k]
             return float(np.clip(p.value(x), p.lower, p.upper))
         return float(x * self.scales[self.names[k]])
+
+    @property
+    def register_values(self) -> tuple[RegisterValue, ...]:
+        """Registers that nobody recorded: raw values of those whose numbers were searched, with their intervals."""
+        from servotwin.identification.fitting.registers import register_values
+
+        if self.registers is None:
+            return ()
+        spans = {name: (one.lower, one.upper) for name, one in self.intervals().items()}
+        return register_values(self.model.servo, self.registers.moves, self.estimates, spans)
 
     @property
     def undetermined(self) -> tuple[str, ...]:

@@ -32,7 +32,7 @@ from servotwin.identification.fitting.judging import with_verdict
 from servotwin.identification.fitting.linearised import LINEARISED, hurried
 from servotwin.identification.fitting.point import NUISANCES, SHARED, Point
 from servotwin.identification.fitting.record import identified_servo, stopped, with_record, with_what_logs_say
-from servotwin.identification.fitting.robot_registers import as_logs_say
+from servotwin.identification.fitting.registers import RegisterSearch, as_logs_say, register_search
 from servotwin.identification.fitting.stopping import Course, Within
 from servotwin.identification.fitting.task import HUBER, Task
 from servotwin.identification.fitting.yielding import Dropped, Widened, Yielded, settle, widened, yielded
@@ -171,9 +171,15 @@ def identify(
     began, limit = clock.monotonic(), Within(within)
     read = checks.checked_logs(logs)
     plain = checks.checked_servo(servo, model)
-    usual = checks.usual_free(plain, read) if free is None else ()
     plain, assumed = as_logs_say(plain, read)
-    given, noticed = (tuple(read), ()) if _seen_before(starts, mend) else first_looks(read, plain, mend)
+    before = _seen_before(starts, mend)
+    given, noticed = (tuple(read), ()) if before else first_looks(read, plain, mend)
+    registers = None if before else register_search(plain, given)
+    if registers is not None and registers.taken is not None:
+        plain = type(plain)(registers.taken.servo)
+    usual = checks.usual_free(plain, read) if free is None else ()
+    if usual and registers is not None and registers.taken is not None:
+        usual = tuple(dict.fromkeys((*usual, *registers.moves)))
     names = usual if free is None else checks.checked_list("free", free)
     beside = checks.checked_words("compare_with", compare_with, BESIDE)
     level, seed = checks.checked_level(level), checks.checked_count("seed", seed, least=0)
@@ -186,15 +192,27 @@ def identify(
     rig = usual_nuisance(plain) if nuisance is None else checks.checked_words("nuisance", nuisance, NUISANCES)
     forecast = Forecast(given, plain, space, rig, seen, running)
     checks.check_fitted(given, fitted, seen, len(names) + len(rig))
-    begin = starts if isinstance(starts, Begin) else Begin(checks.checked_count("starts", starts, least=1))
+    begin = starts if isinstance(starts, Begin) else Begin(
+        checks.checked_count("starts", starts, least=1), others=_beginnings(registers, names))
     task = Task(forecast, Loss(checks.checked_loss(loss, HUBER)), fitted, seed, begin,
                 checks.checked_noise(noise, seen))
     with running.crew, course.watching(), checks.shown(progress) as show, explained(noticed):
         course.show = show
         fit = _run(task, held_out, beside, level, course, intervals=intervals, trials=trials)
         course.ended()
-    fit = replace(fit, warnings=(*assumed, *noticed, *fit.warnings), seconds=clock.monotonic() - began)
+    found = () if registers is None else registers.sentences
+    fit = replace(fit, warnings=(*found, *assumed, *noticed, *fit.warnings), registers=registers,
+                  seconds=clock.monotonic() - began)
     return with_record(fit, read, fitted, mend)
+
+
+def _beginnings(registers: RegisterSearch | None, names: Sequence[str]) -> tuple[dict[str, float], ...]:
+    """Return searched numbers of registers (SI) with which further searches begin."""
+    if registers is None or registers.taken is None:
+        return ()
+    found = [{name: float(value) for name in registers.moves if name in names
+              and isinstance(value := one.servo.get(name), int | float)} for one in registers.others]
+    return tuple(values for values in found if values)
 
 
 def _seen_before(starts: int | Begin, mend: Sequence[str]) -> bool:

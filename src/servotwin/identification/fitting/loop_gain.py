@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from servotwin.logs.bam_actuators import writes_gain
 from servotwin.logs.log import Log
 from servotwin.models import DigitalServo, Model
 from servotwin.parameters import Servo
@@ -48,7 +49,7 @@ def with_loop_gain(log: Log, model: Model) -> Log:
 
 def _of_registers(servo: Servo, log: Log) -> float | None:
     written, family = log.conditions.get("gain"), str(servo.sheet.get("registers", ""))
-    if not is_finite(written) or family not in _REGISTERS:
+    if not is_finite(written) or family not in _REGISTERS or not writes_gain(log.conditions.get("motor")):
         return None
     value = REGISTER_FAMILIES[family]({_REGISTERS[family]: written}, servo=servo).get(GAIN)  # type: ignore[dict-item]
     return float(value) if isinstance(value, int | float) else None

@@ -347,7 +347,9 @@ class Task:
         return sorted(found)
 
     def _candidates(self, nominal: Point, few: Sequence[int]) -> list[Point]:
-        """Return the nominal point, and the best of many random ones."""
+        """Return the nominal point and those of other values that were given, or the best of many random ones."""
+        if self.begin.others:
+            return [nominal, *(self._with(nominal, values) for values in self.begin.others)]
         rng = np.random.default_rng(self.seed)
         tried, offset = [], first_offset(self.forecast, self.fitted) / OFFSET_SCALE
         for _ in range(_TRIED * (self.begin.searches - 1)):
@@ -358,6 +360,14 @@ class Task:
         costs = self._search(few).costs(tried)
         order = np.argsort(costs, kind="stable")
         return [nominal, *(tried[k] for k in order[:self.begin.searches - 1] if math.isfinite(costs[k]))]
+
+    def _with(self, point: Point, values: Mapping[str, float]) -> Point:
+        """Return a point with values of some searched numbers (SI)."""
+        shared = point.shared.copy()
+        for k, p in enumerate(self.forecast.space.parameters):
+            if p.name in values:
+                shared[k] = p.scaled(values[p.name])
+        return point._replace(shared=np.clip(shared, self.lower, self.upper))
 
     def _on_one_scale(self, ended: list[Outcome], few: Sequence[int]) -> list[Outcome]:
         """Return the outcomes with their costs in the noise of the best of them, the best first."""

@@ -22,8 +22,8 @@ from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.held_out import trace_of, with_pulses_of
 from servotwin.identification.fitting.holdout import ErrorTable
 from servotwin.identification.fitting.point import NUISANCES, SHARED, LogPart, Point
+from servotwin.identification.fitting.registers import RegisterSearch, as_logs_say, register_search
 from servotwin.identification.fitting.rig import fitted_rig, has_unknown_phase, with_known
-from servotwin.identification.fitting.robot_registers import as_logs_say
 from servotwin.identification.fitting.scatter import scatter_of
 from servotwin.identification.fitting.task import HUBER
 from servotwin.logs.log import Log
@@ -59,6 +59,8 @@ class Validation:
         How far the residuals of each sensor scatter, robust (SI).
     warnings : tuple of str
         What is probably wrong with the logs, a line each.
+    registers : RegisterSearch, optional
+        Of a bus servo: what stands in registers that logs did not record.
     """
 
     servo: Servo
@@ -69,6 +71,7 @@ class Validation:
     fitted: tuple[str, ...]
     noise: Mapping[str, float]
     warnings: tuple[str, ...] = ()
+    registers: RegisterSearch | None = field(default=None, repr=False)
 
     @property
     def total(self) -> float:
@@ -136,6 +139,7 @@ def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] 
     read = checks.checked_logs(logs)
     plain, assumed = as_logs_say(plain, read)
     given, noticed = first_looks(read, plain, mend)
+    registers = register_search(plain, given)
     seen = checks.checked_sensors(given, sensors, plain)
     for name in nuisance:
         if name not in NUISANCES:
@@ -153,7 +157,8 @@ def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] 
         servo=plain.servo, model=plain, traces=traces, fitted=tuple(name for name in NUISANCES if name in nuisance),
         errors=ErrorTable((own,), {own: tuple(trace.error for trace in traces)}),
         nuisance={name: forecast.nuisance_of(point.shared, name) for name in forecast.extra},
-        noise=_noise(forecast, parts), warnings=(*assumed, *noticed))
+        noise=_noise(forecast, parts), registers=registers,
+        warnings=(*(() if registers is None else registers.sentences), *assumed, *noticed))
 
 
 def _always(model: Model, logs: Sequence[Log]) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from servotwin.parameters.catalog import load_servo
 from servotwin.parameters.registers.dynamixel_x_models import MANUAL, OF_CURRENT, OF_SLOPE, X_MODELS, XModel
 from servotwin.parameters.registers.model import model_for
 from servotwin.parameters.registers.register import Register, laid
+from servotwin.parameters.registers.sets import LEROBOT_X_SETS
 from servotwin.parameters.registers.table import Family, Given, Raw, Setting, on, set_registers
 from servotwin.parameters.servo import Servo
 
@@ -150,7 +151,7 @@ def x_family(model: XModel) -> Family:
                      if not lacking & set(setting.registers))
     return Family(
         label="Dynamixel X", model=model.name, reference=model.document, count=_COUNT, middle=_MIDDLE,
-        current_sense=model.current_sense, registers=model.registers(REGISTERS),
+        current_sense=model.current_sense, registers=model.registers(REGISTERS), sets=LEROBOT_X_SETS,
         assumed=model.unseen(REGISTERS), masks=("Shutdown",), settings=settings,
         other_names={"Secondary_Shadow_ID": "Secondary_ID"},
         copied={"Goal_PWM": "PWM_Limit", **({"Goal_Current": "Current_Limit"} if model.current_unit else {})},

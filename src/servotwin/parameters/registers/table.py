@@ -21,7 +21,7 @@ from servotwin.units import is_finite
 
 Raw = Mapping[str, int]
 Value = float | str | None
-_AS_WRITTEN = re.compile(r"(\w+) \((\d+)\) = (-?\d+)( assumed)?")  # in sources: P_Coefficient (21) = 32
+_AS_WRITTEN = re.compile(r"(\w+) \((\d+)\) = (-?\d+)( assumed)?( given)?")  # in sources: P_Coefficient (21) = 32
 _GUESS = "assumed"
 _UNSURE = (0.5, 2.0)  # ends of the range over what an assumed register makes
 
@@ -185,7 +185,7 @@ def set_registers(family: Family, registers: Given, servo: str | Path | Servo, *
     given = read_registers(family, registers)
     own = _is_own(family, base)
     held = _held(family, base if own else None)
-    held |= {name: _Value(value, assumed) for name, value in given.items()}
+    held |= {name: _Value(value, assumed, not assumed) for name, value in given.items()}
     held |= {name: held[source] for name, source in family.copied.items() if source in given and name not in given}
     raw = {name: value.raw for name, value in held.items()}
     family.check(raw)
@@ -298,11 +298,37 @@ def _family_of(source: str) -> str:
     return label if found else ""
 
 
+def known_registers(family: Family, servo: Servo) -> frozenset[str]:
+    """Return the registers of a servo of which somebody said what they hold: not the factory's, and not assumed.
+
+    Examples
+    --------
+    >>> from servotwin.parameters.registers.feetech import family_of, feetech_sts
+    >>> servo = feetech_sts({"P_Coefficient": 32}, servo="feetech-sts3215-12v")
+    >>> sorted(known_registers(family_of(servo), servo))
+    ['P_Coefficient']
+    """
+    held = _held(family, servo)
+    own = {setting.name: setting for setting in family.settings}
+    raw = {name: one.raw for name, one in held.items()}
+    other = {name for key, setting in own.items() for name in setting.registers
+             if _differs(servo.get(f"firmware.{key}"), setting.value(raw, servo))}  # a number that was set by itself
+    return frozenset(other | {name for name, one in held.items() if not one.assumed and (
+        one.given or one.raw != family.registers[name].factory)})
+
+
+def _differs(one: Any, other: Any) -> bool:
+    if isinstance(one, float) and isinstance(other, float):
+        return abs(one - other) > 1e-9 * max(abs(one), abs(other))
+    return bool((one or None) != (other or None))
+
+
 class _Value(NamedTuple):
-    """What a register holds, and whether that is assumed."""
+    """What a register holds, whether that is assumed, and whether somebody gave it."""
 
     raw: int
     assumed: bool = False
+    given: bool = False
 
 
 def _held(family: Family, servo: Servo | None) -> dict[str, _Value]:
@@ -313,8 +339,8 @@ def _held(family: Family, servo: Servo | None) -> dict[str, _Value]:
     """
     held = {name: _Value(register.factory, not family.document(name)) for name, register in family.registers.items()}
     texts = () if servo is None else (text for text in _of_firmware(servo) if _family_of(text))
-    return held | {name: _Value(int(value), bool(assumed)) for text in texts
-                   for name, _, value, assumed in _AS_WRITTEN.findall(text) if name in held}
+    return held | {name: _Value(int(value), bool(assumed), bool(given)) for text in texts
+                   for name, _, value, assumed, given in _AS_WRITTEN.findall(text) if name in held}
 
 
 def _warn_of_pairs(family: Family, given: Iterable[str], raw: Raw) -> None:
@@ -329,7 +355,8 @@ def _quantity(family: Family, setting: Setting, held: Mapping[str, _Value], serv
     if value is None:
         return None
     named = ", ".join(f"{name} ({family.registers[name].address}) = {held[name].raw}"
-                      + " assumed" * held[name].assumed for name in setting.registers)
+                      + " assumed" * held[name].assumed + " given" * _is_worth_saying(family, name, held[name])
+                      for name in setting.registers)
     unsure = any(held[name].assumed for name in setting.registers
                  if name not in family.masks or set(setting.registers) <= set(family.masks))
     origin = _GUESS if unsure else setting.origin
@@ -339,6 +366,11 @@ def _quantity(family: Family, setting: Setting, held: Mapping[str, _Value], serv
     return Quantity(value=value, unit=unit_of(f"firmware.{setting.name}"), origin=origin,
                     source=f"{family.label} firmware: " + "; ".join(part for part in parts if part),
                     **_spread(setting, value, unsure=unsure))
+
+
+def _is_worth_saying(family: Family, name: str, value: _Value) -> bool:
+    """Tell whether a source says that a value was given: else nobody could tell it from the factory's."""
+    return value.given and value.raw == family.registers[name].factory
 
 
 def _document(family: Family, name: str, value: _Value) -> str:

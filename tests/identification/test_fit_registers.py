@@ -7,7 +7,7 @@ import pytest
 
 import servotwin as st
 from servotwin.identification import validate
-from servotwin.identification.fitting.robot_registers import as_logs_say, of_no_robot
+from servotwin.identification.fitting.registers import as_logs_say, of_no_robot
 from servotwin.models import default_model
 
 STS = "feetech-sts3215-7v4"
