@@ -32,6 +32,7 @@ from servotwin.parameters.registers.table import Family, family_label, known_reg
 
 Array = NDArray[np.float64]
 _LOGS = 4  # that are asked, those of the most motion first
+_DELAY, _NEAR = 0.01, 1e-4  # s, of the first of these, and what changes nothing
 _DELAYED = 3  # simulations of one servo, each at the delay that the one before it wants
 _PROMISING = 1.5  # times the least error: what is more gets no delay of its own
 _RESTS, _RESTED = 1.5, 0.3  # counts between samples, and s: a shaft that rests
@@ -223,7 +224,7 @@ class _Bench:
         self.logs = tuple(replace(log, conditions={}) for log in (with_loop_gain(log, model) for log in logs))
         self.gains = any(GAIN in log.parameters for log in self.logs)
         self._seen: dict[_State, Tried] = {}
-        self._delay, self._least = 0.0, math.inf
+        self._least = math.inf
 
     def tried(self, states: Iterable[_State]) -> list[Tried]:
         """Return what is left with some registers, each set of them simulated once."""
@@ -295,26 +296,27 @@ class _Bench:
         where = [forecast.names_of_own(case).index("log_delay") for case in forecast.cases]
         starts = [forecast.own_start(case) for case in forecast.cases]
         found = [*some]
-        asked, delays = [*range(len(some))], np.full(len(some), self._delay)
+        asked, delays = [*range(len(some))], np.full(len(some), _DELAY)
         for _ in range(_DELAYED):
             for i, start in enumerate(starts):
                 start[where[i]] = delays[i // n] / DELAY_SCALE
             parts = forecast.at(Point(forecast.space.start, tuple(start.copy() for start in starts)),
                                 derivatives=False, cases=[i for k in asked for i in range(k * n, (k + 1) * n)])
-            later = delays.copy()
+            later, hoped = delays.copy(), np.full(len(some), math.inf)
             for j, k in enumerate(asked):
                 r, g = (np.concatenate([getattr(part, name) for part in parts[j * n:(j + 1) * n]])
                         for name in ("residual", "later"))
                 error = _rms(r)
                 if not error >= found[k].error:
                     found[k] = replace(found[k], error=error, delay=float(delays[k]))
-                later[k] = min(max(found[k].delay + _later(r, g) * DELAY_SCALE, 0.0), _MOST_DELAY)
+                more = _later(r, g)
+                later[k] = min(max(float(delays[k]) + more * DELAY_SCALE, 0.0), _MOST_DELAY)
+                hoped[k] = min(error, _rms(r + more * g))
             self._least = min([self._least, *(one.error for one in found)])
             delays = later
-            asked = [k for k in asked if found[k].error < _PROMISING * self._least]
+            asked = [k for k in asked if hoped[k] < _PROMISING * self._least and abs(later[k] - found[k].delay) > _NEAR]
             if not asked:
                 break
-        self._delay = min(found, key=lambda one: one.error).delay
         return found
 
 
