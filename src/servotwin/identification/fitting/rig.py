@@ -14,6 +14,7 @@ from servotwin.identification.fitting.first_offset import first_offset
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.frames import changes, gaps, has_pulses
 from servotwin.identification.fitting.point import DELAY_SCALE, OFFSET_SCALE, SHARED, Point
+from servotwin.identification.fitting.scatter import scatter_of
 from servotwin.identification.fitting.task import HUBER, Task
 from servotwin.logs.log import Log
 from servotwin.models import Model
@@ -23,6 +24,9 @@ Array = NDArray[np.float64]
 _PERIOD = "electronics.frame_period"
 DELAYS = (0.0, 0.02, 0.04, 0.06, 0.09)
 """Where a search for the delay may begin [s]."""
+RIG = ("delay", "angle_offset")
+"""What a rig has that a servo has not: how late commands act, and where its angle is 0."""
+_FEW = 6  # steps of a search that only has to show what they would leave
 _ROUNDS = 3  # of noise and search
 _MOST = 20  # steps of a search
 _IN_STEP = 1e-4  # of a whole number: samples that come with the pulses
@@ -92,6 +96,23 @@ def fitted_rig(forecast: Forecast, start: Point, asked: Sequence[str], show: Cal
     return found if "initial_state" in asked else _as_measured(forecast, found, start)
 
 
+def likely_rig(forecast: Forecast) -> Point:
+    """Return the point of the servo with delay and angle offset as the logs say, near enough to tell what they leave.
+
+    Parameters
+    ----------
+    forecast : Forecast
+        With both as nuisances and pulses without a phase; its searched numbers all stay.
+    """
+    task, start = _task(forecast), with_known(forecast, {})
+    task.asked = RIG
+    forecast.strict = False
+    few = task.few()
+    found = _likely(task, start, few)
+    forecast.noise = {**forecast.noise, **scatter_of(forecast, forecast.at(found, derivatives=False, cases=few), few)}
+    return _as_measured(forecast, task._search(few).run(found, most=_FEW).point, start)
+
+
 def _task(forecast: Forecast) -> RigTask:
     task = RigTask(forecast, Loss(HUBER), list(range(len(forecast.cases))), 0, Begin(), None)
     task.prior = Prior(np.zeros(forecast.size), np.zeros(forecast.size))
@@ -109,7 +130,7 @@ def _searched(task: RigTask, there: Point, show: Callable[[float, str], None]) -
     return found
 
 
-def _likely(task: RigTask, there: Point) -> Point:
+def _likely(task: RigTask, there: Point, cases: Sequence[int] | None = None) -> Point:
     """Return the point from which the search begins: of some usual delays, with and without the offset that is seen."""
     size, extra = len(task.forecast.space), task.forecast.extra
     tried = [there]
@@ -121,7 +142,8 @@ def _likely(task: RigTask, there: Point) -> Point:
             if offset is not None:
                 shared[size + extra.index("angle_offset")] = offset / OFFSET_SCALE
             tried.append(there._replace(shared=shared))
-    sizes = [sum(float(np.abs(part.residual).sum()) for part in parts) for parts in task.forecast.at_all(tried)]
+    sizes = [sum(float(np.abs(part.residual).sum()) for part in parts)
+             for parts in task.forecast.at_all(tried, cases=cases)]
     return tried[int(np.argmin([one if math.isfinite(one) else math.inf for one in sizes]))]
 
 

@@ -23,7 +23,7 @@ from servotwin.identification.fitting.held_out import trace_of, with_pulses_of
 from servotwin.identification.fitting.holdout import ErrorTable
 from servotwin.identification.fitting.point import NUISANCES, SHARED, LogPart, Point
 from servotwin.identification.fitting.registers import RegisterSearch, as_logs_say, register_search
-from servotwin.identification.fitting.rig import fitted_rig, has_unknown_phase, with_known
+from servotwin.identification.fitting.rig import RIG, fitted_rig, has_unknown_phase, likely_rig, with_known
 from servotwin.identification.fitting.scatter import scatter_of
 from servotwin.identification.fitting.task import HUBER
 from servotwin.logs.log import Log
@@ -36,6 +36,8 @@ from servotwin.units import is_finite
 Array = NDArray[np.float64]
 Progress = bool | Callable[[float, str], object]
 
+_FINE = 1e-3  # rad, of an error: of less nobody asks
+_FAR_LESS = 0.5  # of an error: what is said
 _ANY = ("motor.armature_resistance", "motor.rotor_inertia", "motor.torque_constant", "gear.gear_reduction")
 
 
@@ -151,14 +153,32 @@ def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] 
     with explained(noticed), checks.shown(progress) as show:
         show(0.0, "simulating")
         point, parts = _placed(forecast, known, nuisance, show, whole=whole)
-    traces = _traces(forecast, point, parts, whole=whole)
+        traces = _traces(forecast, point, parts, whole=whole)
+        rig = () if nuisance or known else _of_rig(given, plain, seen, _total(traces))
     own = type(plain).__name__
     return Validation(
         servo=plain.servo, model=plain, traces=traces, fitted=tuple(name for name in NUISANCES if name in nuisance),
         errors=ErrorTable((own,), {own: tuple(trace.error for trace in traces)}),
         nuisance={name: forecast.nuisance_of(point.shared, name) for name in forecast.extra},
         noise=_noise(forecast, parts), registers=registers,
-        warnings=(*(() if registers is None else registers.sentences), *assumed, *noticed))
+        warnings=(*(() if registers is None else registers.sentences), *rig, *assumed, *noticed))
+
+
+def _of_rig(logs: Sequence[Log], model: Model, sensors: Sequence[str], left: float) -> tuple[str, ...]:
+    """Return a sentence on a delay and an angle offset with which far less would be left; none where they would not."""
+    if "output_angle" not in sensors or left < _FINE:
+        return ()
+    forecast = Forecast(logs, model, _space(model, logs), (*RIG, "initial_state"), sensors)
+    with forecast.roughly():
+        point = likely_rig(forecast)
+        parts = forecast.at(point, derivatives=False)
+    error = _total(_traces(forecast, point, parts, whole=True))
+    if not error < _FAR_LESS * left:
+        return ()
+    delay, offset = (forecast.nuisance_of(point.shared, name) for name in RIG)
+    said = f"a delay of {1e3 * delay:.3g} ms and a zero of {math.degrees(offset):.3g} deg"
+    return (f"{said} would leave {math.degrees(error):.3g} deg instead of {math.degrees(left):.3g}: of the rig, as it "
+            f"seems, and not of the servo; {','.join(RIG)} as nuisances (--nuisance) fit them",)
 
 
 def _always(model: Model, logs: Sequence[Log]) -> tuple[str, ...]:
