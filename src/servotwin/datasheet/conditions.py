@@ -7,7 +7,7 @@ import warnings
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from servotwin.errors import InputError
-from servotwin.parameters import operating_voltages, printed_points
+from servotwin.parameters import operating_voltages, sheet_voltages
 from servotwin.parameters.quantity import SET_BY_USER
 from servotwin.physics import Temperatures, magnet_factor, winding_resistance
 from servotwin.units import is_finite
@@ -38,11 +38,8 @@ def highest_voltage(servo: Servo) -> float:
     >>> highest_voltage(load_servo("gobilda-2000-135")), highest_voltage(load_servo("towerpro-mg996r"))
     (7.4, 7.2)
     """
-    if (stated := operating_voltages(servo)) is not None:
-        return stated[1]
-    printed = [point.supply_voltage for point in printed_points(servo) if point.supply_voltage]
-    own = servo.supply.open_circuit_voltage
-    return max([*printed, *([own] if own and not printed else [])], default=0.0)
+    found = sheet_voltages(servo)
+    return (servo.supply.open_circuit_voltage or 0.0) if found is None else found[1]
 
 
 def is_above_sheet(servo: Servo, voltage: float) -> bool:
@@ -74,9 +71,8 @@ def lowest_voltage(servo: Servo) -> float:
     >>> lowest_voltage(load_servo("gobilda-2000-135")), lowest_voltage(load_servo("dynamixel-mx-28"))
     (4.8, 10.0)
     """
-    if (stated := operating_voltages(servo)) is not None:
-        return stated[0]
-    return min((point.supply_voltage for point in printed_points(servo) if point.supply_voltage), default=0.0)
+    found = sheet_voltages(servo)
+    return 0.0 if found is None else found[0]
 
 
 def is_below_sheet(servo: Servo, voltage: float) -> bool:

@@ -93,6 +93,21 @@ def operating_voltages(servo: Servo) -> tuple[float, float] | None:
     return voltage_range(servo.name, servo.sheet)
 
 
+def sheet_voltages(servo: Servo) -> tuple[float, float] | None:
+    """Return the lowest and the highest supply voltage of a sheet; None where it has none [V].
+
+    Those that the maker states for operation, else those that figures are printed for.
+
+    Examples
+    --------
+    >>> from servotwin.parameters import load_servo
+    >>> [sheet_voltages(load_servo(name)) for name in ("towerpro-mg996r", "gobilda-2000-135")]
+    [(4.8, 7.2), (4.8, 7.4)]
+    """
+    printed = [point.supply_voltage for point in printed_points(servo) if point.supply_voltage]
+    return operating_voltages(servo) or ((min(printed), max(printed)) if printed else None)
+
+
 def printed_flags(servo: Servo) -> tuple[str, ...]:
     """Return what the [sheet] says of itself: what it lacks, and where it contradicts itself.
 
