@@ -200,6 +200,49 @@ def test_columns_of_both_ways_are_one_table():
     assert found.lines["q(t_a)"].line.hysteresis == pytest.approx(2.0, abs=0.02)
 
 
+UP, DOWN = -0.5, 0.5
+X = np.arange(600.0, 2401.0, 200.0)
+TURNS = {  # pulses and ways of a table whose value at the turn stands twice, and the row that turns, from 1
+    "held at the top": ([*X, *X[::-1]], [UP] * 11 + [DOWN] * 9, None),
+    "gone beyond and back": ([*X, *X[::-1]], [UP] * 10 + [DOWN] * 10, 11),
+    "held for three readings": ([*X, X[-1], *X[::-1]], [UP] * 12 + [DOWN] * 9, None),
+    "read twice at the start": ([X[0], *X, *X[::-1][1:]], [UP] * 11 + [DOWN] * 9, None),
+    "from the top": ([*X[::-1], *X], [DOWN] * 10 + [UP] * 10, 11),
+    "come from above to the start": ([*X, *X[::-1][1:]], [DOWN] + [UP] * 9 + [DOWN] * 9, 1),
+    "two rounds": ([*X, *X[::-1], *X], [UP] * 11 + [DOWN] * 9 + [UP] * 10, 21)}
+
+
+@pytest.mark.parametrize("case", TURNS)
+def test_a_value_that_stands_twice_where_the_ways_turn_is_of_the_way_it_was_read_on(case):
+    pulses, ways, turned = TURNS[case]
+    x, noise = np.array(pulses), np.random.default_rng(77).normal(0.0, 0.2, len(pulses))
+    found = calibrate_table({"t_a_us": x, "q_deg": 0.1 * x - 100.0 + 4.0 * np.array(ways) + noise})
+    line = found.lines["q(t_a)"].line
+    assert found.lines["q(t_a)"].ways.tolist() == ways
+    assert abs(line.hysteresis - 4.0) < 4.0 * line.hysteresis_error < 0.6  # 2 σ/√n = 0.09 each
+    assert not any(row.certain for row in found.rows)
+    said = [text for text in found.findings() if "where the ways turn" in text]
+    assert [text.split(" (")[0] for text in said] == ([] if turned is None else [f"row {turned}"])
+
+
+def test_one_reading_at_the_top_in_the_columns_of_both_ways_is_of_the_way_up():
+    noise = np.random.default_rng(78).normal(0.0, 0.2, (2, X.size))
+    up, down = 0.1 * X - 102.0 + noise[0], 0.1 * X - 98.0 + noise[1]
+    down[-1] = up[-1]
+    found = calibrate_table({"pulse [us]": X, "angle_up_deg": up, "angle_down_deg": down})
+    line = found.lines["q(t_a)"].line
+    assert abs(line.hysteresis - 4.0) < 4.0 * line.hysteresis_error < 0.6  # 2 σ/√n = 0.09 each
+    assert 10 not in [row.row for row in found.rows if row.certain]
+    assert any("row 11" in text and "on the way up" in text for text in found.findings())
+
+
+def test_without_hysteresis_a_value_that_stands_twice_says_nothing():
+    x = np.concatenate([X, X[::-1]])
+    found = calibrate_table({"t_a_us": x, "q_deg": 0.1 * x + np.random.default_rng(79).normal(0.0, 0.2, x.size)})
+    assert found.table.at_turns.tolist() == [k in (0, 9, 10) for k in range(20)]
+    assert not any("where the ways turn" in text for text in found.findings())
+
+
 def test_rows_in_no_order_are_of_one_way():
     x = np.array([1000.0, 1400.0, 1100.0, 1900.0, 1200.0, 1700.0, 1300.0])
     assert calibrate_table({"t_a_us": x, "q_deg": 0.1 * x + np.cos(x)}).table.ways is None

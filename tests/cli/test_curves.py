@@ -150,7 +150,7 @@ def test_which_lists_the_lightest_first_and_says_why_others_cannot(cli):
     (cannot,) = (line for line in lines if " cannot: " in line)
     assert int(cannot.split()[0]) == len(found.refused)
     assert all(words in cannot for words in ("lack the torque", "are too slow", "are not for this voltage"))
-    assert "its sheet begins at 6 V" in next(line for line in lines if "mg996r" in line)
+    assert "its sheet begins at 6 V" in next(line for line in lines if "xl-320" in line)
     assert "no servo of the catalog can" in cli("catalog", "which", "--lift", "50kg", "--arm", "1m").out
 
 

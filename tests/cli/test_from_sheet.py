@@ -33,7 +33,8 @@ def test_the_table_shows_what_follows_with_its_range(make):
 
 @pytest.mark.long
 def test_a_file_is_written_that_the_function_makes_too(make, cli, tmp_path):
-    ended = make(*GOOD, "--deadband", "8 us", "--pulse-range", "556-2410 us", "--rate", "45 deg/400us", "--neutral",
+    ended = make(*GOOD, "--voltage-range", "4.8 V to 6 V", "--deadband", "8 us", "--pulse-range",
+                 "556-2410 us", "--rate", "45 deg/400us", "--neutral",
                  "1.5 ms", "--mass", "110 g", "--gear-ratio", "280:1", "--backlash", "0.5 deg", "--stops", "230 deg",
                  "--travel", "202 deg", "--idle-current", "8.7 mA@6", "--source", "the box", "--note", "Blue.",
                  "--motor-type", "3-pole", "--modulation", "analog", "--title", "Mine", "--out", "mine.toml")
@@ -41,10 +42,10 @@ def test_a_file_is_written_that_the_function_makes_too(make, cli, tmp_path):
     point = SheetPoint(supply_voltage=6.0, stall_torque=13.2 * 0.0980665, no_load_speed=math.pi / 3 / 0.23,
                        no_load_current=0.285, idle_current=0.0087)
     expected = servo_from_sheet(Sheet(
-        name="mine", title="Mine", points=(point,), deadband=8e-6, pulse_min=556e-6, pulse_max=2410e-6,
-        angle_per_pulse=math.radians(45.0) / 400e-6, neutral_pulse=1.5e-3, mass=0.11, gear_reduction=280.0,
-        backlash=math.radians(0.5), stop_travel=math.radians(230.0), travel=math.radians(202.0), source="the box",
-        note="Blue.", motor_type="3-pole", modulation="analog"))
+        name="mine", title="Mine", points=(point,), voltage_min=4.8, voltage_max=6.0, deadband=8e-6, pulse_min=556e-6,
+        pulse_max=2410e-6, angle_per_pulse=math.radians(45.0) / 400e-6, neutral_pulse=1.5e-3, mass=0.11,
+        gear_reduction=280.0, backlash=math.radians(0.5), stop_travel=math.radians(230.0), travel=math.radians(202.0),
+        source="the box", note="Blue.", motor_type="3-pole", modulation="analog"))
     text = (tmp_path / "mine.toml").read_text(encoding="utf-8")
     assert text == servo_file_text(expected)
     found = cli("catalog", "check", "mine.toml", "--json").data
@@ -221,6 +222,8 @@ def test_a_list_makes_a_folder_of_servos(make, tmp_path):
     (["--name", "mine", "--torque", "1290 N m@6V", "--speed", "0.2 s/60deg@6V"], "stall torque at 6 V"),
     ([*GOOD, "--stall-current", "200 mA@6V"], "stall current at 6 V: got 0.2, allowed: more than the no-load"),
     ([*GOOD, "--deadband", "8"], "--deadband: got '8'"), ([*GOOD, "--deadband", "8 ms"], "deadband: got 0.008"),
+    ([*GOOD, "--voltage-range", "5 V"], "--voltage-range: got '5 V', allowed: two voltages with a unit"),
+    ([*GOOD, "--voltage-range", "7.2-4.8 V"], "voltage range: got '7.2 to 4.8 V'"),
     ([*GOOD, "--pulse-range", "500 us"], "--pulse-range"), ([*GOOD, "--pulse-range", "2500-500 us"], "pulse range"),
     ([*GOOD, "--rate", "0.1 deg"], "--rate"), ([*GOOD, "--gear-ratio", "many"], "--gear-ratio"),
     ([*GOOD, "--modulation", "fm"], "modulation: got 'fm'"),

@@ -232,7 +232,7 @@ def test_remarks_are_shown(simulate, words, said, remarks):
 
 
 def test_warnings_are_one_line_each(cli):
-    ended = cli("simulate", "feetech-ft-7235", "--step", "0:30", "--at", "2", "--set", "supply.open_circuit_voltage=17",
+    ended = cli("simulate", "feetech-ft-7235", "--step", "0:30", "--at", "2", "--set", "supply.open_circuit_voltage=19",
                 "--model", "bounded")
     assert ended.code == 0
     warned = ended.err.splitlines()

@@ -71,7 +71,7 @@ def test_each_limit_says_its_reason(which):
         "mass", "voltage", "travel", "time", "kind"}
     alone = which("--limit", "kind=bus", "--limit", "mass=20g", "--json").data
     assert {each["id"] for each in alone["found"]} == {
-        name for name in st.catalog_names() if "xl330" in name}  # the sheet of an XL-320 begins at 7.4 V
+        name for name in st.catalog_names() if "xl330" in name or "xl-320" in name}
 
 
 @pytest.mark.long
@@ -214,8 +214,8 @@ def test_curves_of_several_servos_end_with_one_table(cli):
 
 @pytest.mark.long(but="words0-True")
 @pytest.mark.parametrize(("words", "warned"), [
-    (["--supply", "9V"], True), (["--set", "supply.open_circuit_voltage=9V"], True), (["--supply", "7.4V"], False),
-    ([], False)])
+    (["--supply", "9V"], True), (["--set", "supply.open_circuit_voltage=9V"], True), (["--supply", "7.4V"], True),
+    (["--supply", "6V:0.1ohm"], False), ([], False)])
 def test_a_supply_far_above_the_sheet_is_warned_of(cli, words, warned):
     told = cli("simulate", "hitec-hs-422", "--step", "0:60", "--duration", "0.5", *words).err
     assert ("its sheet ends at 6 V" in told) == warned

@@ -139,10 +139,10 @@ def test_which_servos_lift_is_what_each_of_them_says():
 def test_which_knows_voltages_and_unknown_masses():
     light = [st.load_servo(name) for name in ("hitec-hs-425bb", "hitec-hs-422", "emax-es08a", "dsservo-rds3115")]
     found = st.servos_that_lift(0.05, 0.05, voltage=6.5, servos=light)
-    assert [each.servo.name for each in found.found] == [
-        "emax-es08a", "hitec-hs-422", "dsservo-rds3115", "hitec-hs-425bb"]
+    assert [each.servo.name for each in found.found] == ["emax-es08a", "dsservo-rds3115", "hitec-hs-425bb"]
+    assert [(each.servo.name, each.reason) for each in found.refused] == [("hitec-hs-422", "its sheet ends at 6 V")]
     assert "its sheet ends at 6 V" in found.found[0].notes
-    assert "impossible sheet" in found.found[2].notes
+    assert "impossible sheet" in found.found[1].notes
     assert math.isnan(found.found[-1].mass)
     high = st.servos_that_lift(0.05, 0.05, voltage=13.0, servos=light)
     assert [each.kind for each in high.refused] == ["voltage"] * 4

@@ -6,6 +6,7 @@ import pytest
 
 from servotwin.errors import InputError
 from servotwin.identification import read_sheets, servo_from_sheet, sheet_contradictions
+from servotwin.parameters import operating_voltages
 
 HEADER = "maker,model,type,V,stall_torque_Nm,speed_s_per_60deg,noload_running_current_A,deadband_us,pulse_range_us\n"
 
@@ -38,7 +39,17 @@ def test_rows_of_another_source_do_not_make_the_servo(tmp_path):
     assert sheet.source_at(sheet.others[0]) == "shop"
 
 
+@pytest.mark.parametrize("text", [
+    "model,V,stall_torque_Nm,speed_s_per_60deg,voltage_range_V\nA,6.0,0.4,0.19,4.8-7.2\n",
+    "model;V;stall_torque_Nm;speed_s_per_60deg;voltage_range_V\nA;6,0;0,4;0,19;4,8-7,2\n"])
+def test_a_list_may_say_between_which_voltages_a_servo_runs(tmp_path, text):
+    servo = servo_from_sheet(read_sheets(write(tmp_path, text)).sheets[0])
+    assert operating_voltages(servo) == (4.8, 7.2)
+
+
 @pytest.mark.parametrize(("text", "said"), [
+    (HEADER.replace("pulse_range_us", "voltage_range_V") + "A,B,,6,1,0.2,,8,7.2\n", "line 2, voltage_range_V"),
+    (HEADER.replace("pulse_range_us", "voltage_range_V") + "A,B,,6,1,0.2,,8,7.2-4.8\n", "line 2: voltage range"),
     ("", "an empty file"), (HEADER, "a header without rows"), ("model,V\nA,6\n", "also stall_torque_Nm"),
     (HEADER.replace("deadband_us", "dead_band_us") + "A,B,,6,1,0.2,,,\n", "did you mean 'deadband_us'?"),
     (HEADER + "A,B,,6,much,0.2,,,\n", "line 2, stall_torque_Nm: got 'much'"),

@@ -26,9 +26,10 @@ from servotwin.physics.sheet import motor_from_sheet
 IDS = ("futaba-s3003", "hitec-hs-311", "hitec-hs-755hb", "towerpro-mg90s", "towerpro-mg996r", "towerpro-sg90")
 BENCH = "hitec-hs-755hb"
 OTHERS = tuple(name for name in IDS if name != BENCH)
-DIMENSIONS = {"supply_voltage": "voltage", "stall_torque": "torque", "speed_per_60deg": "time",
-              "no_load_current": "current", "stall_current": "current", "idle_current": "current", "deadband": "time",
-              "pulse_min": "time", "pulse_max": "time", "travel": "angle", "travel_per_400us": "angle", "mass": "mass"}
+DIMENSIONS = {"supply_voltage": "voltage", "voltage_min": "voltage", "voltage_max": "voltage", "stall_torque": "torque",
+              "speed_per_60deg": "time", "no_load_current": "current", "stall_current": "current",
+              "idle_current": "current", "deadband": "time", "pulse_min": "time", "pulse_max": "time",
+              "travel": "angle", "travel_per_400us": "angle", "mass": "mass"}
 ROUNDED = 1e-5  # the files hold six digits
 # What stands behind the range where it is wider than the sheet alone says
 NO_LOAD_CURRENTS = {"futaba-s3003": (0.1, 0.15, 0.2), "towerpro-mg996r": (0.5, 0.6)}

@@ -232,6 +232,22 @@ def test_what_is_wrong_in_a_file_is_said(write, text, parts):
         assert part in str(error)
 
 
+@pytest.mark.parametrize(("low", "high", "parts"), [
+    ("{ value = 8.4, unit = 'V' }", "{ value = 6, unit = 'V' }", ["voltage_max of 'mine'", "got '8.4 to 6 V'"]),
+    ("{ value = 4.8, unit = 'V' }", None, ["got 'one end alone'", "two positive voltages, the lower one first"]),
+    (None, "{ value = 6, unit = 'V' }", ["got 'one end alone'"]),
+    ("{ value = 0, unit = 'V' }", "{ value = 6, unit = 'V' }", ["got '0 to 6 V'"]),
+    ("{ value = nan, unit = 'V' }", "{ value = 6, unit = 'V' }", ["[sheet] voltage_min of 'mine'", "nan"]),
+    ("{ value = 4.8, unit = 'V' }", "{ value = inf, unit = 'V' }", ["[sheet] voltage_max of 'mine'", "inf"]),
+    ("{ value = 4.8, unit = 'A' }", "{ value = 6, unit = 'V' }", ["[sheet] voltage_min of 'mine'", 'unit = "V"']),
+    ("4.8", "6.0", ["[sheet] voltage_min of 'mine'", "got 4.8"])])
+def test_a_range_of_voltages_that_is_none_is_one_line(write, low, high, parts):
+    ends = {"voltage_min": low, "voltage_max": high}
+    error = refused(write(GOOD + "[sheet]\n" + "".join(f"{key} = {end}\n" for key, end in ends.items() if end)))
+    for part in parts:
+        assert part in str(error)
+
+
 @pytest.mark.parametrize("text", [
     GOOD + "[", GOOD + "[motor]\n", GOOD + GOOD.split("[motor]")[1], "= 3", "\0", "name = 'a", "x = " + "[" * 5000,
     "name = 1" + "0" * 5000, b"\x7fELF",

@@ -7,8 +7,7 @@ import pytest
 
 import servotwin as st
 from servotwin.datasheet.choice import candidate
-from servotwin.datasheet.conditions import lowest_voltage
-from servotwin.parameters import catalog_names
+from servotwin.parameters import catalog_names, operating_voltages, printed_points
 from servotwin.simulation.remarks import BELOW_CHIP, BELOW_REGISTER, HELD_BACK
 from servotwin.simulation.sag import floor_of
 
@@ -138,13 +137,42 @@ def test_a_protection_that_watches_the_supply_says_it_itself():
     assert "tripped by undervoltage" in dict(result.remarks)
 
 
-@pytest.mark.parametrize("volts", [5.0, 3.3, 7.4])
-def test_no_servo_is_taken_below_its_sheet(volts):
+@pytest.mark.parametrize("text", ["usb", "3.3V", "5V", "7.4V"])
+def test_no_servo_is_taken_outside_what_its_maker_states_or_far_below_what_is_printed(text):
+    supply = st.Supply.of(text)
+    volts, taken = supply.open_circuit_voltage, set()
     for name in catalog_names():
         servo = st.load_servo(name)
-        if lowest_voltage(servo) > volts:
-            assert "voltage" in [reason.kind for reason in candidate(servo, volts).reasons], name
-    assert any(not candidate(st.load_servo(name), 5.0).reasons for name in catalog_names())
+        if "voltage" in [reason.kind for reason in candidate(servo, supply).reasons]:
+            continue
+        taken.add(name)
+        if "voltage_min" in servo.sheet:
+            assert servo.sheet["voltage_min"]["value"] <= volts <= servo.sheet["voltage_max"]["value"], name
+        else:
+            printed = [point.supply_voltage for point in printed_points(servo) if point.supply_voltage]
+            assert volts >= 0.9 * min(printed, default=0.0), name
+    assert {"towerpro-mg996r", "towerpro-sg90", XL} & taken == {
+        "3.3V": set(), "7.4V": set()}.get(text, {"towerpro-mg996r", "towerpro-sg90", XL})
+
+
+@pytest.mark.parametrize(("name", "taken", "refused"), [
+    ("towerpro-mg996r", (4.8, 5.0, 7.2), (4.7, 7.4)), ("dynamixel-xl-320", (6.0, 7.4, 8.4), (5.0, 8.5)),
+    ("feetech-sts3215-7v4", (5.0, 7.4), (3.7, 8.4)), ("dynamixel-xm430-w350", (11.1, 14.8), (9.9, 15.0)),
+    (STS, (10.9, 15.0), (10.7, 15.1)), ("gobilda-2000-135", (4.4, 9.2), (4.3, 9.3))])  # of these no range is known
+def test_a_stated_range_is_kept_and_printed_figures_have_a_margin(name, taken, refused):
+    servo = st.load_servo(name)
+    for volts in (*taken, *refused):
+        kinds = [reason.kind for reason in candidate(servo, volts).reasons]
+        assert ("voltage" in kinds) is (volts in refused), volts
+
+
+def test_stated_ranges_hold_the_printed_voltages_and_lie_above_where_an_alarm_sets_in():
+    stated = {name: found for name in catalog_names() if (found := operating_voltages(st.load_servo(name)))}
+    assert len(stated) >= 27
+    for name, (low, high) in stated.items():
+        servo = st.load_servo(name)
+        assert all(low <= point.supply_voltage <= high for point in printed_points(servo)), name
+        assert servo.kind != "bus" or floor_of(servo).voltage <= low, name
 
 
 def test_a_fleet_tells_its_supply_and_each_servo_it():

@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from servotwin.bench.table_columns import BenchTable, TableColumn, bench_table
 from servotwin.errors import InputError
 
+_LEAST_WAY = 2  # rows of each way whose way is known, below which no row is put to one by what it reads
+
 
 @dataclass(frozen=True, kw_only=True)
 class LineFit:
@@ -268,6 +270,40 @@ def curvature_test(x: ArrayLike, y: ArrayLike, *, ways: ArrayLike | None = None)
         p_value=2.0 * float(stdtr(free, -abs(t))), sagitta=abs(float(solution[0])))
 
 
+_SHOWN = 0.01  # p-value of a hysteresis from which on it tells the way of a row, so low that noise rarely does; assumed
+_OFF = 3.0  # times the noise: so far a row lies off the line of one way that it is of the other; assumed
+
+
+def settled_ways(table: BenchTable) -> NDArray[np.float64] | None:
+    """Return which way each row was read, as `BenchTable.ways`, but at turning points by what was read there.
+
+    A value that stands twice where the ways turn may have been read twice on one way, or again after the shaft had gone
+    beyond; of the first row no one knows where the shaft came from. If the other rows show hysteresis, such a row that
+    lies off the line of its way by three times their noise, and nearer to that of the other way, is of the other.
+
+    Examples
+    --------
+    >>> x = np.array([1.0, 2.0, 3.0, 4.0, 4.0, 3.0, 2.0, 1.0])
+    >>> for last in (39.0, 41.0):  # held at the top, or come back from beyond
+    ...     y = np.array([9.0, 19.1, 28.9, 39.0, last, 31.0, 21.1, 10.9])
+    ...     settled_ways(bench_table({"t_a_us": 100.0 * x, "q_deg": y}))[4].tolist()
+    -0.5
+    0.5
+    """
+    x, y = table.dialled, _reading(table, "output_angle") or _reading(table, "feedback")
+    if table.ways is None or x is None or y is None:
+        return table.ways
+    at, ways = table.at_turns, table.ways.copy()
+    if at.all() or min(np.sum(ways[~at] < 0.0), np.sum(ways[~at] > 0.0)) < _LEAST_WAY:
+        return ways
+    line = fit_line(x.values[~at], y.values[~at], ways=ways[~at])
+    off = y.values[at] - line(x.values[at])
+    own, other = (np.abs(off - way * line.hysteresis) for way in (ways[at], -ways[at]))
+    noise = math.sqrt(sum(r * r for r in line.residuals) / line.freedom)
+    ways[at] *= np.where((line.hysteresis_p < _SHOWN) & (own > _OFF * noise) & (other < own), -1.0, 1.0)
+    return ways
+
+
 # ordinate and abscissa of each line; a count stands for its voltage where the table has none
 _LINES = (("output_angle", "command"), ("output_angle", "pulse_width"), ("feedback", "output_angle"),
           ("feedback", "command"), ("feedback", "pulse_width"), ("pulse_width", "command"))
@@ -298,7 +334,8 @@ def table_fits(table: BenchTable | Mapping[str, ArrayLike]) -> dict[str, TableFi
     pairs = [(_reading(read, abscissa), _reading(read, ordinate)) for ordinate, abscissa in _LINES]
     for side in ("command", "feedback"):
         pairs.append((read.first(f"{side}_voltage"), read.first(f"{side}_count")))
-    fits = [TableFit(x, y, read.ways) for x, y in pairs if x is not None and y is not None]
+    ways = settled_ways(read)
+    fits = [TableFit(x, y, ways) for x, y in pairs if x is not None and y is not None]
     if not fits:
         raise InputError("lines of the table", got=", ".join(column.name for column in read.columns),
                          allowed="two columns of different quantities")

@@ -127,7 +127,7 @@ def _remarks(table: BenchTable, lines: Mapping[str, TableFit], found: Mapping[st
              instruments: tuple[InstrumentPair, ...], rows: tuple[RowFinding, ...], servo: Servo | None) -> list[str]:
     remarks = ["rows that fit badly are left in all lines" if any(row.certain for row in rows) else
                f"no row is certain to fit badly: the worst has p = {smallest_p_value(lines):.2g} for all rows and "
-               "lines", *_by_counts(lines, instruments)]
+               "lines", *_by_counts(lines, instruments), *_turned(table, lines)]
     if (rates := table.first("pulse_rate")) is not None:
         rate = float(np.mean(rates.values))
         remarks.append(f"the pulses came at {rate:.5g} Hz, a frame of {1e3 / rate:.3g} ms; that belongs to the "
@@ -142,6 +142,16 @@ def _remarks(table: BenchTable, lines: Mapping[str, TableFit], found: Mapping[st
     if table.ignored:
         remarks.append("not used, for their names are unknown: " + ", ".join(table.ignored))
     return remarks
+
+
+def _turned(table: BenchTable, lines: Mapping[str, TableFit]) -> list[str]:
+    """Name the rows at turning points that are of the other way than their order says."""
+    ways = next(iter(lines.values())).ways
+    if ways is None or table.ways is None:
+        return []
+    return [f"{table.label(row)}, where the ways turn, counts as read on the way "
+            f"{'down' if ways[row] > 0.0 else 'up'}: it lies on the line of that way"
+            for row in np.flatnonzero(ways != table.ways).tolist()]
 
 
 def _by_counts(lines: Mapping[str, TableFit], instruments: tuple[InstrumentPair, ...]) -> list[str]:

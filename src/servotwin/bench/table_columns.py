@@ -121,20 +121,38 @@ class BenchTable:
     def ways(self) -> NDArray[np.float64] | None:
         """Which way each row was read, −½ up and ½ down, by the command or pulse of the row before; None for one way.
 
-        The first row counts as one of the way that follows. Rows that turn back after less than three each were read
-        in no order, and are of one way.
+        The first row counts as one of the way that follows, one with the value of the row before as one of its way.
+        Rows that turn back after less than three each were read in no order, and are of one way.
         """
         if self.told_ways is not None:
             return self.told_ways
-        told = [column for name in ("pulse_width", "command_voltage", "command_count") for column in self.of(name)]
-        if not told or self.rows < _LEAST_BOTH:
+        if self.dialled is None or self.rows < _LEAST_BOTH:
             return None
-        steps = np.sign(np.diff(told[0].values))
-        steps = steps[np.maximum.accumulate(np.where(steps != 0.0, np.arange(steps.size), 0))]  # of equal ones the last
+        steps = np.sign(np.diff(self.dialled.values))
+        moved = np.flatnonzero(steps)
+        steps = steps[moved[np.maximum(np.searchsorted(moved, np.arange(steps.size), side="right") - 1, 0)]]
         ways = -0.5 * np.concatenate([steps[:1], steps])
         turns = int((np.diff(ways) != 0.0).sum())
         both = min((ways < 0.0).sum(), (ways > 0.0).sum()) >= _LEAST_WAY
-        return ways if both and 3 * turns <= self.rows and not (ways == 0.0).any() else None
+        return ways if both and 3 * turns <= self.rows else None
+
+    @property
+    def dialled(self) -> TableColumn | None:
+        """The pulse or command that was set in each row; None where there is none."""
+        return self.first("pulse_width") or self.first("command_voltage") or self.first("command_count")
+
+    @property
+    def at_turns(self) -> NDArray[np.bool_]:
+        """Rows whose way no order tells: those of the first value, and those whose value stands twice at a turn."""
+        found = np.zeros(self.rows, dtype=np.bool_)
+        if self.dialled is None or self.ways is None:
+            return found
+        runs = np.concatenate([[0], np.cumsum(np.diff(self.dialled.values) != 0.0)])  # of equal values
+        found[runs == 0] = True
+        for run in np.flatnonzero(np.bincount(runs) > 1):
+            rows = np.flatnonzero(runs == run)
+            found[rows] |= len(set(self.ways[rows[0]:rows[-1] + 2])) > 1
+        return found
 
     @property
     def rows(self) -> int:

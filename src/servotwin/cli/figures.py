@@ -70,8 +70,8 @@ def rate(option: str, text: str) -> float:
     return math.radians(float(found[1])) / (float(found[2] or 1.0) * 1e-6)
 
 
-def pulse_range(option: str, text: str) -> tuple[float, float]:
-    """Return the two pulse widths of a range [s].
+def two_ends(option: str, text: str, dimension: str) -> tuple[float, float]:
+    """Return the two ends of a range of pulse widths [s] or of voltages [V]: dimension "time" or "voltage".
 
     Raises
     ------
@@ -80,16 +80,17 @@ def pulse_range(option: str, text: str) -> tuple[float, float]:
 
     Examples
     --------
-    >>> pulse_range("--pulse-range", "556-2410 us")
-    (0.000556, 0.00241)
+    >>> two_ends("--pulse-range", "556-2410 us", "time"), two_ends("--voltage-range", "4.8V~7.2V", "voltage")
+    ((0.000556, 0.00241), (4.8, 7.2))
     """
-    found = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*(?:us|ms)?\s*(?:-|to|:|\.\.|\u2013)\s*(\d+(?:\.\d+)?\s*\w+)\s*",
-                         in_letters(text))
+    found = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*(us|ms|mV|V)?\s*(?:-|to|:|\.\.|\u2013|~)\s*"
+                         r"(\d+(?:\.\d+)?)\s*([^\W\d]+)\s*", in_letters(text))
     if found is None:
-        raise InputError(option, got=text, allowed="two pulse widths with a unit, such as 500-2500 us")
-    unit = re.sub(r"[\d.\s]", "", found[2])
-    return (quantity(option, f"{found[1]} {unit}", "time", positive=True),
-            quantity(option, found[2], "time", positive=True))
+        raise InputError(option, got=text, allowed={
+            "time": "two pulse widths with a unit, such as 500-2500 us",
+            "voltage": "two voltages with a unit, such as 4.8-7.2 V"}[dimension])
+    return (quantity(option, f"{found[1]} {found[2] or found[4]}", dimension, positive=True),
+            quantity(option, f"{found[3]} {found[4]}", dimension, positive=True))
 
 
 def ratio(option: str, text: str) -> float:

@@ -40,6 +40,7 @@ def from_sheet(
         metavar="VOLTAGE", help="Supply voltage for figures that do not name one.", rich_help_panel=_POINT)] = None,
     name: Annotated[str | None, _of("ID", "Short id, such as my-servo.")] = None,
     title: Annotated[str | None, _of("TEXT", "Name for human readers.")] = None,
+    voltage_range: Annotated[str | None, _of('"4.8-7.2 V"', "Supply voltages that the maker states.")] = None,
     deadband: Annotated[str | None, _of('"8 us"', "Deadband, taken as its full width.")] = None,
     pulse_range: Annotated[str | None, _of('"500-2500 us"', "Pulse widths between which the servo turns.")] = None,
     travel: Annotated[str | None, _of('"180 deg"', "Angle between these pulses; endless: as --continuous.")] = None,
@@ -74,10 +75,11 @@ def from_sheet(
     """Make a servo file from a data sheet."""
     points = {"stall_torque": torque, "no_load_speed": speed, "no_load_current": running_current,
               "stall_current": stall_current, "idle_current": idle_current}
-    whole = {"name": name, "title": title, "deadband": deadband, "pulse_range": pulse_range, "travel": travel,
-             "rate": rate, "neutral": neutral, "stops": stops, "mass": mass, "gear_ratio": gear_ratio,
-             "backlash": backlash, "continuous": continuous, "motor_type": motor_type,
-             "modulation": modulation, "registers": registers, "source": source, "note": note}
+    whole = {"name": name, "title": title, "voltage_range": voltage_range, "deadband": deadband,
+             "pulse_range": pulse_range, "travel": travel, "rate": rate, "neutral": neutral, "stops": stops,
+             "mass": mass, "gear_ratio": gear_ratio, "backlash": backlash, "continuous": continuous,
+             "motor_type": motor_type, "modulation": modulation, "registers": registers, "source": source,
+             "note": note}
     typed = [f"--{option.replace('_', '-')}" for option, given in (
         *whole.items(), ("torque", torque), ("speed", speed), ("running-current", running_current),
         ("stall-current", stall_current), ("idle-current", idle_current), ("at", at)) if given]
@@ -122,7 +124,9 @@ def _sheet(points: dict[str, _Figures], whole: dict[str, Any], at: str | None) -
         raise InputError("--name is missing", allowed="a short id, such as --name my-servo")
     usual = None if at is None else quantity("--at", at, "voltage", bare=True, positive=True)
     endless = (whole["travel"] or "").strip().lower() in ENDLESS
-    low, high = fig.pulse_range("--pulse-range", whole["pulse_range"]) if whole["pulse_range"] else (None, None)
+    (lowest, highest), (low, high) = (
+        fig.two_ends(f"--{name.replace('_', '-')}", whole[name], dimension) if whole[name] else (None, None)
+        for name, dimension in (("voltage_range", "voltage"), ("pulse_range", "time")))
 
     def one(option: str, dimension: str) -> float | None:
         text = whole[option]
@@ -131,7 +135,8 @@ def _sheet(points: dict[str, _Figures], whole: dict[str, Any], at: str | None) -
 
     return Sheet(
         name=whole["name"], title=whole["title"] or "", points=_points(points, usual), pulse_min=low, pulse_max=high,
-        deadband=one("deadband", "time"), neutral_pulse=one("neutral", "time"), travel=one("travel", "angle"),
+        voltage_min=lowest, voltage_max=highest, deadband=one("deadband", "time"),
+        neutral_pulse=one("neutral", "time"), travel=one("travel", "angle"),
         stop_travel=one("stops", "angle"), mass=one("mass", "mass"), backlash=one("backlash", "angle"),
         angle_per_pulse=fig.rate("--rate", whole["rate"]) if whole["rate"] else None,
         gear_reduction=fig.ratio("--gear-ratio", whole["gear_ratio"]) if whole["gear_ratio"] else None,

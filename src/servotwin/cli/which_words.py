@@ -244,11 +244,16 @@ def why(each: Candidate) -> str:
 
 def candidate_facts(each: Judged) -> dict[str, Any]:
     """Return a candidate in SI, ready for JSON."""
+    from servotwin.datasheet.conditions import highest_voltage, lowest_voltage
+    from servotwin.parameters import operating_voltages
+
     made, rest, tried = each.candidate, each.rest, each.tried
     found: dict[str, Any] = {
         "id": made.servo.name, "title": made.servo.title, "kind": made.servo.kind, "mass": made.mass,
         "price": made.price, "travel": made.travel, "margin": made.margin if tried is None else tried.margin,
         "most_torque": made.most_torque, "time_60": made.time, "stall_current": made.stall_current,
+        "voltage": {"lowest": lowest_voltage(made.servo), "highest": highest_voltage(made.servo),
+                    "stated": operating_voltages(made.servo) is not None},
         "notes": [*made.notes, *remarks(each)], "reasons": [reason._asdict() for reason in made.reasons]}
     if rest is not None:
         from servotwin.cli.curves_words import lift_facts

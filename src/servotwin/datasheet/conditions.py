@@ -7,7 +7,7 @@ import warnings
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from servotwin.errors import InputError
-from servotwin.parameters import printed_points
+from servotwin.parameters import operating_voltages, sheet_voltages
 from servotwin.parameters.quantity import SET_BY_USER
 from servotwin.physics import Temperatures, magnet_factor, winding_resistance
 from servotwin.units import is_finite
@@ -20,52 +20,65 @@ if TYPE_CHECKING:
 
 _Model = TypeVar("_Model", bound="Model")
 _MOST = 2.0  # times the highest voltage that the sheet prints
-_ABOVE = 1.25  # times that, at which nobody is told to buy a servo; assumed
-_BELOW = 0.9  # times the lowest: a servo for 12 V runs on three cells, which are called 11.1 V; assumed
+_ABOVE = 1.25  # times that, at which nobody is told to buy a servo whose range no sheet states; assumed
+_BELOW = 0.9  # times the lowest: a servo for 12 V runs on three cells, which are called 11.1 V; assumed, likewise
 _THERMAL = ("winding_capacity", "housing_capacity", "winding_to_housing", "housing_to_ambient", "ambient",
             "magnet_coefficient")
 
 
 def highest_voltage(servo: Servo) -> float:
-    """Return the highest supply voltage that the sheet prints; that of the servo without one [V].
+    """Return the highest supply voltage of the sheet [V].
+
+    The upper end of the range that the maker states; without one the highest voltage that figures are printed for, and
+    without such figures that of the servo.
 
     Examples
     --------
     >>> from servotwin.parameters import load_servo
-    >>> highest_voltage(load_servo("gobilda-2000-135"))
-    7.4
+    >>> highest_voltage(load_servo("gobilda-2000-135")), highest_voltage(load_servo("towerpro-mg996r"))
+    (7.4, 7.2)
     """
-    printed = [point.supply_voltage for point in printed_points(servo) if point.supply_voltage]
-    own = servo.supply.open_circuit_voltage
-    return max([*printed, *([own] if own and not printed else [])], default=0.0)
+    found = sheet_voltages(servo)
+    return (servo.supply.open_circuit_voltage or 0.0) if found is None else found[1]
 
 
 def is_above_sheet(servo: Servo, voltage: float) -> bool:
     """Tell whether a supply voltage [V] is so far above the highest of a sheet that the servo may not bear it.
+
+    That is above the range that the maker states, or far above the figures of a sheet that states none.
 
     Examples
     --------
     >>> from servotwin.parameters import load_servo
     >>> [is_above_sheet(load_servo("gobilda-2000-135"), volts) for volts in (8.4, 12.0)]
     [False, True]
+    >>> is_above_sheet(load_servo("towerpro-mg996r"), 7.4)
+    True
     """
-    return voltage > _ABOVE * highest_voltage(servo) > 0.0
+    most = highest_voltage(servo)
+    return voltage > (most if operating_voltages(servo) else _ABOVE * most) > 0.0
 
 
 def lowest_voltage(servo: Servo) -> float:
-    """Return the lowest supply voltage that the sheet prints; 0 without one [V].
+    """Return the lowest supply voltage of the sheet; 0 without one [V].
+
+    The lower end of the range that the maker states, else the lowest voltage that figures are printed for. A bus
+    servo's register Min_Voltage_Limit lies below that: there its alarm sets in, which is no promise that it works.
 
     Examples
     --------
     >>> from servotwin.parameters import load_servo
     >>> lowest_voltage(load_servo("gobilda-2000-135")), lowest_voltage(load_servo("dynamixel-mx-28"))
-    (4.8, 11.1)
+    (4.8, 10.0)
     """
-    return min((point.supply_voltage for point in printed_points(servo) if point.supply_voltage), default=0.0)
+    found = sheet_voltages(servo)
+    return 0.0 if found is None else found[0]
 
 
 def is_below_sheet(servo: Servo, voltage: float) -> bool:
     """Tell whether a supply voltage [V] is so far below the lowest of a sheet that the servo may not work.
+
+    That is below the range that the maker states, or far below the figures of a sheet that states none.
 
     Examples
     --------
@@ -73,7 +86,8 @@ def is_below_sheet(servo: Servo, voltage: float) -> bool:
     >>> [is_below_sheet(load_servo("feetech-sts3215-12v"), volts) for volts in (11.1, 5.0)]
     [False, True]
     """
-    return 0.0 < voltage < _BELOW * lowest_voltage(servo)
+    least = lowest_voltage(servo)
+    return 0.0 < voltage < (least if operating_voltages(servo) else _BELOW * least)
 
 
 def check_voltage(servo: Servo, voltage: float) -> float:

@@ -58,7 +58,8 @@ BAM_ACTUATORS = {
     "xl330": BamActuator(error_gain=4096.0 / _TURN / (256.0 * 885.0), servos=("dynamixel-xl330",),
                          source="bam/dynamixel/actuator.py, XL330Actuator: counts a radian over 256 and 885 steps"),
     "xc330m288t": BamActuator(error_gain=0.00575504, servos=("dynamixel-xc330-m288",),
-                              source="bam/dynamixel/actuator.py, an XC330-M288-T at 5.1 V"),
+                              source="bam/dynamixel/actuator.py, an XC330-M288-T at 5.1 V; the manual's P/128 times "
+                                     "0.113 %"),
     "sts3215": BamActuator(error_gain=0.166, largest_duty=0.97, speed=3400.0 * _TURN / 4096.0, servos=_STS,
                            source="bam/feetech/actuator.py, STS3215Actuator: by oscilloscope", writes=("P", "D")),
     "waveshare_st3025": BamActuator(error_gain=0.166,

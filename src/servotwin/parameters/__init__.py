@@ -16,7 +16,14 @@ from servotwin.parameters.groups import (
     Thermal,
 )
 from servotwin.parameters.output_file import write_file
-from servotwin.parameters.printed import PrintedPoint, printed_fact, printed_flags, printed_points
+from servotwin.parameters.printed import (
+    PrintedPoint,
+    operating_voltages,
+    printed_fact,
+    printed_flags,
+    printed_points,
+    sheet_voltages,
+)
 from servotwin.parameters.quantity import ORIGINS, Quantity
 from servotwin.parameters.registers import (
     REGISTER_FAMILIES,
@@ -33,6 +40,6 @@ __all__ = [
     "Group", "Motor", "Potentiometer", "PrintedPoint", "Quantity", "Servo", "Stops", "Supply", "Thermal",
     "catalog_names", "dataset_names", "dimension_of", "dynamixel_ax", "dynamixel_mx", "dynamixel_x", "dynamixel_xl320",
     "feetech_sts",
-    "load_dataset", "load_servo", "printed_fact", "printed_flags", "printed_points", "servo_from_values", "unit_of",
-    "write_file",
+    "load_dataset", "load_servo", "operating_voltages", "printed_fact", "printed_flags", "printed_points",
+    "servo_from_values", "sheet_voltages", "unit_of", "write_file",
 ]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from servotwin import units
 from servotwin.errors import ServotwinError
-from servotwin.parameters.sheet_table import ELSE, POINT, WHOLE
+from servotwin.parameters.sheet_table import ELSE, POINT, WHOLE, voltage_range
 
 if TYPE_CHECKING:
     from servotwin.parameters.servo import Servo
@@ -74,6 +74,38 @@ def printed_points(servo: Servo) -> tuple[PrintedPoint, ...]:
     others = servo.sheet.get(ELSE)
     tables = [servo.sheet, *(others if isinstance(others, list) else [])]
     return tuple(_point(table) for table in tables if isinstance(table, Mapping))
+
+
+def operating_voltages(servo: Servo) -> tuple[float, float] | None:
+    """Return the lowest and the highest supply voltage that the maker states for operation; None where not stated [V].
+
+    Raises
+    ------
+    InputError
+        As of `sheet_table.voltage_range`; files are checked when they are read.
+
+    Examples
+    --------
+    >>> from servotwin.parameters import load_servo
+    >>> [operating_voltages(load_servo(name)) for name in ("towerpro-mg996r", "gobilda-2000-135")]
+    [(4.8, 7.2), None]
+    """
+    return voltage_range(servo.name, servo.sheet)
+
+
+def sheet_voltages(servo: Servo) -> tuple[float, float] | None:
+    """Return the lowest and the highest supply voltage of a sheet; None where it has none [V].
+
+    Those that the maker states for operation, else those that figures are printed for.
+
+    Examples
+    --------
+    >>> from servotwin.parameters import load_servo
+    >>> [sheet_voltages(load_servo(name)) for name in ("towerpro-mg996r", "gobilda-2000-135")]
+    [(4.8, 7.2), (4.8, 7.4)]
+    """
+    printed = [point.supply_voltage for point in printed_points(servo) if point.supply_voltage]
+    return operating_voltages(servo) or ((min(printed), max(printed)) if printed else None)
 
 
 def printed_flags(servo: Servo) -> tuple[str, ...]:

@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from servotwin import units
-from servotwin.errors import ParameterError, ServoFileError, UnitError, UnknownNameError
+from servotwin.errors import InputError, ParameterError, ServoFileError, UnitError, UnknownNameError
 from servotwin.parameters.group import Group
 from servotwin.parameters.groups import GROUPS
 from servotwin.parameters.output_file import write_file
 from servotwin.parameters.plausible import warn_of
 from servotwin.parameters.quantity import ORIGINS, Quantity
 from servotwin.parameters.servo import KINDS, Servo, unit_of
+from servotwin.parameters.sheet_table import voltage_range
 from servotwin.text import fault_of, load_toml
 
 if TYPE_CHECKING:
@@ -87,6 +88,10 @@ def _servo_of(content: dict[str, Any], label: str) -> Servo:
             groups[table], found = _read_group(label, table, kind, content[table])
             quantities |= found
     sheet, fit = _table(label, content, "sheet"), _table(label, content, "fit")
+    try:
+        voltage_range(content["name"], sheet)
+    except InputError as error:
+        raise ServoFileError(label, f"{error.what} is not possible", got=error.got, allowed=error.allowed) from None
     try:
         servo = Servo(
             name=content["name"], title=content.get("title", content["name"]), notes=content.get("notes", ""),

@@ -17,12 +17,14 @@ ELSE = "also_at"
 POINT = {"supply_voltage": ("supply_voltage", "voltage", "V"), "stall_torque": ("stall_torque", "torque", "N m"),
          "speed_per_60deg": ("no_load_speed", "time", "s"), "no_load_current": ("no_load_current", "current", "A"),
          "stall_current": ("stall_current", "current", "A"), "idle_current": ("idle_current", "current", "A")}
-WHOLE = {"deadband": ("deadband", "time", "us"), "pulse_min": ("pulse_min", "time", "us"),
+WHOLE = {"voltage_min": ("voltage_min", "voltage", "V"), "voltage_max": ("voltage_max", "voltage", "V"),
+         "deadband": ("deadband", "time", "us"), "pulse_min": ("pulse_min", "time", "us"),
          "pulse_max": ("pulse_max", "time", "us"), "neutral_pulse": ("neutral_pulse", "time", "us"),
          "travel": ("travel", "angle", "deg"), "travel_per_400us": ("angle_per_pulse", "angle", "deg"),
          "stop_travel": ("stop_travel", "angle", "deg"), "backlash": ("backlash", "angle", "deg"),
          "gear_reduction": ("gear_reduction", "number", "1"), "mass": ("mass", "mass", "g")}
 _SPREADS = ("std", "lower", "upper")
+_TWO = "two positive voltages, the lower one first"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,6 +102,35 @@ def figure(servo: str, key: str, entry: Any) -> Figure | None:
         return Figure(value=speed, source=source, std=std, **ends)
     by = 400e-6 if key == "travel_per_400us" else 1.0
     return Figure(value=value / by, source=source, **{name: x / by for name, x in spread.items()})
+
+
+def voltage_range(servo: str, table: Mapping[str, Any]) -> tuple[float, float] | None:
+    """Return the lowest and the highest supply voltage that a maker states for operation [V]; None where not stated.
+
+    Raises
+    ------
+    InputError
+        If the table has one end only, or one that is no voltage, or the low one is above the high one.
+
+    Examples
+    --------
+    >>> volts = {"voltage_min": {"value": 4.8, "unit": "V"}, "voltage_max": {"value": 7200, "unit": "mV"}}
+    >>> voltage_range("mine", volts)
+    (4.8, 7.2)
+    """
+    low, high = (figure(servo, key, table[key]) if key in table else None for key in ("voltage_min", "voltage_max"))
+    check_voltages(f"[sheet] voltage_min and voltage_max of {servo!r}", None if low is None else low.value,
+                   None if high is None else high.value)
+    return None if low is None or high is None else (low.value, high.value)
+
+
+def check_voltages(what: str, low: float | None, high: float | None) -> None:
+    """Raise an InputError if these are not the two ends of a range of voltages [V], or None both."""
+    if low is None or high is None:
+        if low is not high:
+            raise InputError(what, got="one end alone", allowed=_TWO)
+    elif not 0.0 < low <= high:
+        raise InputError(what, got=f"{low:g} to {high:g} V", allowed=_TWO)
 
 
 def _check_spread(what: str, value: float, spread: Mapping[str, float]) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from servotwin.parameters import printed_flags, printed_points
+from servotwin.parameters import printed_flags, sheet_voltages
 from servotwin.signals.signal import headers
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from servotwin.parameters import Servo
     from servotwin.signals import Signal
 
-_TOO_MUCH = 2.0  # times the supply voltage of the sheet
+_TOO_MUCH = 2.0  # times the highest supply voltage of the sheet
 
 
 def warn_of(servo: Servo, commands: Sequence[Signal], duration: float, *, voltages: ArrayLike | None = None,
@@ -48,10 +48,9 @@ def _of_servo(servo: Servo, voltages: ArrayLike | None) -> Iterator[str]:
         yield (f"{servo.name}: its data sheet contradicts itself ({reason}); no servo has all that it says, nor does "
                "this one")
     given = servo.supply.open_circuit_voltage if voltages is None else float(np.max(voltages))
-    printed = [point.supply_voltage for point in printed_points(servo) if point.supply_voltage is not None]
-    rated = max(printed, default=None)
-    if given is not None and rated is not None and given > _TOO_MUCH * rated:
-        yield f"{servo.name}: a supply of {given:g} V is more than twice the {rated:g} V of its data sheet"
+    rated = sheet_voltages(servo)
+    if given is not None and rated is not None and given > _TOO_MUCH * rated[1]:
+        yield f"{servo.name}: a supply of {given:g} V is more than twice the {rated[1]:g} V of its data sheet"
 
 
 def _of_commands(commands: Sequence[Signal], known: NDArray[Any], duration: float) -> Iterator[str]:

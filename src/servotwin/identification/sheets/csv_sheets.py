@@ -22,7 +22,9 @@ _WHOLE = {"deadband_us": ("deadband", 1e-6), "travel_deg": ("travel", _DEG),
           "deg_per_us": ("angle_per_pulse", _DEG * 1e6),
           "mass_g": ("mass", 1e-3), "gear_ratio": ("gear_reduction", 1.0), "backlash_deg": ("backlash", _DEG),
           "neutral_us": ("neutral_pulse", 1e-6), "stop_travel_deg": ("stop_travel", _DEG)}
-_TEXTS = ("maker", "model", "type", "pulse_range_us", "motor_type", "source", "note")
+_RANGES = {"voltage_range_V": (("voltage_min", "voltage_max"), 1.0, "two voltages, such as 4.8-7.2"),
+           "pulse_range_us": (("pulse_min", "pulse_max"), 1e-6, "two pulse widths, such as 500-2500")}
+_TEXTS = ("maker", "model", "type", *_RANGES, "motor_type", "source", "note")
 _UNUSED = ("gear_material", "spline_teeth", "pot_drive", "bearing", "length_mm", "width_mm", "height_mm")
 COLUMNS = (*_TEXTS[:3], *_POINT, *_WHOLE, *_TEXTS[3:])
 
@@ -49,8 +51,8 @@ def read_sheets(path: str | Path) -> SheetList:
     ----------
     path : str or Path
         A header, and one row for each servo and voltage; an empty cell is not printed. Columns: maker, model, type, V,
-        stall_torque_Nm, speed_s_per_60deg, noload_running_current_A, stall_current_A, idle_current_A, deadband_us,
-        pulse_range_us (500-2500), travel_deg (of a servo that turns without
+        stall_torque_Nm, speed_s_per_60deg, noload_running_current_A, stall_current_A, idle_current_A,
+        voltage_range_V (4.8-7.2), deadband_us, pulse_range_us (500-2500), travel_deg (of a servo that turns without
         end: endless), deg_per_us, mass_g, gear_ratio, backlash_deg, neutral_us,
         stop_travel_deg, motor_type, source, note; model, V, stall_torque_Nm and speed_s_per_60deg are needed.
 
@@ -114,9 +116,10 @@ def _sheet(path: Path, title: str, rows: list[tuple[int, Mapping[str, str]]]) ->
         if row.get("type"):
             whole.setdefault("modulation", "digital" if row["type"].startswith("digital") else "analog"
                              if row["type"].startswith("analog") else "")
-        if row.get("pulse_range_us"):
-            whole.setdefault("pulse_min", _pulse(where, row["pulse_range_us"], 1))
-            whole.setdefault("pulse_max", _pulse(where, row["pulse_range_us"], 2))
+        for column, (ends, by, allowed) in _RANGES.items():
+            if row.get(column):
+                for name, value in zip(ends, _two(f"{where}, {column}", row[column], allowed), strict=True):
+                    whole.setdefault(name, value * by)
         if row["V"]:
             points.append(_point(where, row, source))
     try:
@@ -147,11 +150,11 @@ def _number(where: str, column: str, text: str) -> float:
     return value
 
 
-def _pulse(where: str, text: str, k: int) -> float:
+def _two(what: str, text: str, allowed: str) -> tuple[float, float]:
     found = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*-\s*(\d+(?:\.\d+)?)\s*", text)
     if found is None:
-        raise InputError(f"{where}, pulse_range_us", got=text, allowed="two pulse widths, such as 500-2500")
-    return float(found[k]) * 1e-6
+        raise InputError(what, got=text, allowed=allowed)
+    return float(found[1]), float(found[2])
 
 
 def _rows(path: Path) -> list[tuple[int, Mapping[str, str]]]:
@@ -171,5 +174,5 @@ def _rows(path: Path) -> list[tuple[int, Mapping[str, str]]]:
 
 
 def _plain(cell: str) -> str:
-    """Return a number with a decimal point; texts stay as they are."""
-    return cell.replace(",", ".") if re.fullmatch(r"[+-]?\d*,\d+", cell) else cell
+    """Return a number, or a range, with decimal points; texts stay as they are."""
+    return cell.replace(",", ".") if re.fullmatch(r"[+-]?\d*,\d+|\d+(,\d+)?\s*-\s*\d+(,\d+)?", cell) else cell

@@ -10,6 +10,7 @@ from types import MappingProxyType
 from servotwin import units
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.parameters import REGISTER_FAMILIES
+from servotwin.parameters.sheet_table import check_voltages
 
 MODULATIONS = ("analog", "digital", "bus", "")
 ENDLESS = ("endless", "continuous")
@@ -17,7 +18,8 @@ ENDLESS = ("endless", "continuous")
 _USUAL_VOLTAGE = 6.0  # where makers print most
 # What no servo has, from the smallest to the largest: a figure outside it is one in another unit
 _PLAUSIBLE: dict[str, tuple[float, float, str]] = {
-    "supply_voltage": (1.0, 60.0, "V"), "stall_torque": (1e-4, 200.0, "N m"), "no_load_speed": (0.02, 300.0, "rad/s"),
+    **dict.fromkeys(("supply_voltage", "voltage_min", "voltage_max"), (1.0, 60.0, "V")),
+    "stall_torque": (1e-4, 200.0, "N m"), "no_load_speed": (0.02, 300.0, "rad/s"),
     "no_load_current": (1e-4, 50.0, "A"), "stall_current": (1e-3, 200.0, "A"), "idle_current": (1e-7, 5.0, "A"),
     "deadband": (1e-8, 1e-3, "s"), "pulse_min": (1e-5, 0.01, "s"), "pulse_max": (1e-5, 0.01, "s"),
     "neutral_pulse": (1e-5, 0.01, "s"), "travel": (0.01, 500.0, "rad"), "stop_travel": (0.01, 500.0, "rad"),
@@ -92,6 +94,8 @@ class Sheet:
         of the first one make the servo; those of other sources only widen its ranges.
     title : str
         For people; the name unless given.
+    voltage_min, voltage_max : float, optional
+        Supply voltages between which the maker lets it run [V].
     deadband : float, optional
         [s].
     pulse_min, pulse_max : float, optional
@@ -140,6 +144,8 @@ class Sheet:
     name: str
     points: tuple[SheetPoint, ...]
     title: str = ""
+    voltage_min: float | None = None
+    voltage_max: float | None = None
     deadband: float | None = None
     pulse_min: float | None = None
     pulse_max: float | None = None
@@ -170,6 +176,7 @@ class Sheet:
         if self.modulation != "bus" and self.registers:
             raise InputError("registers", got=self.registers, allowed='nothing, for modulation is not "bus"')
         self._check_endless()
+        check_voltages("voltage range", self.voltage_min, self.voltage_max)
         if (self.pulse_min is None) != (self.pulse_max is None) or not (self.pulse_min or 0.0) < (self.pulse_max or 1):
             raise InputError("pulse range", got=f"{self.pulse_min} to {self.pulse_max} s",
                              allowed="two pulse widths, the shorter one first")
