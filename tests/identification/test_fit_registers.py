@@ -8,6 +8,7 @@ import pytest
 import servotwin as st
 from servotwin.identification import validate
 from servotwin.identification.fitting.registers import as_logs_say, of_no_robot, register_search
+from servotwin.identification.fitting.stopping import Within
 from servotwin.loads import Pendulum
 from servotwin.logs.bam_logs import read_bam_log
 from servotwin.models import default_model
@@ -140,3 +141,8 @@ def test_gains_that_bam_did_not_write_are_not_known(data_folder):
     assert math.degrees(found.total) > 5.0
     assert math.degrees(found.registers.taken.error) < 0.5
     assert "no limit of acceleration" in found.warnings[0]
+
+
+def test_a_search_that_has_no_time_says_nothing():
+    servo = st.load_servo(STS)
+    assert register_search(st.DigitalServo(servo), [log(robot="")], Within(1e-9)) is None

@@ -174,7 +174,7 @@ def identify(
     plain, assumed = as_logs_say(plain, read)
     before = _seen_before(starts, mend)
     given, noticed = (tuple(read), ()) if before else first_looks(read, plain, mend)
-    registers = None if before else register_search(plain, given)
+    registers = None if before else register_search(plain, given, limit)
     if registers is not None and registers.taken is not None:
         plain = type(plain)(registers.taken.servo)
     usual = checks.usual_free(plain, read) if free is None else ()

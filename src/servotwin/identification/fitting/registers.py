@@ -21,6 +21,7 @@ from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.loop_gain import GAIN, with_loop_gain
 from servotwin.identification.fitting.point import DELAY_SCALE, Point
+from servotwin.identification.fitting.stopping import Within
 from servotwin.logs.bam_actuators import writes_gain
 from servotwin.logs.log import Log
 from servotwin.models import DigitalServo, Model
@@ -36,7 +37,7 @@ _DELAY, _NEAR = 0.01, 1e-4  # s, of the first of these, and what changes nothing
 _DELAYED = 3  # simulations of one servo, each at the delay that the one before it wants
 _PROMISING = 1.5  # times the least error: what is more gets no delay of its own
 _RESTS, _RESTED = 1.5, 0.3  # counts between samples, and s: a shaft that rests
-_SECONDS = 12.0  # of a log, those of the most motion
+_SECONDS, _MOST = 12.0, 40.0  # of a log, those of the most motion: at first, and in all
 _MOST_DELAY = 0.3  # s
 _ROUNDS = 3  # of all registers, one after the other
 _FAR = 1.25  # step of a register at which the logs tell its value if they do
@@ -216,8 +217,8 @@ class _State(NamedTuple):
 class _Bench:
     """Whole lanes of a servo with other registers beside some logs."""
 
-    def __init__(self, model: Model, logs: Sequence[Log], family: Family) -> None:
-        self.model, self.family = model, family
+    def __init__(self, model: Model, logs: Sequence[Log], family: Family, within: Within) -> None:
+        self.model, self.family, self.within = model, family, within
         self.varied = {one.name: one for one in VARIED[family.label]}
         self.sets = {one.name: one for one in (_AS_GIVEN, *SETS.get(family.label, ()))}
         self.raw = written(family, model.servo)
@@ -230,6 +231,8 @@ class _Bench:
         """Return what is left with some registers, each set of them simulated once."""
         asked = [*dict.fromkeys(states)]
         new = [state for state in asked if state not in self._seen]
+        if new and self.within.over:
+            raise TimeoutError
         made = [(state, one) for state in new if (one := self._made(state)) is not None]
         groups: dict[tuple[str, ...], list[tuple[_State, Tried]]] = {}
         for state, one in made:
@@ -365,8 +368,10 @@ def _words(changed: Mapping[str, int | None], varied: Iterable[Varied]) -> str:
     return ", ".join(said) or "the registers as the servo has them"
 
 
-def register_search(model: Model, logs: Sequence[Log]) -> RegisterSearch | None:
+def register_search(model: Model, logs: Sequence[Log], within: Within | None = None) -> RegisterSearch | None:
     """Return what stands in the registers of a bus servo that logs did not record; None where nothing can be said.
+
+    That is so of servos without registers, of logs without an angle, and where time is over.
 
     Parameters
     ----------
@@ -374,19 +379,29 @@ def register_search(model: Model, logs: Sequence[Log]) -> RegisterSearch | None:
         A `DigitalServo` that takes goals, whose numbers follow from registers; of others there is nothing.
     logs : sequence of Log
         Those without an angle are left out.
+    within : Within, optional
+        The time that it may take.
     """
+    try:
+        return _register_search(model, logs, within or Within())
+    except TimeoutError:
+        return None
+
+
+def _register_search(model: Model, logs: Sequence[Log], within: Within) -> RegisterSearch | None:
     label = family_label(model.servo)
     if not isinstance(model, DigitalServo) or not model.takes_goals or label is None or label not in VARIED:
         return None
     family = register_family_of(model.servo)
     seen = [log for log in logs if log.angle_name == "output_angle" and log.command_kind == "angle"]
-    seen = sorted(seen, key=lambda log: -float(np.nanstd(log.measured["output_angle"])))[:_LOGS]
+    seen = [_busiest(log, family.count, _MOST) for log in
+            sorted(seen, key=lambda log: -float(np.nanstd(log.measured["output_angle"])))[:_LOGS]]
     if not seen:
         return None
     known = known_registers(family, model.servo) | _recorded(seen, VARIED[label])
-    bench = _Bench(model, seen, family)
-    some = [_busiest(log, family.count) for log in seen]
-    first = bench if all(a is b for a, b in zip(some, seen, strict=True)) else _Bench(model, some, family)
+    bench = _Bench(model, seen, family, within)
+    some = [_busiest(log, family.count, _SECONDS) for log in seen]
+    first = bench if all(a is b for a, b in zip(some, seen, strict=True)) else _Bench(model, some, family, within)
     given = bench.tried([_State(_AS_GIVEN.name)])
     if not given or not math.isfinite(given[0].error):
         return None
@@ -400,19 +415,19 @@ def register_search(model: Model, logs: Sequence[Log]) -> RegisterSearch | None:
     return RegisterSearch(given[0], found.best, doubted, found.moves, found.others)
 
 
-def _busiest(log: Log, count: float) -> Log:
+def _busiest(log: Log, count: float, seconds: float) -> Log:
     """Return the part of a log in which its command goes furthest, from rest on; all of one that is short.
 
     In motion nobody knows where the profile of the program stands.
     """
-    if log.duration <= _SECONDS:
+    if log.duration <= seconds:
         return log
     time, q = log.time, log.measured["output_angle"]
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(log.held)))])
     moved = (np.abs(np.diff(q, prepend=q[:1])) > _RESTS * count) | (np.diff(way, prepend=0.0) > 0.0)
     last_moved = np.maximum.accumulate(np.where(moved, time, time[0]))
-    ends = np.searchsorted(time, time + _SECONDS, side="right") - 1
-    rests = (time - last_moved >= _RESTED) & (time <= time[-1] - _SECONDS)
+    ends = np.searchsorted(time, time + seconds, side="right") - 1
+    rests = (time - last_moved >= _RESTED) & (time <= time[-1] - seconds)
     rests[0] = True
     first = int(np.argmax(np.where(rests, way[ends] - way, -1.0)))
     return log.part(float(time[first]), float(time[ends[first]]))
