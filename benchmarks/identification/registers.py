@@ -83,7 +83,7 @@ def inside(fit: st.identification.Fit, true: st.Servo) -> tuple[int, int]:
 
 def main(draws: int = 20, first: int = 1, *, search: bool = False) -> None:
     print("registers; CPU s of the search; error by the file, then as the search leaves it [deg] | fit: CPU s; error "
-          "seen, with true registers given; unseen; registers inside their intervals")
+          "and error with true registers given, seen; likewise unseen; registers inside their intervals")
     found_in, far = 0, 0
     for seed in range(first, first + draws):
         it, servo = joint(seed), st.load_servo(FILE)
@@ -102,11 +102,11 @@ def main(draws: int = 20, first: int = 1, *, search: bool = False) -> None:
         spent = clock.process_time() - begun
         true = st.identify([it.seen], set_as(it.registers), intervals=False, diagnose=False, compare_with=())
         left, best = (math.degrees(one.traces[0].error.rms) for one in (fit, true))
-        unseen = math.degrees(st.validate([it.unseen], fit.servo).total)
+        unseen, known = (math.degrees(st.validate([it.unseen], one.servo).total) for one in (fit, true))
         held, asked = inside(fit, set_as(it.registers))
         found_in += left <= 1.05 * best or held == asked
         far += unseen > 0.2
-        print(f" | {spent:5.1f}; {left:5.3f}, {best:5.3f}; {unseen:5.3f}; {held} of {asked}", flush=True)
+        print(f" | {spent:5.1f}; {left:5.3f}, {best:5.3f}; {unseen:5.3f}, {known:5.3f}; {held} of {asked}", flush=True)
     if not search:
         print(f"found {found_in} of {draws}; unseen above 0.2 deg: {far}")
 

@@ -90,7 +90,7 @@ def test_a_servo_on_a_bus_follows_goals_and_says_that_it_trips(cli, tmp_path):
     ([BUS, "--register", "P_Coefficient="], "allowed: NAME=VALUE"),
     ([BUS, "--register", "lerobo"], "unknown set of registers of Feetech STS 'lerobo'; did you mean 'lerobot'?"),
     ([BUS, "--register", "lerobot,,"], "allowed: NAME=VALUE"),
-    (["dynamixel-xl330-m288", "--register", "lerobot"], "this family has no named sets"),
+    (["dynamixel-mx-64", "--register", "lerobot"], "this family has no named sets"),
     ([ANALOG, "--register", "lerobot"], "--register for hitec-hs-755hb: got 'lerobot'"),
     ([BUS, *SOFTER, *SOFTER], "--register P_Coefficient: got '16 and 16', allowed: one value"),
     ([BUS, "--register", "Operating_Mode=1"], "Operating_Mode"),
