@@ -122,7 +122,7 @@ class Trace:
     @property
     def error(self) -> LogError:
         """How far the servo is off the samples that judge it."""
-        return log_error(self.log, self.residual[self.judged])
+        return log_error(self.log, self.residual[self.judged], self.measured[self.judged])
 
 
 @dataclass(frozen=True)

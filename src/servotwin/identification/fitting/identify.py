@@ -228,9 +228,11 @@ def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: fl
     if "what is left" in missing or not task.begin.exactly:
         return stopped(fit, missing)
     try:
-        return stopped(with_verdict(task, found.point, fit, course, trials=trials and not missing), missing)
+        return stopped(with_verdict(task, found.point, fit, course, tables.slew,
+                                    trials=trials and not missing), missing)
     except KeyboardInterrupt:
-        return stopped(with_verdict(task, found.point, fit, course, trials=False), ["what may be the matter"])
+        return stopped(with_verdict(task, found.point, fit, course, tables.slew, trials=False),
+                       ["what may be the matter"])
 
 
 def _doubted(task: Task, found: Outcome, level: float, course: Course, missing: list[str], *,
