@@ -23,6 +23,7 @@ from servotwin.parameters import Servo
 if TYPE_CHECKING:
     from servotwin.identification.fitting.choosing import Ladder
     from servotwin.identification.fitting.draws import Allowed
+    from servotwin.identification.fitting.foreseen import Foreseen
     from servotwin.identification.fitting.intervals import Ends
     from servotwin.identification.fitting.uncertainty import Uncertainty
     from servotwin.identification.fitting.verdict import Verdict
@@ -188,6 +189,8 @@ class Fit:
         What is not known because it was stopped.
     verdict : Verdict, optional
         Whether what is left is noise; None of a fit that was stopped in its search.
+    foreseen : tuple of Foreseen
+        Searched numbers that the logs can hardly tell, as it was seen before the search.
     """
 
     servo: Servo
@@ -215,6 +218,7 @@ class Fit:
     interrupted: bool = False
     unknown: tuple[str, ...] = ()
     verdict: Verdict | None = None
+    foreseen: tuple[Foreseen, ...] = ()
     spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     phased: bool = False
     ticked: bool = False

@@ -138,15 +138,19 @@ def cross_correlation(series: Sequence[SensorSeries], rows: Sequence[Rows] = (),
     spread = np.sqrt(((products - sizes * (z / squares))**2).sum(axis=0) * (freedom + 1.0) / freedom)
     norm = np.sqrt(float(white @ white) * squares)
     band = -stdtrit(freedom, 0.5 * (1.0 - LEVEL)) * spread / norm
-    return CrossCorrelation(lags, z / norm, band, odds, float(lags[int(np.argmax(np.abs(z) / (band * norm)))]),
+    return CrossCorrelation(lags, z / norm, band, odds, float(lags[int(np.argmax(np.abs(z / norm)))]),
                             max(float(slope @ spanned @ slope) - chance, 0.0))
 
 
 def _changes(one: SensorSeries, lags: Array, width: float) -> Array:
-    """Return by how much the command changed about each lag before each sample, shape (n, k)."""
-    held, edges = one.log.held, np.append(lags, lags[-1] + width) - 0.5 * width
-    place = np.searchsorted(one.log.time, one.time[:, None] - edges, side="right") - 1
-    return np.asarray(-np.diff(held[np.maximum(place, 0)], axis=1))
+    """Return by how much the command changed about each lag before each sample, shape (n, k).
+
+    Lags are counted in samples: those of stamps that are off would tell by how much.
+    """
+    step = float(np.median(np.diff(one.log.time)))
+    before = np.ceil((np.append(lags, lags[-1] + width) - 0.5 * width) / step - 1e-6).astype(int)
+    place = one.log.rows_at(one.time)[:, None] - before
+    return np.asarray(-np.diff(one.log.held[np.maximum(place, 0)], axis=1))
 
 
 def _rest(one: SensorSeries) -> Array:
