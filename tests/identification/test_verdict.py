@@ -166,13 +166,13 @@ def test_a_gain_is_judged_on_what_did_not_teach():
 
 
 def late(seed, kind, seconds):
-    """Return logs whose simulation leaves a bump of eight times the noise so long after each change of the command."""
+    """Return logs whose simulation leaves a bump of five times the noise so long after each change of the command."""
     found = []
     for one in bench(seed, kind):
         change = np.append(0.0, np.diff(one.log.command))
         shift = round(seconds / 0.02)
-        bump = np.append(np.zeros(shift), change[:len(change) - shift])
-        found.append(replace(one, simulated=one.simulated + 8.0 * NOISE * bump))
+        bump = np.convolve(np.append(np.zeros(shift), change), [1.0, 0.7, 0.4])[:len(change)]
+        found.append(replace(one, simulated=one.simulated + 5.0 * NOISE * bump))
     return found
 
 

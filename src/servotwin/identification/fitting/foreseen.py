@@ -49,8 +49,8 @@ class Foreseen:
         these logs hardly tell output_inertia (±300 % with all else known; prior ±20 %): samples are 500 ms apart, the \
 motor settles in 20 ms
         """
-        told = f"±{100.0 * self.alone:.2g} %" if self.alone < 10.0 else "not even"
-        prior = f"; prior ±{100.0 * self.prior:.2g} %" if math.isfinite(self.prior) else ""
+        told = f"±{100.0 * self.alone:.3g} %" if self.alone < 10.0 else "not even"
+        prior = f"; prior ±{100.0 * self.prior:.3g} %" if math.isfinite(self.prior) else ""
         why = f": {self.reason}" if self.reason else ""
         return f"these logs hardly tell {self.name} ({told} with all else known{prior}){why}"
 

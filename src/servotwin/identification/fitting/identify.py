@@ -24,7 +24,7 @@ from servotwin.identification.fitting.doubts import Doubts
 from servotwin.identification.fitting.findings import explained, first_looks
 from servotwin.identification.fitting.fit import Fit, Start, Trace
 from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.foreseen import foreseen
+from servotwin.identification.fitting.foreseen import Foreseen, foreseen
 from servotwin.identification.fitting.frames import has_pulses
 from servotwin.identification.fitting.free import Bounds, Priors, Space
 from servotwin.identification.fitting.held_out import trace_of, with_pulses_of
@@ -208,8 +208,9 @@ def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: fl
     """Search, doubt, and compare; a stop ends the stage that it meets, and those that come after it are left out."""
     ended: list[Outcome] = []
     missing: list[str] = []
-    hardly = () if task.begin.own else foreseen(task)
+    hardly: tuple[Foreseen, ...] = ()
     try:
+        hardly = () if task.begin.own else foreseen(task)
         found, ended = task.search(lambda share, text: course(0.7 * share, text))
     except KeyboardInterrupt:
         found, missing = task.best_so_far(), ["whether the search would end elsewhere", "what is left"]

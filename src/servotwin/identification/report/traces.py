@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from servotwin.identification.fitting.independence import cross_correlation
 from servotwin.identification.fitting.noise import SensorSeries
+from servotwin.identification.fitting.verdict import FALSE_ALARM
 from servotwin.identification.report.shown import sensor_shown
 from servotwin.look import COLOURS, WIDTH, context, finished, new_figure
 
@@ -174,10 +175,11 @@ def _command(ax: Axes, found: CrossCorrelation) -> None:
     ax.axhline(0.0, color=COLOURS["grey"], linewidth=0.8)
     ax.vlines(found.lag, 0.0, found.value, color=COLOURS["blue"], linewidth=1.2)
     ax.plot(found.lag, found.value, color=COLOURS["blue"], linestyle="none", marker="o", markersize=3.0,
-            label=f"all lags together: by chance in {100.0 * found.odds:.2g} % of such logs")
-    most = 1.25 * float(max(np.abs(found.value).max(), found.band.max()))
-    ax.set(xlabel="command so long before (s)", ylabel="cross-correlation (1)", ylim=(-most, 1.4 * most))
-    ax.legend(loc="upper right", ncols=2)
+            label=f"all lags together: noise does so in {100.0 * found.odds:.2g} % of logs" if found.odds > FALSE_ALARM
+            else "all lags together: noise does not do so")
+    most = 1.1 * float(max(np.abs(found.value).max(), found.band.max()))
+    ax.set(xlabel="command so long before (s)", ylabel="cross-correlation (1)", ylim=(-most, 2.0 * most))
+    ax.legend(loc="upper right")
 
 
 def autocorrelation(residuals: Sequence[Array]) -> Array:
