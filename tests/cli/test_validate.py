@@ -41,7 +41,9 @@ def test_what_is_printed(cli, folder, truth):
     lines = cli("validate", truth, folder, "--model", "bounded").out.splitlines()
     assert lines[0] == "Hitec HS-755HB (hitec-hs-755hb), BoundedServo, 4 logs"
     assert any(line.startswith("motion  bounded servo (°)") for line in lines)
-    assert {line.split()[0] for line in lines if line.endswith("°")} == {"step-0", "stairs-1", "step-2", "step-3"}
+    rows = [line.split() for line in lines if line.startswith(("step-", "stairs-"))]
+    assert {row[0] for row in rows} == {"step-0", "stairs-1", "step-2", "step-3"}
+    assert all(row[3] == row[5] == "°" and 90.0 < float(row[6]) < 100.0 for row in rows)  # fit in per cent
 
 
 @pytest.mark.long

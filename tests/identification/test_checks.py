@@ -133,6 +133,31 @@ def test_the_angle_behind_the_shaft_waits_for_a_model_that_has_it(logs):
     assert dict(fits[0].estimates) == dict(fits[1].estimates)
 
 
+# ------------------------------------------------------------------------- what logs can hardly tell
+
+def settled(time):
+    """Return a log that looks at a servo only when it has long arrived."""
+    command = 1.5e-3 + 2e-4 * np.where(np.arange(len(time)) % 2, 1.0, -1.0)
+    angle = np.interp(command, [1.3e-3, 1.7e-3], [1.57 - 0.35, 1.57 + 0.35])
+    rng = np.random.default_rng(0)
+    return st.Log(name="settled", time=time, command=command, command_kind="pulse_width",
+                  measured={"output_angle": np.roll(angle, 1) + 1e-3 * rng.normal(size=len(time))})
+
+
+def test_numbers_that_the_logs_can_hardly_tell_are_named_before_the_search(logs):
+    """Samples two seconds apart tell nothing of inertia, and a prior of one per cent more than noise does."""
+    fit = identify([settled(2.0 * np.arange(12))], TRUTH, free=["output_inertia", "electronics.deadband"], priors=None,
+                   starts=1, compare_with=(), holdout=0, intervals=False, diagnose=False)
+    found = {one.name: one for one in fit.foreseen}
+    assert "samples are 2e+03 ms apart" in found["output_inertia"].reason
+    assert str(found["output_inertia"]) in fit.warnings
+    told = identify(logs, TRUTH, free=FREE, priors={"output_inertia": (5e-3, 1e-7)}, starts=1, compare_with=(),
+                    holdout=0, intervals=False, diagnose=False)
+    assert [one.name for one in told.foreseen] == ["output_inertia"]
+    assert identify(logs, TRUTH, free=FREE, priors=None, starts=1, compare_with=(), holdout=0, intervals=False,
+                    diagnose=False).foreseen == ()
+
+
 # --------------------------------------------------------------------------------------- arguments
 
 @pytest.mark.parametrize(("more", "words"), [

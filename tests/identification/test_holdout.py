@@ -116,6 +116,9 @@ def test_an_empty_table_is_empty():
 def test_the_error_of_a_log_carries_its_conditions():
     log = replace(logs(step=1)[0], parameters={"supply.open_circuit_voltage": 7.4}, conditions={"gain": 300.0},
                   load=st.loads.Inertia(2e-3) + st.loads.Pendulum(mass=0.1, length=0.2))
+    known = log_error(log, np.array([0.3, -0.4]), np.array([2.0, 4.0]))
+    assert known.fit_percent == pytest.approx(100.0 * (1.0 - np.sqrt(0.125)))  # 100 (1 − |y − ŷ|/|y − ȳ|)
+    assert np.isnan(log_error(log, np.array([0.3]), np.array([2.0])).fit_percent)
     found = log_error(log, np.array([0.3, -0.4]))
     assert (found.rms, found.largest, found.samples) == (pytest.approx(math.sqrt(0.125)), 0.4, 2)
     assert found.conditions["voltage"] == 7.4

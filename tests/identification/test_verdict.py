@@ -9,10 +9,11 @@ import servotwin as st
 from identification.synthetic_logs import TRUTH, noisy, run
 from servotwin.identification import identify
 from servotwin.identification.fitting.diagnosis.gain import gain, teaching
+from servotwin.identification.fitting.independence import cross_correlation
 from servotwin.identification.fitting.judging import _outliers
 from servotwin.identification.fitting.noise import SensorSeries, isolated, noise_of
 from servotwin.identification.fitting.uncertainty import Rows
-from servotwin.identification.fitting.verdict import judge
+from servotwin.identification.fitting.verdict import against, judge, rival
 from servotwin.logs.log import Log
 
 NOISE = 1e-3  # rad
@@ -164,6 +165,82 @@ def test_a_gain_is_judged_on_what_did_not_teach():
     assert better.after == pytest.approx(0.2 * better.before, rel=0.05)
 
 
+def late(seed, kind, seconds):
+    """Return logs whose simulation leaves a bump of five times the noise so long after each change of the command."""
+    found = []
+    for one in bench(seed, kind):
+        change = np.append(0.0, np.diff(one.log.command))
+        shift = round(seconds / 0.02)
+        bump = np.convolve(np.append(np.zeros(shift), change), [1.0, 0.7, 0.4])[:len(change)]
+        found.append(replace(one, simulated=one.simulated + 5.0 * NOISE * bump))
+    return found
+
+
+@pytest.mark.long(but="white")
+@pytest.mark.parametrize("kind", ["white", "remembers", "jitters"])
+def test_noise_does_not_follow_the_command(kind):
+    """Odds of 20 benches of true models are even: two below 0.01 once in 60 such rows, one below 1e-4 in 500."""
+    odds = []
+    for seed in range(200, 220):
+        series = bench(seed, kind, rests=kind == "jitters" or seed % 2 == 0)
+        odds.append(cross_correlation(series, (), noise_of(series)).odds)
+    assert np.sum(np.array(odds) < 0.01) <= 1
+    assert min(odds) > 1e-4
+    assert 0.3 < np.median(odds) < 0.8
+
+
+@pytest.mark.parametrize("kind", ["white", "remembers"])
+def test_what_follows_the_command_is_told_with_its_lag(kind):
+    for seed, lag in ((0, 0.1), (1, 0.3)):
+        verdict = judge(late(seed, kind, lag), "output_angle")
+        assert verdict.word == "bad"
+        assert verdict.command_lag == pytest.approx(lag, abs=1e-9)
+        assert f"follow the command of {lag:g} s before" in verdict.sentence
+
+
+def test_what_the_fitted_numbers_can_imitate_is_not_held_against_them():
+    """Slow noise that a fit has gone after leaves sharp traces behind the filter: those of its own derivatives."""
+    series = bench(3, "remembers")
+    wrong = bench(3, "remembers", wrong=1e-3)
+    rows = [Rows(one.residual / NOISE, np.gradient(one.simulated, one.time)[:, None] / NOISE, np.ones(len(one.time)))
+            for one in wrong]
+    noise = noise_of(series)
+    assert cross_correlation(wrong, (), noise).odds < 1e-6
+    assert cross_correlation(wrong, rows, noise).odds > 1e-3
+
+
+def test_counts_of_a_cycle_that_comes_again_are_no_lack():
+    """The same reading is wrong by the same each time: that follows the command, by no more than counts do."""
+    found = [judge(bench(seed, "counts", rests=False), "output_angle") for seed in range(4)]
+    assert min(one.odds["command"] for one in found) < 1e-3
+    assert all("command" not in one.sentence for one in found)
+
+
+@pytest.mark.parametrize(("ours", "theirs", "beats"), [(3.0, 1.0, True), (1.0, 3.0, False), (1.0, 1.0, False),
+                                                       (1.01, 1.0, False)])
+def test_a_rival_is_nearer_by_more_than_chance(ours, theirs, beats):
+    rng = np.random.default_rng(5)
+    pairs = [(ours * NOISE * rng.normal(size=200), theirs * NOISE * rng.normal(size=200)) for _ in range(4)]
+    found = rival("delay + slew + lag", pairs, 0.02, NOISE, held_out=True)
+    assert found.beats is beats
+    said = against(judge(bench(0), "output_angle"), found, "output_angle")
+    assert said.word == ("bad" if beats else "good")
+    assert said.sentence.startswith("a plain delay + slew + lag without physics is nearer") is beats
+
+
+def test_a_few_samples_show_no_rival():
+    assert rival("lag", [(np.ones(100), np.zeros(100))], 0.02, NOISE, held_out=False) is None
+
+
+def test_models_that_are_alike_are_no_rivals():
+    """Of 400 pairs of the same law, uneven from stretch to stretch, one in a thousand would be too near by chance."""
+    rng = np.random.default_rng(11)
+    size = np.repeat(np.exp(rng.normal(size=(400, 2, 12))), 50, axis=2)
+    pairs = NOISE * size * rng.normal(size=size.shape)
+    found = [rival("lag", [(pair[0], pair[1])], 0.02, 0.0, held_out=False).beats for pair in pairs]
+    assert sum(found) <= 3
+
+
 # ------------------------------------------------------------------------------------------- of fits
 
 FREE = ["motor.armature_resistance", "output_inertia", "electronics.stretcher_gain"]
@@ -208,6 +285,21 @@ def test_the_cause_is_named(driven):
     assert "trying: minimum drive time" in tried
     assert "trying: load friction" not in tried  # what is explained down to the noise needs no dear trials
     assert all(0.0 <= share <= 1.0 for share, _ in told)
+
+
+def test_a_fit_that_a_plain_lag_beats_says_so_first():
+    """A third of the true friction, and nothing that could make up for it."""
+    slow = TRUTH.replace({"friction.coulomb_torque_forward": 3.0 * TRUTH.friction.coulomb_torque_forward,
+                          "friction.coulomb_torque_backward": 3.0 * TRUTH.friction.coulomb_torque_backward})
+    logs = [noisy(run(slow, "step", seed=k, load=DISC, kind="pulse_width", duration=3.0), NOISE, seed=k)
+            for k in range(4)]
+    fit = identify([replace(log, name=f"{k}") for k, log in enumerate(logs)], TRUTH, free=["electronics.deadband"],
+                   nuisance=("delay", "initial_state"), priors=None, starts=1, holdout=0.5, compare_with=("slew",),
+                   diagnose=False)
+    assert fit.verdict.rival.beats
+    assert fit.verdict.rival.held_out
+    assert not fit.verdict.holds
+    assert str(fit).startswith("a plain delay + slew + lag without physics is nearer on logs that were held out: ")
 
 
 def test_without_trials_the_verdict_stays(driven):

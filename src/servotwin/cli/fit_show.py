@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any
 from servotwin.cli.summary import names as dotted
 from servotwin.cli.summary import was_set
 from servotwin.cli.terminal import pairs, table
+from servotwin.identification.fitting.holdout import fit_percent
 from servotwin.identification.report.shown import (
     MODELS,
     error_rows,
     error_shown,
     estimate_lines,
     nominal_of,
+    percent,
     tables_of,
 )
 
@@ -93,12 +95,12 @@ def errors(tables: Mapping[str, ErrorTable], traces: Sequence[Trace], label: str
     """Return a table of rms errors by the values of a label, all models beside each other."""
     models = next(iter(tables.values())).models
     factor, unit = error_shown(traces)
-    rows = [(row.value, row.which, *(_error(row.errors, model, factor) for model in models))
-            for row in error_rows(tables, label)]
-    rows += [("all", which, *(_error(held.total(), model, factor) for model in models))
-             for which, held in tables.items()]
+    rows = [(row.value, row.which, *(_error(row.errors, model, factor) for model in models),
+             percent(row.fits.get(models[0], math.nan))) for row in error_rows(tables, label)]
+    rows += [("all", which, *(_error(held.total(), model, factor) for model in models),
+              percent(held.total(fit_percent)[models[0]])) for which, held in tables.items()]
     named = any(tables)
-    header = (label.replace("_", " "), "logs", *(f"{MODELS.get(name, name)} ({unit})" for name in models))
+    header = (label.replace("_", " "), "logs", *(f"{MODELS.get(name, name)} ({unit})" for name in models), "fit (%)")
     if not named:
         header, rows = (header[0], *header[2:]), [(row[0], *row[2:]) for row in rows]
     return table(header, rows)
@@ -127,13 +129,18 @@ def facts(fit: Fit, files: Sequence[str]) -> dict[str, Any]:
             for item in fit.unidentifiable],
         "registers": None if fit.registers is None else {
             **fit.registers.facts, "values": [one._asdict() for one in fit.register_values]},
+        "foreseen": [vars(one) | {"words": str(one)} for one in fit.foreseen],
         "at_bound": list(fit.at_bound), "yielded": [_yielded(one) for one in fit.yielded],
         "errors": {which.replace(" ", "_"): error_facts(held) for which, held in tables_of(fit).items()},
         "noise": {name: float(value) for name, value in fit.noise.items()}, "warnings": list(fit.warnings),
         "verdict": None if fit.verdict is None else {
             "sentence": fit.verdict.sentence, "holds": fit.verdict.holds, "ratio": fit.verdict.ratio,
             "noise": dict(fit.verdict.noise), "autocorrelation": fit.verdict.autocorrelation,
-            "odds": dict(fit.verdict.odds), "outliers": fit.verdict.outliers,
+            "odds": dict(fit.verdict.odds), "outliers": fit.verdict.outliers, "word": fit.verdict.word,
+            "rival": None if fit.verdict.rival is None else vars(fit.verdict.rival),
+            "command_lag": fit.verdict.command_lag,
+            "cross_correlation": None if fit.verdict.command is None else {
+                name: getattr(fit.verdict.command, name).tolist() for name in ("lag", "value", "band")},
             "causes": [{"name": cause.name, "sentence": cause.sentence, "before": cause.before, "after": cause.after,
                         "remedy": cause.remedy} for cause in fit.verdict.causes]},
         "starts": [{"cost": float(start.cost), "converged": bool(start.converged)} for start in fit.starts],
@@ -153,8 +160,10 @@ def error_facts(held: ErrorTable) -> dict[str, Any]:
     """Return errors as plain data (SI): in all, by every label, and of each log."""
     return {
         "all": held.total(), "by": {label: held.by(label) for label in held.labels()},
+        "fit_percent": held.total(fit_percent),
         "logs": {model: [{"log": e.log, "motion": e.motion, "conditions": dict(e.conditions), "rms": e.rms,
-                          "largest": e.largest, "samples": e.samples} for e in held.errors[model]]
+                          "largest": e.largest, "samples": e.samples, "fit_percent": e.fit_percent}
+                         for e in held.errors[model]]
                  for model in held.models}}
 
 

@@ -179,7 +179,7 @@ def _sections(found: Validation, above: Mapping[str, float], limits: Mapping[str
 
 
 def _log_table(found: Validation) -> Any:
-    from servotwin.identification.report.shown import error_unit
+    from servotwin.identification.report.shown import error_unit, percent
 
     errors = found.errors.errors[found.errors.models[0]]
     signals = {trace.log.name: trace.signal for trace in found.traces}
@@ -187,6 +187,6 @@ def _log_table(found: Validation) -> Any:
     for error in sorted(errors, key=lambda error: -error.rms)[:_MOST_LOGS]:
         factor, unit = error_unit(signals[error.log])
         rows.append((error.log, error.motion or "other", f"{error.rms * factor:.3g} {unit}",
-                     f"{error.largest * factor:.3g} {unit}"))
+                     f"{error.largest * factor:.3g} {unit}", percent(error.fit_percent)))
     more = f"log ({_MOST_LOGS} worst of {len(errors)})" if len(errors) > _MOST_LOGS else "log"
-    return table((more, "motion", "rms error", "largest"), rows)
+    return table((more, "motion", "rms error", "largest", "fit (%)"), rows)

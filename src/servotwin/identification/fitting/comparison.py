@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,10 +37,11 @@ _VISCOUS = "motor.motor_viscous_friction"
 
 @dataclass(frozen=True)
 class ErrorTables:
-    """Errors of the fitted servo and of the models beside it."""
+    """Errors of the fitted servo and of the models beside it, and what delay, slew and lag leave, log by log."""
 
     training: ErrorTable
     holdout: ErrorTable
+    slew: Mapping[int, Array]
 
 
 def compare(task: Task, held_out: Sequence[int], traces: Sequence[Trace], servo: Servo,
@@ -67,20 +68,31 @@ def compare(task: Task, held_out: Sequence[int], traces: Sequence[Trace], servo:
     model, fitted = task.forecast.model, task.fitted
     own = type(model).__name__
     errors: dict[str, dict[int, LogError]] = {own: {k: t.error for k, t in enumerate(traces)}}
+    slew: dict[int, Array] = {}
     if "slew" in beside:
         slew = _of_slew([trace.log for trace in traces], fitted, traces, task.loss.limit)
         if slew:
-            errors[SLEW] = slew
+            errors[SLEW] = {k: _error(traces[k], residual) for k, residual in slew.items()}
     if "M1" in beside:
         simple = _of_m1(task, held_out, traces, type(model)(servo), point, tell)
         if simple:
             errors[M1] = simple
     models = tuple(errors)
-    return ErrorTables(*(ErrorTable(models if which else (), {m: tuple(errors[m][k] for k in which) for m in models})
-                         for which in (fitted, held_out)))
+    training, holdout = (ErrorTable(models if which else (), {m: tuple(errors[m][k] for k in which) for m in models})
+                         for which in (fitted, held_out))
+    return ErrorTables(training, holdout, slew)
 
 
-def _of_slew(logs: Sequence[Log], fitted: Sequence[int], traces: Sequence[Trace], loss: float) -> dict[int, LogError]:
+def _error(trace: Trace, residual: Array) -> LogError:
+    """Return the error of a model on a log from its residuals where it is judged; those that are nan do not count."""
+    known = np.isfinite(residual)
+    if not known.any():
+        return log_error(trace.log, np.array([math.nan]))
+    return log_error(trace.log, residual[known], trace.measured[trace.judged][known])
+
+
+def _of_slew(logs: Sequence[Log], fitted: Sequence[int], traces: Sequence[Trace], loss: float) -> dict[int, Array]:
+    """Return the residuals of delay, slew and lag where each log is judged; none where there is no such model."""
     try:
         simple = fit_slew_lag([logs[k] for k in fitted], loss="linear" if math.isinf(loss) else "huber")
     except InputError:  # logs of several kinds of command or signal, or too few samples: there is no such model
@@ -91,9 +103,7 @@ def _of_slew(logs: Sequence[Log], fitted: Sequence[int], traces: Sequence[Trace]
         if simple.signal != trace.signal or simple.command_kind != log.command_kind:
             return {}
         predicted = np.asarray(simple.predict(log))
-        difference = predicted[log.rows_at(trace.time)] - trace.measured
-        known = np.isfinite(difference) & trace.judged
-        found[k] = log_error(log, difference[known] if known.any() else np.array([math.nan]))
+        found[k] = np.asarray(predicted[log.rows_at(trace.time)] - trace.measured)[trace.judged]
     return found
 
 
@@ -127,5 +137,5 @@ def _of_m1(whole: Task, held_out: Sequence[int], traces: Sequence[Trace], model:
     point = with_pulses_of(forecast, task.loss, found, held_out, task.fitted)
     for k, part in enumerate(forecast.at(point, derivatives=False)):
         residual = by_sensor(forecast, k, part)[traces[k].signal]
-        errors[k] = log_error(logs[k], residual[traces[k].judged])
+        errors[k] = _error(traces[k], residual[traces[k].judged])
     return errors

@@ -23,6 +23,7 @@ from servotwin.parameters import Servo
 if TYPE_CHECKING:
     from servotwin.identification.fitting.choosing import Ladder
     from servotwin.identification.fitting.draws import Allowed
+    from servotwin.identification.fitting.foreseen import Foreseen
     from servotwin.identification.fitting.intervals import Ends
     from servotwin.identification.fitting.registers import RegisterSearch, RegisterValue
     from servotwin.identification.fitting.uncertainty import Uncertainty
@@ -123,7 +124,7 @@ class Trace:
     @property
     def error(self) -> LogError:
         """How far the servo is off the samples that judge it."""
-        return log_error(self.log, self.residual[self.judged])
+        return log_error(self.log, self.residual[self.judged], self.measured[self.judged])
 
 
 @dataclass(frozen=True)
@@ -191,6 +192,8 @@ class Fit:
         Whether what is left is noise; None of a fit that was stopped in its search.
     registers : RegisterSearch, optional
         Of a bus servo: what stands in registers that logs did not record.
+    foreseen : tuple of Foreseen
+        Searched numbers that the logs can hardly tell, as it was seen before the search.
     """
 
     servo: Servo
@@ -218,6 +221,7 @@ class Fit:
     interrupted: bool = False
     unknown: tuple[str, ...] = ()
     verdict: Verdict | None = None
+    foreseen: tuple[Foreseen, ...] = ()
     spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     phased: bool = False
     ticked: bool = False

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,6 +28,8 @@ class LogError:
     rms, largest : float
         Of simulated less measured [rad], or [V] where the log has no angle.
     samples : int
+    spread : float
+        Rms of what was measured about its mean, in the same unit; nan where it is not known.
     """
 
     log: str
@@ -36,6 +38,12 @@ class LogError:
     rms: float
     largest: float
     samples: int
+    spread: float = math.nan
+
+    @property
+    def fit_percent(self) -> float:
+        """How much of the measured motion is reproduced: 100 all, 0 no more than by its mean."""
+        return fit_percent([self])
 
 
 @dataclass(frozen=True)
@@ -73,21 +81,22 @@ class ErrorTable:
         names = dict.fromkeys(name for error in first for name in error.conditions)
         return ("motion", *(name for name in names if len({_text(e.conditions.get(name)) for e in first}) > 1))
 
-    def by(self, label: str = "motion") -> dict[str, dict[str, float]]:
-        """Return the rms error over all samples of each value of a label, for each model."""
-        found: dict[str, dict[str, float]] = {}
+    def by(self, label: str = "motion",
+           measure: Callable[[Iterable[LogError]], float] | None = None) -> dict[str, dict[str, float]]:
+        """Return the rms error over all samples of each value of a label, or another measure, for each model."""
+        measure, found = measure or pooled, dict[str, dict[str, float]]()
         for model in self.models:
             groups: dict[str, list[LogError]] = {}
             for error in self.errors[model]:
                 value = error.motion if label == "motion" else _text(error.conditions.get(label))
                 groups.setdefault(value or "other", []).append(error)
             for value, group in groups.items():
-                found.setdefault(value, {})[model] = pooled(group)
+                found.setdefault(value, {})[model] = measure(group)
         return found
 
-    def total(self) -> dict[str, float]:
-        """Return the rms error over all samples, for each model."""
-        return {model: pooled(self.errors[model]) for model in self.models}
+    def total(self, measure: Callable[[Iterable[LogError]], float] | None = None) -> dict[str, float]:
+        """Return the rms error over all samples, or another measure, for each model."""
+        return {model: (measure or pooled)(self.errors[model]) for model in self.models}
 
 
 def pooled(errors: Iterable[LogError]) -> float:
@@ -103,8 +112,24 @@ def pooled(errors: Iterable[LogError]) -> float:
     return math.sqrt(sum(e.rms**2 * e.samples for e in items) / total) if total else math.nan
 
 
-def log_error(log: Log, difference: NDArray[np.float64]) -> LogError:
-    """Return the error of one log from the differences at its samples that count."""
+def fit_percent(errors: Iterable[LogError]) -> float:
+    """Return how much of the measured motion of some logs is reproduced: 100 (1 − |y − ŷ|/|y − ȳ|), ȳ of each log.
+
+    100 is all, 0 no more than by the mean of each log, and less than 0 is worse; nan of a shaft that stands. It is the
+    "fit" of the System Identification Toolbox (Ljung).
+
+    Examples
+    --------
+    >>> fit_percent([LogError("a", "", {}, 1.0, 3.0, 100, 10.0), LogError("b", "", {}, 3.0, 4.0, 100, 10.0)])
+    77.63932022500211
+    """
+    items = [e for e in errors if e.samples]
+    spread = math.sqrt(sum(e.spread**2 * e.samples for e in items))
+    return 100.0 * (1.0 - math.sqrt(sum(e.rms**2 * e.samples for e in items)) / spread) if spread > 0.0 else math.nan
+
+
+def log_error(log: Log, difference: NDArray[np.float64], measured: NDArray[np.float64] | None = None) -> LogError:
+    """Return the error of one log from the differences at its samples that count, and what was measured there."""
     conditions: dict[str, float | str] = dict(log.conditions)
     voltage = log.parameters.get("supply.open_circuit_voltage")
     if voltage is not None and "voltage" not in conditions:
@@ -112,7 +137,8 @@ def log_error(log: Log, difference: NDArray[np.float64]) -> LogError:
     if "load" not in conditions:
         conditions["load"] = _load(log)
     return LogError(log.name, log.motion, conditions, float(np.sqrt(np.mean(difference**2))),
-                    float(np.abs(difference).max()), len(difference))
+                    float(np.abs(difference).max()), len(difference),
+                    math.nan if measured is None else float(np.std(measured)))
 
 
 def split(logs: Sequence[Log], holdout: Any, seed: int) -> tuple[list[int], list[int]]:

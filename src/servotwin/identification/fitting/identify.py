@@ -24,6 +24,7 @@ from servotwin.identification.fitting.doubts import Doubts
 from servotwin.identification.fitting.findings import explained, first_looks
 from servotwin.identification.fitting.fit import Fit, Start, Trace
 from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.foreseen import Foreseen, foreseen
 from servotwin.identification.fitting.frames import has_pulses
 from servotwin.identification.fitting.free import Bounds, Priors, Space
 from servotwin.identification.fitting.held_out import trace_of, with_pulses_of
@@ -225,7 +226,9 @@ def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: fl
     """Search, doubt, and compare; a stop ends the stage that it meets, and those that come after it are left out."""
     ended: list[Outcome] = []
     missing: list[str] = []
+    hardly: tuple[Foreseen, ...] = ()
     try:
+        hardly = () if task.begin.own else foreseen(task)
         found, ended = task.search(lambda share, text: course(0.7 * share, text))
     except KeyboardInterrupt:
         found, missing = task.best_so_far(), ["whether the search would end elsewhere", "what is left"]
@@ -241,14 +244,18 @@ def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: fl
     tables = _compared(task, held_out, traces, final, beside, found.point, course, missing)
     fit = _fit(task, found, doubts, dropped, wide, final, traces, tables, ended)
     middles = {name: 0.5 * (low + high) for name, (low, high) in doubts.spans.items()}
+    fit = replace(fit, foreseen=hardly, warnings=(*(str(one) for one in hardly if one.name not in fit.undetermined),
+                                                  *fit.warnings))
     fit = replace(fit, level=level, phased=forecast.phased, ticked=forecast.ticked,
                   estimates={**fit.estimates, **middles})
     if "what is left" in missing or not task.begin.exactly:
         return stopped(fit, missing)
     try:
-        return stopped(with_verdict(task, found.point, fit, course, trials=trials and not missing), missing)
+        return stopped(with_verdict(task, found.point, fit, course, tables.slew,
+                                    trials=trials and not missing), missing)
     except KeyboardInterrupt:
-        return stopped(with_verdict(task, found.point, fit, course, trials=False), ["what may be the matter"])
+        return stopped(with_verdict(task, found.point, fit, course, tables.slew, trials=False),
+                       ["what may be the matter"])
 
 
 def _doubted(task: Task, found: Outcome, level: float, course: Course, missing: list[str], *,

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from servotwin.errors import PlausibilityWarning
 from servotwin.identification.fitting.arrow import Prior
+from servotwin.identification.fitting.comparison import SLEW
 from servotwin.identification.fitting.diagnosis import diagnose
 from servotwin.identification.fitting.diagnosis.counted import counted_stamps
 from servotwin.identification.fitting.fit import Fit, Trace
@@ -18,15 +20,28 @@ from servotwin.identification.fitting.point import Point
 from servotwin.identification.fitting.stopping import Course
 from servotwin.identification.fitting.task import Task
 from servotwin.identification.fitting.uncertainty import Rows, rows_of
-from servotwin.identification.fitting.verdict import UNHELD, Cause, Verdict, intervals_said, judge, shown
+from servotwin.identification.fitting.verdict import (
+    UNHELD,
+    Cause,
+    Rival,
+    Verdict,
+    against,
+    intervals_said,
+    judge,
+    rival,
+    shown,
+)
 from servotwin.logs.log import ANGLES
+
+Array = NDArray[np.float64]
 
 _OUTLIERS = 0.005  # of the samples: then they are told
 _FINEST = 1e-9  # SI: what no simulation is told to be nearer
 _EFFORT = 3.0  # times that of the fit, for all trials: the verdict itself and their start are not counted
 
 
-def with_verdict(task: Task, point: Point, fit: Fit, course: Course, *, trials: bool) -> Fit:
+def with_verdict(task: Task, point: Point, fit: Fit, course: Course, slew: Mapping[int, Array], *,
+                 trials: bool) -> Fit:
     """Return a fit with its verdict, and with the causes that explain a bad one.
 
     Parameters
@@ -37,6 +52,8 @@ def with_verdict(task: Task, point: Point, fit: Fit, course: Course, *, trials: 
     fit : Fit
     course : Course
         Told the share done, and what goes on.
+    slew : mapping of int to ndarray
+        What delay, slew and lag leave where each log is judged (SI); none where there is no such model beside.
     trials : bool
         Whether causes are tried.
     """
@@ -48,7 +65,8 @@ def with_verdict(task: Task, point: Point, fit: Fit, course: Course, *, trials: 
     sensor = sensors.pop()
     verdict = judge([_series(trace) for trace in fitted], sensor, _rows(task, point), len(fit.names),
                     max(task.forecast.running.accuracy, _FINEST))
-    verdict = replace(verdict, noise={**verdict.noise, **_others(task)})
+    verdict = against(replace(verdict, noise={**verdict.noise, **_others(task)}),
+                      _rival(fit.traces, slew, verdict.noise[sensor]), sensor)
     causes: tuple[Cause, ...] = ()
     try:
         if trials:
@@ -73,6 +91,20 @@ def with_verdict(task: Task, point: Point, fit: Fit, course: Course, *, trials: 
     verdict = replace(verdict, causes=causes, sentence=_with_causes(verdict, causes, tried=trials))
     first = () if verdict.holds and not verdict.undecided else (verdict.sentence,)
     return replace(fit, verdict=verdict, warnings=(*first, *fit.warnings))
+
+
+def _rival(traces: Sequence[Trace], slew: Mapping[int, Array], noise: float) -> Rival | None:
+    """Return how delay, slew and lag stand beside the fit: on the logs that were held out, else on those fitted."""
+    held_out = any(trace.held_out for trace in traces)
+    judged = {k: trace for k, trace in enumerate(traces) if trace.held_out is held_out and k in slew}
+    if not judged:
+        return None
+    pairs = []
+    for k, trace in judged.items():
+        known = np.isfinite(slew[k])
+        pairs.append((trace.residual[trace.judged][known], slew[k][known]))
+    step = float(np.median(np.concatenate([np.diff(trace.time) for trace in judged.values()])))
+    return rival(SLEW, pairs, step, noise, held_out=held_out)
 
 
 def _half_widths(fit: Fit) -> dict[str, float]:

@@ -131,7 +131,7 @@ def noise_of(series: Sequence[SensorSeries]) -> Noise:
     """
     count, repeats, white = step_of(np.concatenate([one.measured for one in series])), _repeats(series), _white(series)
     floor = max(count / math.sqrt(12.0), 1e-12)
-    guesses = _at_rest([window for one in series for window in _windows(one)], white)
+    guesses = _at_rest([window for one in series for window in _windows(one)], white, floor)
     if not guesses:
         size = next((value for value in (repeats, white) if math.isfinite(value)), 0.0)
         return Noise(max(size, floor), math.nan, white, (), repeats, count, _jitter(series))
@@ -251,15 +251,18 @@ def _line(m: int) -> Array:
     return np.full((m, m), 1.0 / m) + np.outer(x, x) / float(x @ x)
 
 
-def _at_rest(windows: Sequence[Array], white: float) -> tuple[NoiseGuess, ...]:
+def _at_rest(windows: Sequence[Array], white: float, floor: float) -> tuple[NoiseGuess, ...]:
     """Return noises that are equally likely, first-order autoregressive ones, the smaller ones first; none if unknown.
 
     As likely as they make stretches whose lines were taken away (Patterson & Thompson 1971), and second differences.
+    Where an instrument counts, which has the noise `floor` by that alone, a stretch at the edge of a count scatters
+    more than most: it is like the others.
     """
     if not windows or sum(len(w) for w in windows) < _ENOUGH:
         return ()
     powers = np.array([float(np.mean(w**2)) for w in windows])
-    kept = [w for w, power in zip(windows, powers, strict=True) if power <= _FAR * float(np.median(powers))]
+    most = _FAR * max(float(np.median(powers)), floor**2)
+    kept = [w for w, power in zip(windows, powers, strict=True) if power <= most]
     free = float(sum(len(w) - 2 for w in kept))
     squares, volumes = _forms(kept)
     usual = squares[0] / free

@@ -1,8 +1,9 @@
 """Is what a fit leaves noise? Its residuals beside noise that needs no model, and what that says of the model.
 
-Three tests, each with a false alarm in a thousand fits: whether residuals are larger, sample after sample, than the
-sensor's own noise at rest; whether they follow the motion, judged on stretches other than those that taught how; and
-whether logs want different numbers. None of them is harmed by noise that remembers itself or by stamps that jitter.
+Tests, each with a false alarm in a thousand fits: whether residuals are larger, sample after sample, than the sensor's
+own noise at rest; whether they follow the motion, or the command of some time before; whether logs want different
+numbers; and whether a model without any physics is nearer. None of them is harmed by noise that remembers itself or by
+stamps that jitter.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.identification.fitting.independence import CrossCorrelation, cross_correlation
 from servotwin.identification.fitting.noise import Noise, NoiseGuess, SensorSeries, isolated, noise_of
 from servotwin.identification.fitting.uncertainty import Rows
 
@@ -33,6 +35,7 @@ _LEAST = 20  # samples that a test needs
 _BLOCK = 20  # samples at least that are judged together
 _BLOCKS = 8  # that a test needs
 _SHORTLY = 0.15  # s
+_ALONE = 1.0  # s: so far apart errors of a model are those of different motions, assumed
 
 
 @dataclass(frozen=True)
@@ -63,6 +66,32 @@ class Cause:
 
 
 @dataclass(frozen=True)
+class Rival:
+    """A model without physics beside the fitted servo, on the same samples.
+
+    Parameters
+    ----------
+    name : str
+        Such as "delay + slew + lag".
+    own, error : float
+        Rms error of the fitted servo and of this model [rad; V where no angle was measured].
+    held_out : bool
+        Whether that is on logs that were held out; else on those that were fitted.
+    beats : bool
+        Whether this model is nearer by more than chance.
+    odds : float
+        How often chance alone would make it as much nearer.
+    """
+
+    name: str
+    own: float
+    error: float
+    held_out: bool
+    beats: bool
+    odds: float
+
+
+@dataclass(frozen=True)
 class Verdict:
     """Whether the model can do what the logs show.
 
@@ -70,7 +99,8 @@ class Verdict:
     ----------
     sentence : str
     holds : bool
-        Whether what is left is noise, so that the intervals hold; if it is not, `moved` says which do nevertheless.
+        Whether what is left is noise, so that the intervals hold, and no rival is nearer; if it is not, `moved` says
+        which do nevertheless.
     ratio : float
         Rms residual over the noise that needs no model, of the angle.
     noise : mapping of str to float
@@ -87,6 +117,12 @@ class Verdict:
         Where what is left is no noise: by how many half widths of its interval each number would be off if the model
         lacks the worst of what may be missing, as large as what is left allows; and what that is. Empty where it was
         not simulated.
+    rival : Rival, optional
+        The simplest model beside it; None where there is none, or too little to judge by.
+    command_lag : float
+        How long before the command came that residuals follow [s]; nan where they follow none.
+    command : CrossCorrelation, optional
+        Of the residuals with the command before; None of too few samples or changes.
     """
 
     sentence: str
@@ -98,6 +134,14 @@ class Verdict:
     odds: Mapping[str, float] = field(default_factory=dict)
     outliers: float = 0.0
     moved: Mapping[str, tuple[float, str]] = field(default_factory=dict)
+    rival: Rival | None = None
+    command_lag: float = math.nan
+    command: CrossCorrelation | None = None
+
+    @property
+    def word(self) -> str:
+        """The verdict in a word: "good", "undecided" or "bad"."""
+        return "bad" if not self.holds else "undecided" if self.undecided else "good"
 
     @property
     def undecided(self) -> bool:
@@ -152,18 +196,78 @@ def judge(series: Sequence[SensorSeries], sensor: str, rows: Sequence[Rows] = ()
     ratio = math.sqrt(float(np.mean(np.concatenate([u[k] for u, k in zip(scaled, inner, strict=True)])**2)))
     tests = {"size": _size(series, inner, noise), "memory": _memory(series, inner, noise),
              "motion": None if noise.known else _motion(series, scaled, inner), "logs": _between(rows, noise, numbers)}
+    follows = cross_correlation(series, rows if len(rows) == len(series) else (), noise)
+    if follows is not None:
+        usual = noise.size**2 if noise.known else left**2
+        tests["command"] = Excess((follows.followed - noise.count**2 / 12.0) / usual, follows.odds)
     power = sum(float(one.residual @ one.residual) for one in series)
     first = sum(float(one.residual[1:] @ one.residual[:-1]) for one in series) / power if power > 0.0 else 0.0
     failed = [name for name, test in tests.items() if test is not None and test.fails]
-    sentence = _sentence(failed, ratio, noise, sensor)
+    lag = follows.clearest if follows is not None and "command" in failed else math.nan
+    sentence = _sentence(failed, ratio, noise, sensor, lag)
     if lost > 0.005:
         sentence += f"; {100.0 * lost:.2g} % of the samples lie far off alone and are no noise of that kind"
     return Verdict(sentence, not failed, ratio, {sensor: noise.size}, first,
-                   odds={name: test.odds for name, test in tests.items() if test is not None}, outliers=lost)
+                   odds={name: test.odds for name, test in tests.items() if test is not None}, outliers=lost,
+                   command_lag=lag, command=follows)
 
 
-def _sentence(failed: Sequence[str], ratio: float, noise: Noise, sensor: str) -> str:
+def rival(name: str, pairs: Sequence[tuple[Array, Array]], step: float, noise: float, *,
+          held_out: bool) -> Rival | None:
+    """Return how a model without physics stands beside the fitted servo; None of too few samples.
+
+    It is nearer if the sum of its squared errors is less by more than 4 %, and if by more than chance it is nearer in
+    stretches of a second, of 20 samples at least: Student's t of the logarithm of both mean squares' ratio, in each of
+    which the noise counts too. Two models that are alike could as well change places in any stretch.
+
+    Parameters
+    ----------
+    name : str
+    pairs : sequence of tuple of ndarray
+        Residuals of the servo and of the model in each log (SI).
+    step : float
+        From sample to sample [s].
+    noise : float
+        Of the sensor (SI).
+    held_out : bool
+        Whether the logs were held out.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> near, far = rng.normal(size=400), 2.0 * rng.normal(size=400)
+    >>> [rival("lag", [pair], 0.02, 1.0, held_out=True).beats for pair in ((far, near), (near, far), (near, near))]
+    [True, False, False]
+    """
+    from scipy.special import stdtr
+
+    count = sum(len(own) for own, _ in pairs)
+    block = max(_BLOCK, min(round(_ALONE / step), count // _BLOCKS))
+    squares = np.array([[float(np.mean(one**2)) for one in (own[some], other[some])] for own, other in pairs
+                        for some in np.array_split(np.arange(len(own)), max(1, len(own) // block)) if len(some)])
+    if len(squares) < _BLOCKS:
+        return None
+    own, error = (math.sqrt(sum(float(pair[k] @ pair[k]) for pair in pairs) / count) for k in (0, 1))
+    ratio = np.log((squares[:, 0] + noise**2) / (squares[:, 1] + noise**2))
+    spread = float(ratio.std(ddof=1)) / math.sqrt(len(ratio))
+    odds = float(stdtr(len(ratio) - 1.0, -float(ratio.mean()) / max(spread, 1e-12)))
+    return Rival(name, own, error, held_out, error**2 < (1.0 - _SMALL) * own**2 and odds < FALSE_ALARM, odds)
+
+
+def against(verdict: Verdict, rival: Rival | None, sensor: str) -> Verdict:
+    """Return a verdict that knows the simplest model beside the fit; where that is nearer, it says so first."""
+    if rival is None or not rival.beats:
+        return replace(verdict, rival=rival)
+    where = "logs that were held out" if rival.held_out else "the same logs"
+    rest = f"of the fitted logs {verdict.sentence}" if verdict.holds else verdict.sentence
+    return replace(verdict, rival=rival, holds=False, sentence=(
+        f"a plain {rival.name} without physics is nearer on {where}: {shown(rival.error, sensor)} against "
+        f"{shown(rival.own, sensor)}; {rest}"))
+
+
+def _sentence(failed: Sequence[str], ratio: float, noise: Noise, sensor: str, lag: float) -> str:
     size = shown(noise.size, sensor)
+    command = "the command at once" if lag == 0.0 else f"the command of {lag:.2g} s before"
     if not failed:
         if not noise.known and ratio > UNDECIDED:
             return (f"residuals are {ratio:.2g} times the noise of {size} that neighbours show: the sensor's noise "
@@ -174,7 +278,10 @@ def _sentence(failed: Sequence[str], ratio: float, noise: Noise, sensor: str) ->
         return f"what is left is noise of {size}: the model can do what these logs show"
     lacks = f"the model lacks something; {UNHELD}"
     if ratio >= 1.3:
-        return f"residuals are {ratio:.2g} times the sensor's noise of {size}: {lacks}"
+        follow = f" and follow {command}" if "command" in failed else ""
+        return f"residuals are {ratio:.2g} times the sensor's noise of {size}{follow}: {lacks}"
+    if "command" in failed:
+        return f"residuals are hardly larger than the sensor's noise of {size}, but follow {command}: {lacks}"
     if "memory" in failed or "size" in failed:
         return f"residuals are hardly larger than the sensor's noise of {size}, but follow each other: {lacks}"
     if "motion" in failed:
@@ -220,8 +327,8 @@ def shown(value: float, sensor: str) -> str:
 
 def _blocks(parts: Sequence[Array]) -> tuple[Array, Array]:
     """Return sums over stretches of some samples, and how many each has: what chance is judged by."""
-    blocks = [block for part in parts for block in np.array_split(part, max(1, len(part) // _BLOCK)) if len(block)]
-    return np.array([float(block.sum()) for block in blocks]), np.array([float(len(block)) for block in blocks])
+    blocks = [some for part in parts for some in np.array_split(part, max(1, len(part) // _BLOCK)) if len(some)]
+    return np.array([float(some.sum()) for some in blocks]), np.array([float(len(some)) for some in blocks])
 
 
 def _test(parts: Sequence[Array], expected: float, sure: float) -> Excess | None:

@@ -6,12 +6,20 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from servotwin.identification.fitting.holdout import fit_percent
 from servotwin.identification.report import parts as report_parts
 from servotwin.identification.report import pictures as report_pictures
 from servotwin.identification.report import tables as report_tables
 from servotwin.identification.report.parts import STYLE, figure, space
-from servotwin.identification.report.shown import error_shown, error_unit, estimate_lines, share_text, tables_of
-from servotwin.look import document, escape, number
+from servotwin.identification.report.shown import (
+    error_shown,
+    error_unit,
+    estimate_lines,
+    percent,
+    share_text,
+    tables_of,
+)
+from servotwin.look import MINUS, document, escape, number
 from servotwin.parameters import write_file
 
 if TYPE_CHECKING:
@@ -95,6 +103,7 @@ def _summary(fit: Fit) -> str:
             total = table.total()
             own, *others = table.models
             beside = "; ".join(f"{escape(name)} {number(total[name] * factor, 3)}{space(unit)}" for name in others)
+            words += f" (fit {percent(table.total(fit_percent)[own]).replace('-', MINUS)} %)"
             words += f". Beside: {beside}" if beside else ""
             cards.append((f"{number(total[own] * factor, 3)}{space(unit)}", words))
     known = [line for line in estimate_lines(fit) if line.interval != line.method and not line.nuisance]
@@ -162,7 +171,7 @@ def _errors(fit: Fit) -> str:
 
 
 def _residuals(fit: Fit) -> str:
-    drawn = report_parts.residuals(fit.traces, fit.noise)
+    drawn = report_parts.residuals(fit.traces, fit.noise, None if fit.verdict is None else fit.verdict.command)
     if fit.doubt is None:
         return drawn
     if fit.doubt.method == "independent residuals":
@@ -201,8 +210,10 @@ others. “Linearised”: the fit was stopped; the ends are those of the problem
 far off and beyond where a whole step would lead.</li>
 <li><b>Held out.</b> These logs took no part in the fit. Their error is what to expect of the next log of that kind. An
 error that is much smaller on fitted logs means that the others show what these do not, or that these are too few.</li>
+<li><b>Fit (%).</b> 100 (1 − |y − ŷ|/|y − ȳ|): 100 is all of the measured motion, 0 no more than its mean.</li>
 <li><b>Verdict.</b> Residuals beside noise that needs no model: of a shaft that stands, of neighbouring samples, of
-counts. Causes are tried on a few logs; their errors are those of samples that took no part in the trial.</li>
+counts; and whether they follow the command of up to a second before. Causes are tried on a few logs; their errors are
+those of samples that took no part in the trial.</li>
 <li><b>Simpler models.</b> “delay + slew + lag” has no physics. “M1” is this servo with Coulomb and viscous friction
 only. What does not beat them is not worth its parameters.</li>
 <li><b>At a bound, not determined.</b> Such a number is not measured by these logs. Do not carry it to another

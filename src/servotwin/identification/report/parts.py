@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from servotwin.identification.fitting.fit import Trace
     from servotwin.identification.fitting.holdout import ErrorTable
+    from servotwin.identification.fitting.independence import CrossCorrelation
 
 _MOST_LOGS = 21  # that are drawn folded
 STYLE = """
@@ -97,8 +98,10 @@ def _one(trace: Trace, *, tagged: bool) -> str:
     return f"<figure{kind}><figcaption>{_caption(trace, tagged=tagged)}</figcaption><div>{drawn}</div></figure>\n"
 
 
-def residuals(traces: Sequence[Trace], noise: Mapping[str, float]) -> str:
-    """Return the picture of what is left."""
-    return figure(report_traces.residuals(traces, noise),
-                  "Simulated less measured, in units of each sensor's noise σ. Above: over time. Middle: their "
-                  "distribution beside the normal law. Below: how far residuals follow each other.")
+def residuals(traces: Sequence[Trace], noise: Mapping[str, float], command: CrossCorrelation | None = None) -> str:
+    """Return the picture of what is left; of logs that were fitted with what the verdict says of the command before."""
+    return figure(report_traces.residuals(traces, noise, command),
+                  "Simulated less measured, in units of each sensor's noise σ. From above: over time; their "
+                  "distribution beside the normal law; how far residuals follow each other; how far they follow the "
+                  "command of some time before, both filtered so that noise has no memory. Grey: where 99 of 100 lags "
+                  "lie if what is left is noise.")

@@ -175,9 +175,9 @@ def errors(tables: Mapping[str, ErrorTable], label: str, factor: float, unit: st
         height = 1.15 + len(rows) * (0.16 + _BAR * len(models))
         figure = new_figure(WIDTH, height)
         ax = figure.subplots()
-        most = max((x for *_, by in every for x in by.values() if math.isfinite(x)), default=1.0) * factor
-        for place, (_, which, by) in enumerate(rows):
-            _draw_errors(ax, place, by, models, factor, most, faint=which == "fitted" and len(tables) > 1)
+        most = max((x for row in every for x in row.errors.values() if math.isfinite(x)), default=1.0) * factor
+        for place, row in enumerate(rows):
+            _draw_errors(ax, place, row.errors, models, factor, most, faint=row.which == "fitted" and len(tables) > 1)
         ax.set_yticks(range(len(rows)), [f"{shortened(row.value)}\n{row.which}".rstrip() for row in rows])
         ax.set_ylim(len(rows) - 0.45, -0.55)
         ax.set_xlim(0.0, 1.16 * most)

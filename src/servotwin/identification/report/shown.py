@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from servotwin import units
 from servotwin.identification.fitting.free import LUMPED, nominal
+from servotwin.identification.fitting.holdout import fit_percent
 from servotwin.look import figure_in, label_of, readable, unit_for
 from servotwin.studies import dimension_of
 
@@ -166,11 +167,12 @@ def error_shown(traces: Iterable[Trace]) -> tuple[float, str]:
 
 
 class ErrorRow(NamedTuple):
-    """Rms errors (SI) of the logs with one value of a label, by model; `which` logs, such as "held out"."""
+    """Rms errors (SI) and fits [%] of the logs with one value of a label, by model; `which` logs, as "held out"."""
 
     value: str
     which: str
     errors: Mapping[str, float]
+    fits: Mapping[str, float]
 
 
 def tables_of(fit: Fit) -> dict[str, ErrorTable]:
@@ -182,10 +184,24 @@ def tables_of(fit: Fit) -> dict[str, ErrorTable]:
 def error_rows(tables: Mapping[str, ErrorTable], label: str) -> list[ErrorRow]:
     """Return the rms errors by the values of a label, those of one value next to each other."""
     rows = []
-    found = {which: table.by(label) for which, table in tables.items()}
-    for value in dict.fromkeys(key for by in found.values() for key in by):
-        rows += [ErrorRow(value, which, by[value]) for which, by in found.items() if value in by]
+    found = {which: (table.by(label), table.by(label, fit_percent)) for which, table in tables.items()}
+    for value in dict.fromkeys(key for by, _ in found.values() for key in by):
+        rows += [ErrorRow(value, which, by[value], fits[value]) for which, (by, fits) in found.items() if value in by]
     return rows
+
+
+def percent(value: float) -> str:
+    """Return a fit in per cent, to where it differs from 100; "–" where it is not known.
+
+    Examples
+    --------
+    >>> percent(98.123), percent(99.9912), percent(-310.2), percent(float("nan"))
+    ('98.1', '99.991', '-310', '–')
+    """
+    if not math.isfinite(value):
+        return "–"
+    digits = 1 if value < 99.0 else min(2 - math.floor(math.log10(max(100.0 - value, 1e-6))), 6)
+    return f"{value:.{digits}f}" if value > -100.0 else f"{value:.0f}"
 
 
 def share_text(value: float) -> str:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from servotwin.identification.fitting.holdout import fit_percent
 from servotwin.identification.report.shown import (
     MODELS,
     dimension_of_free,
@@ -13,6 +14,7 @@ from servotwin.identification.report.shown import (
     error_shown,
     error_unit,
     estimate_lines,
+    percent,
     sensor_dimension,
 )
 from servotwin.look import MINUS, escape, figure_in, label_of, number, readable, table, unit_for
@@ -72,14 +74,15 @@ def causes(fit: Fit) -> str:
 def errors(tables: Mapping[str, ErrorTable], label: str, factor: float, unit: str) -> str:
     """Return rms errors by the values of a label, of all models."""
     models = next(iter(tables.values())).models
-    rows = [[escape(value), which, *(_error(by.get(model, math.nan) * factor) for model in models)]
-            for value, which, by in error_rows(tables, label)]
+    rows = [[escape(row.value), row.which, *(_error(row.errors.get(model, math.nan) * factor) for model in models),
+             _percent(row.fits.get(models[0], math.nan))] for row in error_rows(tables, label)]
     for which, held in tables.items():
         total = held.total()
-        rows.append(["<b>all</b>", which, *(_error(total.get(model, math.nan) * factor) for model in models)])
+        rows.append(["<b>all</b>", which, *(_error(total.get(model, math.nan) * factor) for model in models),
+                     _percent(held.total(fit_percent)[models[0]])])
     words = escape(label.replace("_", " "))
-    return table((words, "logs", *(f"{escape(MODELS.get(m, m))} ({unit})" for m in models)), rows,
-                 caption=f"Rms error by {words}, over all samples.", text_columns=2)
+    return table((words, "logs", *(f"{escape(MODELS.get(m, m))} ({unit})" for m in models), "fit (%)"),
+                 rows, caption=f"Rms error by {words}, over all samples; fit of the servo.", text_columns=2)
 
 
 def logs(tables: Mapping[str, ErrorTable], traces: Sequence[Trace]) -> str:
@@ -91,8 +94,8 @@ def logs(tables: Mapping[str, ErrorTable], traces: Sequence[Trace]) -> str:
         factor, unit = error_unit(signals.get(error.log, "output_angle"))
         rows.append([escape(error.log), escape(error.motion or "other"), which,
                      f"{_error(error.rms * factor)} {unit}", f"{_error(error.largest * factor)} {unit}",
-                     str(error.samples)])
-    return table(("log", "motion", "part", "rms error", "largest error", "samples"), rows, text_columns=3)
+                     _percent(error.fit_percent), str(error.samples)])
+    return table(("log", "motion", "part", "rms error", "largest error", "fit (%)", "samples"), rows, text_columns=3)
 
 
 def starts(fit: Fit) -> str:
@@ -151,3 +154,7 @@ def settings(fit: Fit) -> str:
 
 def _error(value: float) -> str:
     return number(value, 3)
+
+
+def _percent(value: float) -> str:
+    return percent(value).replace("-", MINUS)

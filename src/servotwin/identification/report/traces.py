@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.identification.fitting.independence import cross_correlation
+from servotwin.identification.fitting.noise import SensorSeries
+from servotwin.identification.fitting.verdict import FALSE_ALARM
 from servotwin.identification.report.shown import sensor_shown
 from servotwin.look import COLOURS, WIDTH, context, finished, new_figure
 
@@ -17,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from servotwin.identification.fitting.fit import Trace
+    from servotwin.identification.fitting.independence import CrossCorrelation
 
 Array = NDArray[np.float64]
 
@@ -98,14 +102,20 @@ def _zoom(ax: Axes, time: Array, low: float, high: float, *curves: Array) -> Non
     ax.xaxis.set_major_locator(MaxNLocator(5))
 
 
-def residuals(traces: Sequence[Trace], noise: Mapping[str, float]) -> Figure:
-    """Return three panels: residuals over time, their distribution, and their autocorrelation.
+def residuals(traces: Sequence[Trace], noise: Mapping[str, float], command: CrossCorrelation | None = None) -> Figure:
+    """Return panels: residuals over time, their distribution, autocorrelation, and correlation with the command before.
 
-    In units of each sensor's noise, so that all logs stand in one picture.
+    In units of each sensor's noise, so that all logs stand in one picture. The last is that of logs that were fitted,
+    as the verdict says it where there is one; without a verdict that of all logs.
     """
     with context():
-        figure = new_figure(WIDTH, 6.6)
-        over_time, spread, follows = figure.subplots(3, 1)
+        if command is None and len({trace.signal for trace in traces}) == 1:
+            command = cross_correlation([SensorSeries(t.log, t.time, t.measured, t.simulated) for t in traces
+                                         if not t.held_out or all(one.held_out for one in traces)])
+        figure = new_figure(WIDTH, 6.6 if command is None else 8.6)
+        over_time, spread, follows, *last = figure.subplots(3 if command is None else 4, 1)
+        if command is not None:
+            _command(last[0], command)
         mixed = len({trace.held_out for trace in traces}) > 1
         groups = [(words if mixed else "all logs", [t for t in traces if t.held_out is held], style)
                   for words, held, style in (("fitted", False, (COLOURS["blue"], "-")),
@@ -156,6 +166,20 @@ def _follows(ax: Axes, traces: Sequence[Trace], words: str, colour: str, dash: A
     """Draw the mean autocorrelation of the logs, up to a third of the longest."""
     found = autocorrelation([t.residual for t in traces])
     ax.plot(np.arange(len(found)), found, color=colour, linestyle=dash, label=words)
+
+
+def _command(ax: Axes, found: CrossCorrelation) -> None:
+    """Draw how residuals follow the command of before, over the band in which noise does."""
+    ax.fill_between(found.lag, -found.band, found.band, color=COLOURS["grey"], alpha=0.25, linewidth=0.0,
+                    label="99 % of noise")
+    ax.axhline(0.0, color=COLOURS["grey"], linewidth=0.8)
+    ax.vlines(found.lag, 0.0, found.value, color=COLOURS["blue"], linewidth=1.2)
+    ax.plot(found.lag, found.value, color=COLOURS["blue"], linestyle="none", marker="o", markersize=3.0,
+            label=f"all lags together: noise does so in {100.0 * found.odds:.2g} % of logs" if found.odds > FALSE_ALARM
+            else "all lags together: noise does not do so")
+    most = 1.1 * float(max(np.abs(found.value).max(), found.band.max()))
+    ax.set(xlabel="command so long before (s)", ylabel="cross-correlation (1)", ylim=(-most, 2.0 * most))
+    ax.legend(loc="upper right")
 
 
 def autocorrelation(residuals: Sequence[Array]) -> Array:

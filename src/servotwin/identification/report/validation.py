@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from servotwin.identification.fitting.holdout import fit_percent
 from servotwin.identification.report import parts as report_parts
 from servotwin.identification.report.parts import STYLE, space
-from servotwin.identification.report.shown import error_shown, rig_text
-from servotwin.look import document, escape, number
+from servotwin.identification.report.shown import error_shown, percent, rig_text
+from servotwin.look import MINUS, document, escape, number
 from servotwin.parameters import write_file
 
 if TYPE_CHECKING:
@@ -50,8 +51,9 @@ here.</p>
 def _summary(found: Validation) -> str:
     factor, unit = error_shown(found.traces)
     errors = found.errors.errors[type(found.model).__name__]
+    told = percent(found.errors.total(fit_percent)[found.errors.models[0]]).replace("-", MINUS)
     worst = max(errors, key=lambda error: error.rms)
-    cards = [(f"{number(found.total * factor, 3)}{space(unit)}", "rms error over all samples"),
+    cards = [(f"{number(found.total * factor, 3)}{space(unit)}", f"rms error over all samples (fit {told} %)"),
              (f"{number(worst.rms * factor, 3)}{space(unit)}", f"rms error of the worst log, {escape(worst.log)}"),
              (f"{number(max(error.largest for error in errors) * factor, 3)}{space(unit)}", "largest error of all")]
     for name, value in found.nuisance.items():
