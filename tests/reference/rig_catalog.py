@@ -76,7 +76,7 @@ def logs(this: Bench, servos: list[rig.Servo] | None = None, load: rig.Load = ri
     What is sent is a multiple of `step` from `begin` on [s], where that is given; the log says what was asked for.
     """
     found = []
-    for k in range(LOGS):
+    for k in range(LOGS if servos is None else len(servos)):
         rng = np.random.default_rng([this.seed, 22, k])
         share = DURATION / len(MOTIONS)
         widths = np.concatenate([draws.motion(kind, share, rng)[:round(share / SAMPLE)]
@@ -143,7 +143,7 @@ def _wrapped(said: rig.Recording, rng: np.random.Generator) -> rig.Recording:
 def _two(this: Bench) -> list[st.Log]:
     s = this.servo
     other = s._replace(R=1.4 * s.R, J=0.6 * s.J, forward=1.5 * s.forward, backward=1.5 * s.backward, gain=0.7 * s.gain)
-    return logs(this, [s, other, s, other])
+    return logs(this, [s, other] * 3)
 
 
 def _warm(this: Bench) -> list[st.Log]:

@@ -21,7 +21,7 @@ from servotwin.identification.fitting.common_cause import common_cause
 from servotwin.identification.fitting.comparison import BESIDE, ErrorTables, compare
 from servotwin.identification.fitting.doubting import doubts_of
 from servotwin.identification.fitting.doubts import Doubts
-from servotwin.identification.fitting.findings import explained, first_looks
+from servotwin.identification.fitting.findings import BY_ITSELF, explained, first_looks, mended
 from servotwin.identification.fitting.fit import Fit, Start, Trace
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.frames import has_pulses
@@ -93,7 +93,8 @@ def identify(
         Normal beliefs, mean and standard deviation by name (SI); "servo" takes the spread that the servo file states.
     mend : sequence of str
         What of `findings(logs, model)` is put right in all logs before the fit: of "wrap", "stamps", "sign", "span",
-        "rows" and "not followed". All that is found is said first among the warnings, mended or not.
+        "rows" and "not followed". All that is found is said first among the warnings, mended or not; "wrap" and "sign"
+        are mended unasked.
     bounds : mapping, optional
         Lowest and highest value by name (SI); random starts fill them. Wide ones unless given.
     holdout : float or sequence of str, optional
@@ -173,7 +174,8 @@ def identify(
     plain = checks.checked_servo(servo, model)
     usual = checks.usual_free(plain, read) if free is None else ()
     plain, assumed = as_logs_say(plain, read)
-    given, noticed = (tuple(read), ()) if _seen_before(starts, mend) else first_looks(read, plain, mend)
+    given, noticed = (mended(read, plain, BY_ITSELF).logs, ()) if _seen_before(starts, mend) else \
+        first_looks(read, plain, mend, BY_ITSELF)
     names = usual if free is None else checks.checked_list("free", free)
     beside = checks.checked_words("compare_with", compare_with, BESIDE)
     level, seed = checks.checked_level(level), checks.checked_count("seed", seed, least=0)

@@ -91,7 +91,7 @@ def turned(bench: TrialBench) -> Sequence[Setting]:
         return ()
     other = "brake" if old.servo.get("electronics.off_state") == "coast" else "coast"
     return [Setting(bench.setting.logs, type(old)(old.servo.replace({"electronics.off_state": other},
-                                                                    source="a trial")))]
+                                                                    source="a trial")), afresh=True)]
 
 
 def directed(bench: TrialBench) -> Sequence[Setting]:

@@ -31,7 +31,8 @@ _ROUNDS, _TIMES = 3, 2  # of choosing and searching, and of choosing in each
 _FORETOLD = 0.25  # of what an event has to gain: what it is tried for, where its effect is foretold
 _PAYS = 8.0  # in units of noise: what one of some hundred places has to gain (their logarithm, twice)
 _LEFT = 0.25  # of what is left in a log, where that is more than noise: a model that lacks something takes any event
-_MOST_LEFT, _FIRST_LEFT = 0.5, 0.8  # of the error: in the end, and before any number has moved
+MOST_LEFT = 0.5  # of the error
+_FIRST_LEFT = math.sqrt(MOST_LEFT)  # of the error, before any number has moved: half of the way
 _NORMAL = 1.4826  # standard deviation over median magnitude of a normal law
 
 
@@ -131,7 +132,7 @@ def _tried(bench: TrialBench, kind: _Kind) -> tuple[int, Gain | None]:
     if not any(found) or not all(np.isfinite(r).all() for r in trial.residuals):
         return 0, None
     gained = _gain(base.residuals, trial.residuals, bench.noise)
-    return sum(map(len, found)), gained if gained.after < _MOST_LEFT * gained.before else None
+    return sum(map(len, found)), gained if gained.after < MOST_LEFT * gained.before else None
 
 
 def _gain(before: Sequence[Array], after: Sequence[Array], noise: float) -> Gain:
