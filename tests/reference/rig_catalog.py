@@ -81,7 +81,7 @@ def logs(this: Bench, servos: list[rig.Servo] | None = None, load: rig.Load = ri
         share = DURATION / len(MOTIONS)
         widths = np.concatenate([draws.motion(kind, share, rng)[:round(share / SAMPLE)]
                                  for kind in rng.permutation(MOTIONS)])
-        widths = draws.MIDDLE + rng.uniform(1.0, 1.8) * (widths - draws.MIDDLE)
+        widths = draws.MIDDLE + min(rng.uniform(1.0, 1.8), _room(this) / draws.REACH) * (widths - draws.MIDDLE)
         sent = begin + step * np.round((widths - begin) / step) if step else widths
         servo = this.servo if servos is None else servos[k]
         said = rig.record(servo, load, sent, **{
@@ -91,6 +91,14 @@ def logs(this: Bench, servos: list[rig.Servo] | None = None, load: rig.Load = ri
             said = change(said, rng)
         found.append(log_of(said, load, f"{k + 1}"))
     return found
+
+
+def _room(this: Bench) -> float:
+    """Return how far pulses may lie off the middle without a stop [s]; the bench has none."""
+    middle = _MIDDLE - this.shift
+    ends = (middle - float(this.file.get("stops.lower_angle") or -math.inf),
+            float(this.file.get("stops.upper_angle") or math.inf) - middle)
+    return 0.9 * this.servo.slope * min(ends)
 
 
 Defect = Callable[[Bench], list[st.Log]]
