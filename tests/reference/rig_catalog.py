@@ -65,6 +65,7 @@ def bench(name: str, seed: int) -> Bench:
         B=N**2 * of("motor.motor_viscous_friction"), V_oc=of("supply.open_circuit_voltage"),
         V_ce0=of("supply.bridge_drop_voltage"), R_b=of("supply.internal_resistance"), zero=zero - slope * shift,
         slope=slope, gain=of("electronics.stretcher_gain") * about(1.3), deadband=of("electronics.deadband"),
+        motor_share=of("friction.load_friction_motor"), external_share=of("friction.load_friction_external"),
         t_min=of("electronics.minimum_drive_time")), shift, seed)
 
 
