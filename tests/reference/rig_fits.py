@@ -45,9 +45,10 @@ AT_HOME = {  # names of causes that are right for a defect of a servo of the cat
     "coast": ("coast",), "warming": ("warming",), "load friction": ("load friction",),
     "digital P servo": ("digital",), "two servos": ("two servos",)}
 AT_HOME_SAID = {
-    "late stamps": "stamps", "angle times 1.1": "the angle is scaled by 1.1", "degrees": "degrees",
-    "reversed sign": "turns against the command", "wrapped angle": "the angle jumps by", "outliers": "lie far off alone",
-    "frame 20.48 ms": "pulses come every 20.4"}
+    "late stamps": ("stamps",), "angle times 1.1": ("the angle is scaled by 1.1",),
+    "degrees": ("degrees", "check the unit of the angle"), "reversed sign": ("turns against the command",),
+    "wrapped angle": ("the angle jumps by",), "outliers": ("lie far off alone",),
+    "frame 20.48 ms": ("pulses come every 20.4",)}
 OF_BUS = {  # defects of a bus servo: by which factors P is larger than its file says, log by log
     "wrong P register": lambda factor: (factor,) * 4, "mixed P register": lambda factor: (1.0, factor, 1.0, factor),
     "counted stamps of a bus servo": lambda factor: (1.0,) * 4}
@@ -155,7 +156,7 @@ def first_at_home(name: str, found: Seen) -> bool:
     if name == "none":
         return found.holds and not any(line.startswith("log ") for line in found.warnings)
     if name in AT_HOME_SAID:
-        return any(AT_HOME_SAID[name] in line for line in said)
+        return any(words in line for words in AT_HOME_SAID[name] for line in said)
     return found.causes[:1] != () and found.causes[0] in AT_HOME[name]
 
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.diagnosis.bench import TrialBench
+from servotwin.identification.fitting.diagnosis.bench import Spent, TrialBench
 from servotwin.identification.fitting.diagnosis.gain import Gain, Told, gain, teaching
 from servotwin.identification.fitting.frames import has_pulses
 from servotwin.identification.fitting.point import Point
@@ -115,23 +115,28 @@ def _tried(bench: TrialBench, kind: _Kind) -> tuple[int, Gain | None]:
     second sample, everywhere, and the others judge. A hundred events explain some of whatever a model lacks: so these
     have to explain most of it, and some of it before any number has moved.
     """
-    base = bench.base
+    base, point = bench.base, bench.base.point
     found: list[list[int]] = [[] for _ in bench.setting.logs]
-    trial = base
-    for round_ in range(_ROUNDS):
-        before, point = found, trial.point
-        chosen = [_settled(bench, point, k, kind, already) for k, already in enumerate(found)]
-        found = [one.places for one in chosen]
-        if found == before:
-            break
-        if round_ == 0 and _gain(base.residuals, [one.residual for one in chosen], bench.noise).after > \
-                _FIRST_LEFT * _gain(base.residuals, base.residuals, bench.noise).before:
-            return 0, None
-        logs = tuple(kind.put(log, starts) for log, starts in zip(bench.setting.logs, found, strict=True))
-        trial = bench.searched(replace(bench.setting, logs=logs), point)
-    if not any(found) or not all(np.isfinite(r).all() for r in trial.residuals):
+    residuals = base.residuals
+    try:
+        for number in range(_ROUNDS):
+            before = found
+            chosen = [_settled(bench, point, k, kind, already) for k, already in enumerate(found)]
+            found = [one.places for one in chosen]
+            if found == before:
+                break
+            residuals = tuple(one.residual for one in chosen)
+            if number == 0 and _gain(base.residuals, residuals, bench.noise).after > _FIRST_LEFT * _gain(
+                    base.residuals, base.residuals, bench.noise).before:
+                return 0, None
+            logs = tuple(kind.put(log, starts) for log, starts in zip(bench.setting.logs, found, strict=True))
+            trial = bench.searched(replace(bench.setting, logs=logs), point)
+            point, residuals = trial.point, trial.residuals
+    except Spent:
+        pass  # they count as far as they were found
+    if not any(found) or not all(np.isfinite(r).all() for r in residuals):
         return 0, None
-    gained = _gain(base.residuals, trial.residuals, bench.noise)
+    gained = _gain(base.residuals, residuals, bench.noise)
     return sum(map(len, found)), gained if gained.after < MOST_LEFT * gained.before else None
 
 

@@ -38,7 +38,7 @@ _SPECIAL: dict[str, Try] = {
     "mixed P register": mixed_gains, "supply that changes": changing_supply, "warming": warming,
     "two servos": two_servos}
 """Candidates that are tried in ways of their own."""
-_EVENTS: dict[str, Try] = {"lost pulses": lost_pulses, "dropped samples": dropped_samples}
+_EVENTS: dict[str, Try] = {"dropped samples": dropped_samples, "lost pulses": lost_pulses}
 """Those that explain a part of whatever is missing: tried where nothing else explains what they would have to."""
 
 
@@ -155,7 +155,10 @@ def _tried(bench: TrialBench, candidate: Candidate, settings: Sequence[Setting])
     if not any(map(bench.may_gain, settings)) and not any(map(bench.gains_soon, promising)):
         return None
     trials = [bench.searched(setting, bench.base.point) for setting in promising]
-    trials += [bench.afresh(setting) for setting in settings if setting.afresh]
+    try:
+        trials += [bench.afresh(setting) for setting in promising if setting.afresh]
+    except Spent:
+        pass  # what was searched from the fit counts
     good = [trial for trial in trials if all(np.isfinite(r).all() for r in trial.residuals)]
     if not good:
         return None
