@@ -7,8 +7,8 @@ pulses and late stamps are both frames that came otherwise.
 
     python benchmarks/identification/defects.py home SEED [SERVO] [DEFECT ...]
 
-fits servos of the catalog (`tests/reference/rig_catalog.py`) by default arguments, one for each of 23 defects and one of
-a bus servo, and prints what is named first, the error in times of the noise and the seconds of CPU.
+fits a servo of the catalog (`tests/reference/rig_catalog.py`) by default arguments, once for each of 23 defects, and a
+bus servo, and prints what is named first, the error in times of the noise and the seconds of CPU.
 """
 
 import sys
@@ -53,7 +53,8 @@ def home(seed: int, servo: str = "hitec-hs-755hb", *names: str) -> None:
         named = one.causes[0] if one.causes else "-" if one.holds and not one.warnings else one.warnings[0] \
             if one.warnings else one.sentence
         right, spent, count = right + (good and name != "none"), spent + one.seconds, count + (name != "none")
-        print(f"  {name:28} {named[:36]:36} {'yes' if good else 'NO':5} {one.ratio:11.1f} {one.seconds:9.1f}", flush=True)
+        print(f"  {name:28} {named[:36]:36} {'yes' if good else 'NO':5} {one.ratio:11.1f} {one.seconds:9.1f}",
+              flush=True)
     print(f"  first in {right} of {count}, {spent:.0f} s in all", flush=True)
 
 

@@ -1,4 +1,4 @@
-"""Servos of the catalog on the independent bench, with what goes wrong at home: 24 defects, fitted as anyone would.
+"""Servos of the catalog on the independent bench, with what goes wrong at home: 23 defects, fitted as anyone would.
 
 A servo is one that its file describes: off by up to 20 % in resistance, 80 % in inertia and 40 % in friction. Four logs
 of 7.5 s at 50 Hz have steps, a random binary sequence, a triangle and small steps one after the other; the shaft is
@@ -18,11 +18,12 @@ import servotwin as st
 from . import rig
 from . import rig_draws as draws
 from .rig_draws import COUNT, MOTIONS
-from .rig_logs import REDUCTION, log_of
+from .rig_logs import log_of
 
 DURATION, LOGS, SAMPLE = 7.5, 4, draws.SAMPLE  # s, -, s
 _MIDDLE = 1.5  # rad, about which a potentiometer of the bench is bent
 _COPPER = 3.9e-3  # 1/K
+_FREE = rig.Load()
 
 
 class Bench(NamedTuple):
@@ -69,7 +70,7 @@ def bench(name: str, seed: int) -> Bench:
         t_min=of("electronics.minimum_drive_time")), shift, seed)
 
 
-def logs(this: Bench, servos: list[rig.Servo] | None = None, load: rig.Load = rig.Load(), *,
+def logs(this: Bench, servos: list[rig.Servo] | None = None, load: rig.Load = _FREE, *,
          change: Callable[[rig.Recording, np.random.Generator], rig.Recording] | None = None, step: float = 0.0,
          begin: float = 0.0, **taking: Any) -> list[st.Log]:
     """Return the logs of a bench, perhaps of other servos log by log, or changed after they were written.
@@ -165,10 +166,11 @@ def _warm(this: Bench) -> list[st.Log]:
 
 
 def _loaded(this: Bench) -> list[st.Log]:
-    """A gear that loses 25 % of all torque, against a fifth of the stall torque."""
+    """A gear that loses 20 % of all torque on either side, against a fifth of the stall torque."""
     s = this.servo
     stall = s.K * (s.V_oc - s.V_ce0) / s.R
-    return logs(this, [s._replace(motor_share=0.2, external_share=0.2)] * LOGS, rig.Load(inertia=s.J, torque=0.2 * stall))
+    lossy = s._replace(motor_share=0.2, external_share=0.2)
+    return logs(this, [lossy] * LOGS, rig.Load(inertia=s.J, torque=0.2 * stall))
 
 
 DEFECTS: dict[str, Defect] = {

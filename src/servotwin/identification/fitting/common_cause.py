@@ -102,8 +102,8 @@ def common_cause(contradicted: Sequence[Contradicted], agreeing: Sequence[Contra
         return (f"a supply of {supply:.2g} V instead of {voltage:g} V would explain {many}: measure it, or search for "
                 "supply.open_circuit_voltage")
     if cause == "angle":
-        return (f"or the angle is scaled by {factor:.3g}, and torque constant, friction and inertia with it: check what "
-                "its sensor counts")
+        return (f"or the angle is scaled by {factor:.3g}, and torque constant, friction and inertia with it: check "
+                "what its sensor counts")
     return (f"loads {factor:.2g} times as large as the logs say would explain {many}: check them, or search for one, "
             "such as load.inertia")
 

@@ -204,7 +204,7 @@ def _with(bench: TrialBench, point: Point, k: int, kind: _Kind, several: Sequenc
 
 def _pursued(bench: TrialBench, scale: float, here: Array, effects: Array, first: NDArray[np.int64],
              most: int) -> list[int]:
-    """Return which effects are added to residuals, the one that lowers the cost of the samples soon after it by most."""
+    """Return which effects are added to residuals, in turn the one that lowers the cost soon after it by most."""
     chosen: list[int] = []
     at = first[:, None] + np.arange(_SOON)
     teaches = (at < len(here)) & (at % 2 == 0)  # as `teaching`

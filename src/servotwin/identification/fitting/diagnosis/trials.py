@@ -116,8 +116,7 @@ def _told(bench: TrialBench, try_it: Try) -> Told | None:
 
 
 def _ordered(bench: TrialBench, traces: Sequence[Trace]) -> list[list[tuple[str, Try]]]:
-    """Return all candidates with what tries them: what the checks suggest and what is cheap, what is dear, changes, events.
-    """
+    """Return all candidates with what tries them: what checks suggest and is cheap, what is dear, changes, events."""
     cheap: list[tuple[str, Try]] = []
     dear: list[tuple[str, Try]] = []
     for candidate in (*_of_findings(bench, traces), *TABLE):
