@@ -4,6 +4,11 @@ Each defect on several random benches, from hardly to be seen to gross. The tabl
 fault, and where it does, how often the true cause is the first that it names, among the first three, or not among them.
 Registers for P are those of a bus servo, which another reference moves. A cause may be found in more than one way: lost
 pulses and late stamps are both frames that came otherwise.
+
+    python benchmarks/identification/defects.py home SEED [SERVO] [DEFECT ...]
+
+fits a servo of the catalog (`tests/reference/rig_catalog.py`) by default arguments, once for each of 23 defects, and a
+bus servo, and prints what is named first, the error in times of the noise and the seconds of CPU.
 """
 
 import sys
@@ -11,8 +16,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
 
+from reference import rig_catalog
 from reference.rig_defects import DEFECTS
-from reference.rig_fits import OF_BUS, place, seen
+from reference.rig_fits import OF_BUS, first_at_home, place, seen, seen_at_home
 
 STRENGTHS = (0.2, 0.5, 0.8)
 
@@ -36,6 +42,25 @@ def main(*seeds: int, only: tuple[str, ...] = ()) -> None:
     print("\n".join(rows), flush=True)
 
 
+def home(seed: int, servo: str = "hitec-hs-755hb", *names: str) -> None:
+    """Print the table of a servo of the catalog, fitted by default arguments."""
+    right, spent, count = 0, 0.0, 0
+    print(f"{servo}, seed {seed}\n  {'defect':28} {'first named':36} right  times noise  s of CPU", flush=True)
+    for name in names or (*rig_catalog.DEFECTS, "wrong P register"):
+        of_bus = name in OF_BUS
+        one = seen(name, 0.5, seed) if of_bus else seen_at_home(servo, name, seed)
+        good = place(name, one) == 0 if of_bus else first_at_home(name, one)
+        named = one.causes[0] if one.causes else "-" if one.holds and not one.warnings else one.warnings[0] \
+            if one.warnings else one.sentence
+        right, spent, count = right + (good and name != "none"), spent + one.seconds, count + (name != "none")
+        print(f"  {name:28} {named[:36]:36} {'yes' if good else 'NO':5} {one.ratio:11.1f} {one.seconds:9.1f}",
+              flush=True)
+    print(f"  first in {right} of {count}, {spent:.0f} s in all", flush=True)
+
+
 if __name__ == "__main__":
-    main(*(int(word) for word in sys.argv[1:] if word.isdecimal()),
-         only=tuple(word for word in sys.argv[1:] if not word.isdecimal()))
+    if sys.argv[1:2] == ["home"]:
+        home(int(sys.argv[2]), *sys.argv[3:])
+    else:
+        main(*(int(word) for word in sys.argv[1:] if word.isdecimal()),
+             only=tuple(word for word in sys.argv[1:] if not word.isdecimal()))

@@ -22,6 +22,10 @@ def test_each_cause_is_told_from_the_other():
     assert "a supply of 4.8 V instead of 6 V would explain both" in common_cause(items(VOLTAGE, 0.8), voltage=6.0)
     assert "loads 1.3 times as large as the logs say would explain all three" in common_cause(
         items(LOAD, 1.3), voltage=6.0)
+    angle = items({"potentiometer.feedback_gain": -1.0, "output_torque_constant": -1.0, "output_inertia": -2.0}, 1.1)
+    for seen in (angle, angle[:1]):
+        assert "the angle is scaled by 1.1," in common_cause(seen, voltage=6.0)
+    assert common_cause(angle[1:], voltage=6.0) is None
     with_drop = common_cause(items(VOLTAGE, 0.5), voltage=6.0, drop_voltage=0.4)
     assert "a supply of 3.2 V" in with_drop
 

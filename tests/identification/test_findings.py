@@ -7,6 +7,7 @@ import pytest
 
 import servotwin as st
 from identification.synthetic_logs import ENCODER, MIDDLE, TRUTH, noisy, run
+from reference import rig_catalog
 from reference.rig_draws import CONDITIONS, file_of, random_truth, runs
 from reference.rig_logs import log_of, servo_of
 from servotwin.errors import InputError
@@ -42,6 +43,13 @@ def test_nothing_is_found_on_logs_of_clean_benches():
         one, = runs(truth, taking, duration=2.0, motions=(("prbs", "steps", "triangle")[seed % 3],))
         log = log_of(one.said, one.load, condition)
         assert findings([log], st.PulseServo(servo_of(file_of(truth)))) == (), condition
+
+
+def test_nothing_is_found_on_healthy_logs_of_the_catalog():
+    """Servos that begin to move late under slow commands, as friction and a soft loop have it."""
+    for seed in (8, 18):
+        this = rig_catalog.bench("futaba-s3003", seed)
+        assert findings(rig_catalog.DEFECTS["none"](this), st.PulseServo(this.file)) == (), seed
 
 
 @pytest.mark.long
@@ -204,6 +212,9 @@ def test_a_fit_says_it_first_and_mends_it_on_request(logs):
     fit = identify(spoilt, TRUTH, mend=("sign",), **options)
     assert fit.warnings[0].startswith("mended: log 'prbs 1': the angle turns against the command")
     assert fit.servo.fit["mended"] == ["sign"]
+    unasked = identify(spoilt, TRUTH, **options)
+    assert unasked.warnings == fit.warnings
+    assert unasked.estimates == fit.estimates
     assert fit.training.total()["PulseServo"] < 2e-3
     plain = identify(logs[:2], TRUTH, **options)
     assert plain.warnings == ()

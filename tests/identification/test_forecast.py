@@ -409,3 +409,26 @@ def test_a_shaft_that_starts_on_a_stop_has_derivatives(side, central):
     assert np.isfinite(part.residual).all()
     k = f.names_of_own(f.cases[0]).index("output_angle")
     assert part.own[:, k] == pytest.approx(inside.own[:, k], abs=0.02 * np.abs(inside.own[:, k]).max())
+
+
+def test_copies_of_a_log_say_what_the_logs_themselves_would():
+    """A pulse left out, and a row put in that says nothing but its command: all samples of the original count."""
+    log = noisy(run(TRUTH, "prbs", seed=5, duration=1.0, kind="pulse_width"), 1e-3)
+    sent = np.ones(len(log), np.bool_)
+    sent[30] = False
+    later = np.where(np.arange(len(log)) >= 30, log.time + 0.02, log.time)
+    copies = [log, replace(log, torque_on=sent), replace(
+        log, time=np.insert(later, 30, later[30] - 0.02), command=np.insert(log.command, 30, log.command[29]),
+        measured={"output_angle": np.insert(log.measured["output_angle"], 30, np.nan)})]
+    model = st.PulseServo(TRUTH)
+    given = (model, Space(model, ["output_inertia"]), ("delay", "frame_phase", "angle_offset", "initial_state"),
+             ("output_angle",))
+    first = Forecast([log], *given)
+    at = Point(np.append(first.space.start, [3.0, 0.5]), (first.own_start(first.cases[0]),) * 3, (first.frames[0],) * 3)
+    parts = [[part.residual for part in Forecast(copies, *given, None, original).at(at, derivatives=False)]
+             for original in (None, first.cases[0])]
+    for whole, copied in zip(*parts, strict=True):
+        np.testing.assert_array_equal(copied, whole)
+    for changed in parts[1][1:]:
+        assert np.abs(changed - parts[1][0])[:30].max() == 0.0
+        assert np.abs(changed - parts[1][0])[30:].max() > 10e-3

@@ -11,7 +11,7 @@ import numpy as np
 
 import servotwin as st
 
-from . import bus_rig
+from . import bus_rig, rig_catalog
 from . import rig_draws as draws
 from .rig_defects import WAKING, between, with_defect
 from .rig_logs import log_of, servo_of
@@ -36,6 +36,19 @@ SAID = {  # what names a defect in the sentence or the warnings, before anything
 }
 
 
+AT_HOME = {  # names of causes that are right for a defect of a servo of the catalog, and what names it without a trial
+    "bent potentiometer": ("bent potentiometer",), "falling supply": ("supply that changes",),
+    "dropping supply": ("supply that changes",), "lost pulses": ("lost pulses",), "dropped rows": ("dropped samples",),
+    "another supply in some logs": ("supply that changes", "voltage", "two servos"),
+    "rounded commands": ("rounded commands",), "play": ("play",), "growing play": ("play",),
+    "play at the potentiometer": ("play at the potentiometer",), "directed friction": ("directed friction",),
+    "coast": ("coast",), "warming": ("warming",), "load friction": ("load friction",),
+    "digital P servo": ("digital",), "two servos": ("two servos",)}
+AT_HOME_SAID = {
+    "late stamps": ("stamps",), "angle times 1.1": ("the angle is scaled by 1.1",),
+    "degrees": ("degrees", "check the unit of the angle"), "reversed sign": ("turns against the command",),
+    "wrapped angle": ("the angle jumps by",), "outliers": ("lie far off alone",),
+    "frame 20.48 ms": ("pulses come every 20.4",)}
 OF_BUS = {  # defects of a bus servo: by which factors P is larger than its file says, log by log
     "wrong P register": lambda factor: (factor,) * 4, "mixed P register": lambda factor: (1.0, factor, 1.0, factor),
     "counted stamps of a bus servo": lambda factor: (1.0,) * 4}
@@ -119,6 +132,32 @@ def seen(name: str, strength: float, seed: int, **more: Any) -> Seen:
     verdict = fit.verdict
     return Seen(verdict.sentence, verdict.holds, tuple(cause.name for cause in verdict.causes), tuple(fit.warnings),
                 clock.process_time() - began, verdict.ratio)
+
+
+def seen_at_home(servo: str, name: str, seed: int, **more: Any) -> Seen:
+    """Fit the logs of a servo of the catalog by default arguments, and return what is said of them."""
+    began = clock.process_time()
+    try:
+        this = rig_catalog.bench(servo, seed)
+        logs = rig_catalog.DEFECTS[name](this)
+        began = clock.process_time()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            fit = st.identify(logs, this.file, **more)
+    except st.errors.InputError as refused:
+        return Seen(str(refused), False, (), (), clock.process_time() - began)
+    return Seen(fit.verdict.sentence, fit.verdict.holds, tuple(cause.name for cause in fit.verdict.causes),
+                tuple(fit.warnings), clock.process_time() - began, fit.verdict.ratio)
+
+
+def first_at_home(name: str, found: Seen) -> bool:
+    """Tell whether what is wrong is the first that a fit names; of nothing, that it accuses no log."""
+    said = (found.sentence, *found.warnings)
+    if name == "none":
+        return found.holds and not any(line.startswith("log ") for line in found.warnings)
+    if name in AT_HOME_SAID:
+        return any(words in line for words in AT_HOME_SAID[name] for line in said)
+    return found.causes[:1] != () and found.causes[0] in AT_HOME[name]
 
 
 def place(name: str, found: Seen) -> int | None:

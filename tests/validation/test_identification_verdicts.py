@@ -9,7 +9,7 @@ import pytest
 
 import servotwin as st
 from reference import rig
-from reference.rig_fits import place, seen
+from reference.rig_fits import first_at_home, place, seen, seen_at_home
 from reference.rig_logs import log_of, servo_of
 
 GROSS = 0.8
@@ -42,6 +42,14 @@ def test_what_changes_or_bends_is_named_first_or_harmless(name):
     for strength in (0.5,) if name == "mixed P register" else (0.1, 0.5):
         found = seen(name, strength, 30, starts=1)
         assert found.ratio <= 1.2 or place(name, found) == 0, (strength, found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["none", "coast", "dropped rows", "another supply in some logs", "play"])
+def test_what_goes_wrong_at_home_is_named_first_by_default(name):
+    """Servos of the catalog, off as their files are, four logs of a free shaft; `defects.py home` has all of it."""
+    found = seen_at_home("hitec-hs-755hb", name, 3)
+    assert first_at_home(name, found), found
 
 
 @pytest.mark.slow

@@ -123,18 +123,33 @@ def make_case(log: Log, model: Model, space: Space, sensors: Sequence[str], *, d
     if not used:
         raise InputError(f"log {log.name!r}", got="no value of " + ", ".join(sensors) + " that counts",
                          allowed="measured values outside the windows that are left out")
-    any_used = np.logical_or.reduce(list(used.values()))
-    index = np.cumsum(any_used) - 1
-    places = {name: index[mask] for name, mask in used.items()}
-    values = {name: log.measured[name][mask] for name, mask in used.items()}
-    times = time[any_used]
     overridden = tuple(sorted(name for name in log.parameters))
-    key = (log.command_kind, overridden, tuple(sorted(places)), bool(log.sent.all()))
+    key = (log.command_kind, overridden, tuple(sorted(used)), bool(log.sent.all()))
     signal = _signal(log, model, {} if signals is None else signals)
-    return Case(log=log, signal=signal, times=times, places=places, values=values, start=(angle, speed),
+    return Case(log=log, signal=signal, **_counted(log, used), start=(angle, speed),
                 scatter=scatter, moving=moving, key=key, period=_period(log, model),
                 leans=_leans(log, model, angle, scatter),
                 tick=0.0 if has_pulses(model) else model.value_or(_TICK, 0.0))
+
+
+def case_like(case: Case, log: Log, model: Model) -> Case:
+    """Return a log with other commands or times than that of a case, and the same samples: it starts as that does.
+
+    Its command is to be told by pulses; else it is that of the log.
+    """
+    used = {name: _usable(log, model, name) for name in case.places}
+    if case.times[0] > 0.0:
+        used = {name: mask & (log.time - log.time[0] >= case.times[0] - 1e-9) for name, mask in used.items()}
+    signal = case.signal if has_pulses(model) and case.period else _signal(log, model, {})
+    return replace(case, log=log, signal=signal, **_counted(log, used), key=(*case.key[:-1], bool(log.sent.all())))
+
+
+def _counted(log: Log, used: Mapping[str, NDArray[np.bool_]]) -> dict[str, Any]:
+    """Return instants, places and values of the samples that count."""
+    any_used = np.logical_or.reduce(list(used.values()))
+    index = np.cumsum(any_used) - 1
+    return {"times": (log.time - log.time[0])[any_used], "places": {name: index[mask] for name, mask in used.items()},
+            "values": {name: log.measured[name][mask] for name, mask in used.items()}}
 
 
 def _usable(log: Log, model: Model, name: str) -> NDArray[np.bool_]:

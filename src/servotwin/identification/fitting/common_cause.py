@@ -1,9 +1,11 @@
-"""One voltage, or one scale of all loads, that explains several contradictions between logs and servo file.
+"""One voltage, or one scale of all loads or of the angle, that explains contradictions between logs and servo file.
 
 The motion of a servo says its numbers only relative to the voltage and to the loads that the logs state. If the supply
 has a times the voltage that is said, a fit finds the torque constant 1/a and the resistances 1/a² times as large; if
 all loads are b times as large, it finds inertia and friction 1/b and the resistances b times as large, for
-J q'' = K/R (s V - K q') - tau_c holds with these as with the true ones.
+J q'' = K/R (s V - K q') - tau_c holds with these as with the true ones. If the angle is c times what the shaft turns
+through, it finds the gain of the potentiometer, the torque constant and friction 1/c times as large, inertia and
+viscous friction 1/c².
 """
 
 from __future__ import annotations
@@ -18,9 +20,13 @@ _TORQUE = ("output_torque_constant", "motor.torque_constant", "motor.back_emf_co
 _RESISTANCE = ("motor.armature_resistance", "supply.internal_resistance", "supply.bridge_drop_resistance")
 _MECHANICAL = ("output_inertia", "motor.rotor_inertia", "gear.output_inertia", "output_coulomb_torque",
                "friction.coulomb_torque_forward", "friction.coulomb_torque_backward", "motor.motor_viscous_friction")
-_POWERS: Mapping[str, Mapping[str, float]] = {  # of a factor of voltage or load, in what a fit finds
+_SQUARED = ("output_inertia", "motor.rotor_inertia", "gear.output_inertia", "motor.motor_viscous_friction")
+_GAIN = "potentiometer.feedback_gain"  # which an angle's scale alone may explain
+_POWERS: Mapping[str, Mapping[str, float]] = {  # of a factor of voltage, load or angle, in what a fit finds
     "voltage": {**dict.fromkeys(_TORQUE, -1.0), **dict.fromkeys(_RESISTANCE, -2.0)},
     "load": {**dict.fromkeys(_RESISTANCE, 1.0), **dict.fromkeys(_MECHANICAL, -1.0)},
+    "angle": {_GAIN: -1.0, **dict.fromkeys(_TORQUE, -1.0), **dict.fromkeys(_MECHANICAL, -1.0),
+              **dict.fromkeys(_SQUARED, -2.0)},
 }
 _FEWEST = 2
 _APART = 3.5  # standard errors, beyond which something is still contradicted
@@ -61,12 +67,12 @@ class _Scale(NamedTuple):
 
 def common_cause(contradicted: Sequence[Contradicted], agreeing: Sequence[Contradicted] = (), *, voltage: float,
                  drop_voltage: float = 0.0) -> str | None:
-    """Return one sentence on the voltage or the scale of loads that would explain all contradictions; None without one.
+    """Return one sentence on the voltage or the scale that would explain all contradictions; None without one.
 
     Parameters
     ----------
     contradicted : sequence of Contradicted
-        At least two.
+        At least two, or the gain of the potentiometer, which a scale of the angle explains as well.
     agreeing : sequence of Contradicted
         Numbers that must not be contradicted by it.
     voltage, drop_voltage : float
@@ -80,11 +86,12 @@ def common_cause(contradicted: Sequence[Contradicted], agreeing: Sequence[Contra
     a supply of 5.1 V instead of 6 V would explain both: measure it, or search for supply.open_circuit_voltage
     """
     known = [one for one in contradicted if _usable(one)]
-    if len(known) < max(_FEWEST, len(contradicted)):
+    fewest = 1 if any(one.name == _GAIN for one in known) else _FEWEST
+    if len(known) < max(fewest, len(contradicted)):
         return None
     others = [one for one in agreeing if _usable(one)]
     found = {cause: _scale(known, others, powers) for cause, powers in _POWERS.items()
-             if all(one.name in powers for one in known)}
+             if all(one.name in powers for one in known) and (cause != "angle" or fewest == 1)}
     good = {cause: scale for cause, scale in found.items() if scale.left < _APART}
     if not good:
         return None
@@ -94,6 +101,9 @@ def common_cause(contradicted: Sequence[Contradicted], agreeing: Sequence[Contra
         supply = drop_voltage + factor * (voltage - drop_voltage)
         return (f"a supply of {supply:.2g} V instead of {voltage:g} V would explain {many}: measure it, or search for "
                 "supply.open_circuit_voltage")
+    if cause == "angle":
+        return (f"or the angle is scaled by {factor:.3g}, and torque constant, friction and inertia with it: check "
+                "what its sensor counts")
     return (f"loads {factor:.2g} times as large as the logs say would explain {many}: check them, or search for one, "
             "such as load.inertia")
 

@@ -22,7 +22,7 @@ from servotwin.identification.fitting.suspicions.wrap import wraps
 from servotwin.logs.log import Log
 from servotwin.models import Model
 
-__all__ = ["KINDS", "MENDED", "Finding", "Mended", "explained", "findings", "first_looks", "mended"]
+__all__ = ["BY_ITSELF", "KINDS", "MENDED", "Finding", "Mended", "explained", "findings", "first_looks", "mended"]
 
 _CHECKS: Mapping[str, Callable[[Sequence[Look]], list[Finding]]] = {
     "wrap": wraps, "stamps": wrong_stamps, "sign": turned, "span": spans, "rows": missing_rows,
@@ -32,6 +32,8 @@ KINDS = tuple(_CHECKS)
 _STEADIED = ("wrap", "stamps")  # what makes a shaft look faster than any servo
 MENDED = tuple(kind for kind in KINDS if kind != "pulses")
 """Kinds of findings that can be mended."""
+BY_ITSELF = ("wrap", "sign")
+"""Kinds that a fit mends unasked, as no servo does so and nothing is lost: a search would be in vain."""
 
 
 def findings(logs: Sequence[Log], model: Model) -> tuple[Finding, ...]:
@@ -100,8 +102,9 @@ def _checked(logs: Sequence[Log], model: Model, kinds: Sequence[str]) -> _Checke
     return _Checked(tuple(now.values()), tuple(found), steadied)
 
 
-def first_looks(logs: Sequence[Log], model: Model, mend: Sequence[str]) -> tuple[tuple[Log, ...], tuple[str, ...]]:
-    """Return logs with some kinds of findings mended, and what has to be said of all findings.
+def first_looks(logs: Sequence[Log], model: Model, mend: Sequence[str],
+                unasked: Sequence[str] = ()) -> tuple[tuple[Log, ...], tuple[str, ...]]:
+    """Return logs with some kinds of findings mended, asked for or not, and what has to be said of all findings.
 
     Raises
     ------
@@ -111,7 +114,7 @@ def first_looks(logs: Sequence[Log], model: Model, mend: Sequence[str]) -> tuple
     """
     kinds = checks.checked_words("mend", mend, MENDED)
     about = centred(logs, model)
-    done = mended(about.logs, model, kinds)
+    done = mended(about.logs, model, (*kinds, *unasked))
     left = _checked(done.logs, model, KINDS)
     checks.check_speeds(left.steadied, model)
     return done.logs, (*about.sentences, *(f"mended: {one.sentence}" for one in done.findings),

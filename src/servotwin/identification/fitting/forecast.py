@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.identification.fitting.batches import Batch, Done, Running, batches, simulated
-from servotwin.identification.fitting.case import Case, make_case
+from servotwin.identification.fitting.case import Case, case_like, make_case
 from servotwin.identification.fitting.frames import gaps, signal, widest
 from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.lanes import LogLanes
@@ -75,6 +75,8 @@ class Forecast:
         Names of measured signals that are compared.
     running : Running, optional
         Who simulates, and how closely; threads of this process unless given.
+    original : Case, optional
+        One of which all logs are copies with other commands or times; its pulses come when a point says.
 
     Raises
     ------
@@ -83,7 +85,7 @@ class Forecast:
     """
 
     def __init__(self, logs: Sequence[Log], model: Model, space: Space, nuisance: Sequence[str],
-                 sensors: Sequence[str], running: Running | None = None) -> None:
+                 sensors: Sequence[str], running: Running | None = None, original: Case | None = None) -> None:
         for name in nuisance:
             if name not in NUISANCES:
                 raise InputError("nuisance", got=name, allowed=", ".join(NUISANCES))
@@ -99,7 +101,9 @@ class Forecast:
         self.step = WIDE if isinstance(model, DigitalServo) else STEP  # of the differences that are derivatives
         delayed = any(name in nuisance for name in ("delay", "log_delay", "frame_phase"))
         signals: dict[tuple[Any, ...], Signal] = {}
-        self.cases = tuple(make_case(log, model, space, self.sensors, delayed=delayed, signals=signals) for log in logs)
+        self.cases = tuple(
+            make_case(log, model, space, self.sensors, delayed=delayed, signals=signals) if original is None
+            else case_like(original, log, model) for log in logs)
         self.strict = True
         fades = _STRIBECK in space.names or model.value_or(_STRIBECK, 0.0) > 0.0
         bent = fades or any(log.load.pendulums or log.load.springs for log in logs)
@@ -113,7 +117,8 @@ class Forecast:
         self.ticked = self.phased and "control_phase" in nuisance  # whether ticks find which commands they take
         self.own_phases = "delay" not in self.extra  # whether each log's pulses come when they want
         self.held = False  # whether servos had held their first command for long when their log began
-        self.frames = tuple(widest(case.log, case.period) for case in self.cases) if self.phased else ()
+        self.frames = tuple(widest(case.log, case.period) for case in self.cases) if (
+            self.phased and original is None) else ()
         if "frame_period" in self.extra and len({case.period for case in self.cases}) > 1:
             raise InputError("nuisance: frame_period", got="logs with several frame periods", allowed="one in all logs")
 

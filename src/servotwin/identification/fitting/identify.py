@@ -21,7 +21,7 @@ from servotwin.identification.fitting.common_cause import common_cause
 from servotwin.identification.fitting.comparison import BESIDE, ErrorTables, compare
 from servotwin.identification.fitting.doubting import doubts_of
 from servotwin.identification.fitting.doubts import Doubts
-from servotwin.identification.fitting.findings import explained, first_looks
+from servotwin.identification.fitting.findings import BY_ITSELF, explained, first_looks, mended
 from servotwin.identification.fitting.fit import Fit, Start, Trace
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.foreseen import Foreseen, foreseen
@@ -94,7 +94,8 @@ def identify(
         Normal beliefs, mean and standard deviation by name (SI); "servo" takes the spread that the servo file states.
     mend : sequence of str
         What of `findings(logs, model)` is put right in all logs before the fit: of "wrap", "stamps", "sign", "span",
-        "rows" and "not followed". All that is found is said first among the warnings, mended or not.
+        "rows" and "not followed". All that is found is said first among the warnings, mended or not; "wrap" and "sign"
+        are mended unasked.
     bounds : mapping, optional
         Lowest and highest value by name (SI); random starts fill them. Wide ones unless given.
     holdout : float or sequence of str, optional
@@ -174,7 +175,8 @@ def identify(
     plain = checks.checked_servo(servo, model)
     plain, assumed = as_logs_say(plain, read)
     before = _seen_before(starts, mend)
-    given, noticed = (tuple(read), ()) if before else first_looks(read, plain, mend)
+    given, noticed = (mended(read, plain, BY_ITSELF).logs, ()) if before else \
+        first_looks(read, plain, mend, BY_ITSELF)
     registers = None if before else register_search(plain, given, limit)
     if registers is not None and registers.taken is not None:
         plain = type(plain)(registers.taken.servo)

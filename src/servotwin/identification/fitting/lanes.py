@@ -59,14 +59,16 @@ class LogLanes:
         self.tick = np.full(self.count, own.get("control_phase", 0.0))
         columns = {"output_angle": (self.angle, OFFSET_SCALE), "output_speed": (self.speed, SPEED_SCALE),
                    "control_phase": (self.tick, 1.0)}
-        own_lower, own_upper = self._room(own)
-        open_ = np.full(len(self.shaped), np.inf)
-        self.steps = _steps(
-            np.concatenate([point.shared[:p], [own[name] for name in self.varied], np.zeros(len(open_))]),
-            np.concatenate([forecast.space.lower, own_lower, -open_]),
-            np.concatenate([forecast.space.upper, own_upper, open_]), sides, step)
-        if self.shaped:  # a period that is much longer would have other pulses carry the commands
-            self.steps[:, -1] = np.clip(self.steps[:, -1], -STEP, STEP)
+        self.steps = np.zeros((sides, numbers))
+        if sides:
+            own_lower, own_upper = self._room(own)
+            open_ = np.full(len(self.shaped), np.inf)
+            self.steps = _steps(
+                np.concatenate([point.shared[:p], [own[name] for name in self.varied], np.zeros(len(open_))]),
+                np.concatenate([forecast.space.lower, own_lower, -open_]),
+                np.concatenate([forecast.space.upper, own_upper, open_]), sides, step)
+            if self.shaped:  # a period that is much longer would have other pulses carry the commands
+                self.steps[:, -1] = np.clip(self.steps[:, -1], -STEP, STEP)
         for side in range(sides):
             first = 1 + side * numbers
             self.x[np.arange(first, first + p), np.arange(p)] += self.steps[side, :p]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from servotwin.identification.fitting.arrow import Loss
 from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.frames import Gap, gap_of, gaps, latency
+from servotwin.identification.fitting.frames import Gap, changes, gap_of, gaps, latency
 from servotwin.identification.fitting.point import DELAY_SCALE, Frames, LogPart, Point
 from servotwin.identification.fitting.ticks import ticks_of
 
@@ -30,7 +30,7 @@ _FIRST_PULSES = 600  # after which no further log is taken
 _LIKELY = 5  # periods, that are searched from
 _MOST_PERIODS = 160
 _MOST_PHASES = 8  # for each period
-_ASKED = 0.25  # of the periods: those that further logs are asked about
+_ASKED = 0.25  # of the periods: those that are simulated
 _REACH = 0.06  # of a period, either way: more than a PCA9685's clock is off by its data sheet
 _FINE = (1e-5, 3e-5, 1e-4, 2e-4, 4e-4, 8e-4)  # of a period: quartz clocks
 _WINDOWS = 6  # of a log, that are compared
@@ -243,22 +243,52 @@ def drifts(forecast: Forecast, loss: Loss, point: Point, cases: Sequence[int], *
 
 
 def likely_periods(scan: Scan, cases: Sequence[int]) -> list[float]:
-    """Return the frame periods that some logs fit best, the best first [s]."""
+    """Return the frame periods that some logs fit best, the best first [s].
+
+    Simulated are those that promise most to first order.
+    """
     forecast = scan.forecast
     nominal = scan.now(cases[0]).frames.period
     order = sorted(cases, key=lambda k: -len(gaps(forecast.cases[k].log, nominal)))
     pulses = np.cumsum([forecast.cases[k].log.duration / nominal for k in order])
     rich = [k for k, before in zip(order, [0.0, *pulses], strict=False) if before < _FIRST_PULSES][:_FIRST_LOGS]
     longest = max(forecast.cases[k].log.duration for k in rich)
-    costs = _costs(scan, rich[:1], _periods(nominal, longest))  # the richest log says which the others are asked about
-    some = sorted(costs, key=lambda period: costs[period])[:math.ceil(_ASKED * len(costs))]
-    more = _costs(scan, rich[1:], some) if len(rich) > 1 else {}
-    costs = {period: costs[period] + more.get(period, 0.0) for period in some}
+    left = _foretold(scan, rich, _periods(nominal, longest))
+    costs = _costs(scan, rich, sorted(left, key=lambda period: left[period])[:math.ceil(_ASKED * len(left))])
     found: list[float] = []
     for period in sorted(costs, key=lambda period: costs[period]):
         if all(abs(period - other) > 2.0 * _step(nominal, longest) for other in found):
             found.append(period)
     return found[:_LIKELY]
+
+
+def _foretold(scan: Scan, cases: Sequence[int], periods: Sequence[float]) -> dict[float, float]:
+    """Return the share of the cost that pulses of each period leave to first order, at the best phase of each log.
+
+    A command waits for its pulse; where that wait is another one than now, the motion after it is as much later. All
+    numbers may follow, in each log for itself.
+    """
+    forecast, before = scan.forecast, 0.0
+    left = np.zeros(len(periods))
+    for k, part in zip(cases, forecast.at_all([scan.point], derivatives=True, rates=True, cases=cases)[0], strict=True):
+        now, log, case = scan.now(k), forecast.cases[k].log, forecast.cases[k]
+        at = np.searchsorted(t := changes(log), case.times - now.first * DELAY_SCALE, side="right") - 1
+        weight = np.sqrt(scan.loss.weight(part.residual))
+        basis = np.linalg.qr(np.column_stack([part.shared, part.own]) * weight[:, None])[0]
+        if not len(t) or not np.isfinite(basis).all():
+            continue
+        places = np.concatenate(list(case.places.values()))
+        shifted = np.where(at[places] >= 0, part.later * weight, 0.0)[:, None] / DELAY_SCALE
+        r = part.residual * weight
+        r = r - basis @ (basis.T @ r)
+        before += float(r @ r)
+        here = t[np.maximum(at[places], 0)]
+        for i, period in enumerate(periods):
+            phases = period * np.arange(_MOST_PHASES) / _MOST_PHASES
+            d = shifted * (np.mod(phases - here[:, None], period)
+                           - np.mod(now.frames.phase - here, now.frames.period)[:, None])
+            left[i] += float(((r[:, None] + d - basis @ (basis.T @ d)) ** 2).sum(axis=0).min())
+    return dict(zip(periods, (left / max(before, 1e-300)).tolist(), strict=True))
 
 
 def _costs(scan: Scan, cases: Sequence[int], periods: Sequence[float]) -> dict[float, float]:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.arrow import Outcome, Prior, Search
+from servotwin.identification.fitting.arrow import Outcome, Prior, Search, together
 from servotwin.identification.fitting.doubts import Doubts
 from servotwin.identification.fitting.intervals import begins
 from servotwin.identification.fitting.point import Point
@@ -34,6 +34,7 @@ _PUSH = 0.5 * PUSHED**2
 _FACTORS = (0.25, 0.4, 0.63, 0.8, 1.25, 1.6, 2.5, 4.0)  # of the value: where the logs are asked once more
 _STEPS = 8  # of a search that only has to show whether it goes down
 _HINT = 0.5  # of the gain that counts: the noise is not known yet
+_HINTS = 0.1  # of that: what a parabola has to promise, for the cost need not be one
 
 Told = Callable[[float, str], None]
 
@@ -152,9 +153,11 @@ class _Trial:
 
 
 def settle(task: Task, found: Outcome, tell: Told) -> tuple[Outcome, tuple[Dropped, ...]]:
-    """Drop the priors that the logs contradict, one after the other; return where the fit ends then, and which.
+    """Drop the priors that the logs contradict; return where the fit ends then, and which.
 
-    Those that the logs push, if less far, are widened. The task goes on so.
+    All that are contradicted one by one go at once, and come back one at a time where the logs do not contradict them
+    beside those that are still there. Those that the logs push, if less far, are widened one after the other. The task
+    goes on so.
 
     Parameters
     ----------
@@ -171,15 +174,49 @@ def settle(task: Task, found: Outcome, tell: Told) -> tuple[Outcome, tuple[Dropp
         with task.nearly(found.point):
             trials = [trial for trial in _trials(task, found)
                       if trial.dropped.which not in [one.which for one in left]]
-        if not trials:
-            break
-        best = max(trial.gain for trial in trials)
-        # What fits as well is told apart by how far its own prior has to be left
-        chosen = min((t for t in trials if t.gain > best - _REACH), key=lambda t: t.moved)
-        task.prior = _widened(task.prior, chosen.dropped)
-        found = task.again(chosen.end.point, _part_of(tell, k, count))
-        left.append(chosen.dropped)
+            if not trials:
+                break
+            best = max(trial.gain for trial in trials)
+            # What fits as well is told apart by how far its own prior has to be left
+            chosen = min((t for t in trials if t.gain > best - _REACH), key=lambda t: t.moved)
+            gone, point = [chosen.dropped], chosen.end.point
+            if len(going := [trial for trial in trials if math.isinf(trial.dropped.wide)]) > 1:
+                gone, point = _contradicted(task, going)
+        for one in gone:
+            task.prior = _widened(task.prior, one)
+        found = task.again(point, _part_of(tell, k, count))
+        left += gone
     return found, tuple(left)
+
+
+def _contradicted(task: Task, trials: Sequence[_Trial]) -> tuple[list[Dropped], Point]:
+    """Return which of several priors have to go together, and where the fit without them ends.
+
+    Each is contradicted alone. Without all of them, those come back beside which the fit is as good, until each that
+    is left out would cost more than a prior does that is not believed.
+    """
+    out = {trial.dropped.which: trial for trial in trials}
+
+    def ends(several: Sequence[Sequence[int]], starts: Sequence[Point]) -> list[Outcome]:
+        searches = [_search(task, _without(task.prior, some)).steps(start, most=_STEPS)
+                    for some in several for start in starts]
+        reached = together(task.forecast, task.fitted, searches)
+        return [min(reached[i:i + len(starts)], key=lambda end: end.cost)
+                for i in range(0, len(reached), len(starts))]
+
+    best = max(trials, key=lambda trial: trial.gain).end.point
+    (now,) = ends([tuple(out)], [best])
+    while len(out) > 1:
+        back = dict(zip(out, ends([[k for k in out if k != one] for one in out], [now.point, best]), strict=True))
+        rise = {k: end.cost - now.cost for k, end in back.items()}
+        least = min(rise.values())
+        if least >= _OPEN:
+            break
+        # Of those that cost as little, the one comes back that would have to be left by most of its own widths
+        one = max((k for k in out if rise[k] < max(least, 0.0) + _REACH), key=lambda k: out[k].moved)
+        del out[one]
+        now = back[one]
+    return [trial.dropped for trial in out.values()], now.point
 
 
 def yielded(task: Task, found: Outcome, left: Sequence[Dropped], doubts: Doubts) -> tuple[Yielded, ...]:
@@ -249,29 +286,45 @@ def _search(task: Task, prior: Prior) -> Search:
 
 
 def _trials(task: Task, found: Outcome) -> list[_Trial]:
-    """Return the fits without one prior each that are better by so much that the prior is not believed."""
+    """Return the fits without one prior each that are better by so much that the prior is not believed.
+
+    Searched are those without a prior that pulls at the fit, or far from which the logs are fitted as well.
+    """
     stuck = task.at_bound(found) | task.held
     believed = [k for k in range(len(task.forecast.space)) if task.prior.weight[k] > 0.0]
     free = [k for k in believed if not stuck[k]]
     base = _search(task, task.prior).costs([found.point])[0]
     if not believed or not math.isfinite(base):
         return []
-    far = _far(task, found, free, base)
+    doubt, rows = _doubt(task, found.point, task.prior)
+    far = _far(task, found, free, base, doubt, rows)
     without = _search(task, _without(task.prior, believed)).run(found.point, most=_STEPS)
     if not far and base - without.cost < _HINT * _PUSH:
         return []
-    trials = []
-    for k in believed:
-        search = _search(task, _without(task.prior, [k]))
-        ends = (search.run(start, most=_STEPS) for start in (found.point, *far.get(k, ())))
-        judged = [trial for end in ends if (trial := _judged(task, found, k, end, base)) is not None]
-        trials += [max(judged, key=lambda trial: trial.gain)] if judged else []
-    return trials
+    asked = [(k, start) for k in believed if k in far or stuck[k] or _promises(task, found, k, doubt)
+             for start in (found.point, *far.get(k, ()))]
+    ends = together(task.forecast, task.fitted, [
+        _search(task, _without(task.prior, [k])).steps(start, most=_STEPS) for k, start in asked])
+    judged: dict[int, list[_Trial]] = {}
+    for (k, _), end in zip(asked, ends, strict=True):
+        if (trial := _judged(task, found, k, end, base)) is not None:
+            judged.setdefault(k, []).append(trial)
+    return [max(some, key=lambda trial: trial.gain) for some in judged.values()]
 
 
-def _far(task: Task, found: Outcome, which: Sequence[int], base: float) -> Mapping[int, tuple[Point, ...]]:
+def _promises(task: Task, found: Outcome, k: int, doubt: Uncertainty) -> bool:
+    """Tell whether the fit without a prior gains so much on a parabola that a search for it may: half of u²/(1 - h).
+
+    u is by how many of its widths the fit leaves it, and h the variance of the number over that of the prior.
+    """
+    u = float((found.point.shared[k] - task.prior.mean[k]) * task.prior.weight[k])
+    share = float(doubt.curvature[k, k]) * float(task.prior.weight[k]) ** 2
+    return 0.5 * u**2 > _HINTS * max(1.0 - share, 0.0) * _HINT * _PUSH
+
+
+def _far(task: Task, found: Outcome, which: Sequence[int], base: float, doubt: Uncertainty,
+         rows: Sequence[Rows]) -> Mapping[int, tuple[Point, ...]]:
     """Return points far from the prior of one number that fit as well, all else following: the best one of each."""
-    doubt, rows = _doubt(task, found.point, task.prior)
     search = _search(task, task.prior)
     asked = [(k, point) for k in which for x in _values(task, k) for point in begins(
         search, found, doubt, k, (x - found.point.shared[k]) / max(float(doubt.std[k]), 1e-12), rows)]

@@ -278,14 +278,11 @@ class TrialBench:
         self.purse.check(sum(log.duration + _COPY for log in logs))
         self.purse.left -= _COPY * len(logs)
         old = self.base.forecast
-        forecast = Watched(self.purse, 1.0, logs, old.model, old.space, old.nuisance, old.sensors)
+        forecast = Watched(self.purse, 1.0, logs, old.model, old.space, old.nuisance, old.sensors, None, old.cases[k])
         forecast.goes_on_from(old)
         forecast.nearly = forecast.bent
-        frames = (point.frames[k],) * len(logs) if point.frames else ()
-        known = dict(zip(old.names_of_own(old.cases[k]), point.own[k], strict=True))
-        own = tuple(np.array([known.get(name, value) for name, value in zip(
-            forecast.names_of_own(case), forecast.own_start(case), strict=True)]) for case in forecast.cases)
-        return list(self.judged(forecast, Point(point.shared, own, frames)))
+        frames = (old.frames_of(point, k),) * len(logs) if old.phased else ()
+        return list(self.judged(forecast, Point(point.shared, (point.own[k],) * len(logs), frames)))
 
     def counted(self, k: int) -> NDArray[np.int64]:
         """Return which rows of a log have an angle that counts."""

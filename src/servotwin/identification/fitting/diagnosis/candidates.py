@@ -91,7 +91,7 @@ def turned(bench: TrialBench) -> Sequence[Setting]:
         return ()
     other = "brake" if old.servo.get("electronics.off_state") == "coast" else "coast"
     return [Setting(bench.setting.logs, type(old)(old.servo.replace({"electronics.off_state": other},
-                                                                    source="a trial")))]
+                                                                    source="a trial")), afresh=True)]
 
 
 def directed(bench: TrialBench) -> Sequence[Setting]:
@@ -181,7 +181,8 @@ def backlash(bench: TrialBench) -> Sequence[Setting]:
     if not inertia:
         return ()
     own = {} if bench.setting.model.servo.get("gear.output_inertia") else {"gear.output_inertia": 0.05 * inertia}
-    return numbers(({"gear.backlash": 0.006}, {"gear.backlash": 0.02}), own, price=20.0)(bench)
+    return [replace(one, afresh=True)  # the fit has bent inertia and friction
+            for one in numbers(({"gear.backlash": 0.006}, {"gear.backlash": 0.02}), own, price=3.0)(bench)]
 
 
 TABLE: tuple[Candidate, ...] = (

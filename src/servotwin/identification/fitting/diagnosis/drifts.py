@@ -1,4 +1,4 @@
-"""What changes in the course of logs: a supply that falls or drops, a winding that warms.
+"""What changes in the course of logs: a supply that falls, drops or differs from log to log, a winding that warms.
 
 A number has another value in each stretch of a log. A log is simulated once for each of them, with that value
 throughout, and each simulation counts in its own stretch: a servo in its loop soon forgets what was before.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -40,8 +41,11 @@ class _Shape:
 
 
 def changing_supply(bench: TrialBench) -> Told | None:
-    """Return what a supply gains whose voltage falls over each log or over all, or drops at once."""
-    kinds = [[_ramp(bench)], [_ramp(bench, over_all=True)], [_drop(bench, at) for at in _DROPS]]
+    """Return what a supply gains whose voltage falls over each log or over all, drops at once, or differs in some."""
+    count = len(bench.cases)
+    groups = [some for size in range(1, count // 2 + 1) for some in combinations(range(count), size)]
+    kinds = [[_ramp(bench)], [_ramp(bench, over_all=True)], [_drop(bench, at) for at in _DROPS],
+             [_some(bench, group) for group in groups]]
     return _told(bench, VOLTAGE, kinds, "supply that changes", "a supply whose voltage changes in the course of the "
                  "logs, by {change:.0f} %", "measure the voltage beside the angle, or use a stiffer supply")
 
@@ -84,6 +88,11 @@ def _drop(bench: TrialBench, at: float) -> _Shape:
     return _Shape(samples, np.tile(after, (len(bench.cases), 1)))
 
 
+def _some(bench: TrialBench, group: Sequence[int]) -> _Shape:
+    samples = tuple(np.full(len(case.times), float(k in group)) for k, case in enumerate(bench.cases))
+    return _Shape(samples, np.array([np.full(_STRETCHES, float(k in group)) for k in range(len(bench.cases))]))
+
+
 def _way(times: Array, duration: float) -> Array:
     return times / max(duration, 1e-12)
 
@@ -120,6 +129,8 @@ class _Drift:
         tried = []
         for several in kinds:
             told = [(*self._step(self.r, slope, shape), shape) for shape in several]
+            if not told:
+                continue
             least = min(cost for cost, *_ in told)
             # Where a drop lies in a quarter that does not teach, nothing tells: the middle
             alike = [(step, shape) for cost, step, shape in told if cost <= _ALIKE * least]

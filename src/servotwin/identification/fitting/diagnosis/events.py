@@ -1,7 +1,9 @@
-"""Single events in logs, pulses that never came and rows that were not written: tried one by one, kept where they pay.
+"""Single events in logs, pulses that never came and rows that were not written, kept where they pay.
 
-All places of a log are tried in one batch at the present numbers, by what soon follows them, until no more is found;
-then the numbers are searched again. Every second sample chooses, those between judge on the quarters that do not teach.
+Every place after which enough is left is simulated once at the present numbers. A servo in its loop soon forgets an
+event, so the effects of several add up: the events of a log are chosen by matching pursuit (Mallat & Zhang 1993), any
+number of them, simulated together, and left out again where the log is as well off without one. Then the numbers are
+searched again. Every second sample chooses, those between judge on the quarters that do not teach.
 """
 
 from __future__ import annotations
@@ -9,11 +11,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.diagnosis.bench import TrialBench
+from servotwin.identification.fitting.diagnosis.bench import Spent, TrialBench
 from servotwin.identification.fitting.diagnosis.gain import Gain, Told, gain, teaching
 from servotwin.identification.fitting.frames import has_pulses
 from servotwin.identification.fitting.point import Point
@@ -22,14 +25,14 @@ from servotwin.models import DigitalServo
 
 Array = NDArray[np.float64]
 
-_MOST = 12  # events of a log and round
+_MOST = 0.5  # of the places of a log: more events tell nothing apart
 _SOON = 10  # samples after an event, by which it is judged
-_ROUNDS, _TIMES = 3, 4  # of choosing and searching, and of choosing in each
-_LOOKED = 100  # places of a log that are tried at once: those after which most is left
+_ROUNDS, _TIMES = 3, 2  # of choosing and searching, and of choosing in each
 _FORETOLD = 0.25  # of what an event has to gain: what it is tried for, where its effect is foretold
 _PAYS = 8.0  # in units of noise: what one of some hundred places has to gain (their logarithm, twice)
 _LEFT = 0.25  # of what is left in a log, where that is more than noise: a model that lacks something takes any event
-_MOST_LEFT = 0.5  # of the error
+MOST_LEFT = 0.5  # of the error
+_FIRST_LEFT = math.sqrt(MOST_LEFT)  # of the error, before any number has moved: half of the way
 _NORMAL = 1.4826  # standard deviation over median magnitude of a normal law
 
 
@@ -110,66 +113,112 @@ def _tried(bench: TrialBench, kind: _Kind) -> tuple[int, Gain | None]:
 
     Their numbers come from the quarters that teach, as those of all candidates. Where events are is chosen by every
     second sample, everywhere, and the others judge. A hundred events explain some of whatever a model lacks: so these
-    have to explain most of it.
+    have to explain most of it, and some of it before any number has moved.
     """
-    base = bench.base
+    base, point = bench.base, bench.base.point
     found: list[list[int]] = [[] for _ in bench.setting.logs]
-    trial = base
-    for _ in range(_ROUNDS):
-        before, point = found, trial.point
-        found = [_settled(bench, point, k, kind, already) for k, already in enumerate(found)]
-        if found == before:
-            break
-        logs = tuple(kind.put(log, starts) for log, starts in zip(bench.setting.logs, found, strict=True))
-        trial = bench.searched(replace(bench.setting, logs=logs), point)
-    if not any(found) or not all(np.isfinite(r).all() for r in trial.residuals):
+    residuals = base.residuals
+    try:
+        for number in range(_ROUNDS):
+            before = found
+            chosen = [_settled(bench, point, k, kind, already) for k, already in enumerate(found)]
+            found = [one.places for one in chosen]
+            if found == before:
+                break
+            residuals = tuple(one.residual for one in chosen)
+            if number == 0 and _gain(base.residuals, residuals, bench.noise).after > _FIRST_LEFT * _gain(
+                    base.residuals, base.residuals, bench.noise).before:
+                return 0, None
+            logs = tuple(kind.put(log, starts) for log, starts in zip(bench.setting.logs, found, strict=True))
+            trial = bench.searched(replace(bench.setting, logs=logs), point)
+            point, residuals = trial.point, trial.residuals
+    except Spent:
+        pass  # they count as far as they were found
+    if not any(found) or not all(np.isfinite(r).all() for r in residuals):
         return 0, None
-    gained = gain([r[1::2] for r in base.residuals], [r[1::2] for r in trial.residuals], bench.noise)
-    return sum(map(len, found)), gained if gained.after < _MOST_LEFT * gained.before else None
+    gained = _gain(base.residuals, residuals, bench.noise)
+    return sum(map(len, found)), gained if gained.after < MOST_LEFT * gained.before else None
 
 
-def _settled(bench: TrialBench, point: Point, k: int, kind: _Kind, already: list[int]) -> list[int]:
+def _gain(before: Sequence[Array], after: Sequence[Array], noise: float) -> Gain:
+    """Return what is gained on the samples that did not choose."""
+    return gain([r[1::2] for r in before], [r[1::2] for r in after], noise)
+
+
+class _Chosen(NamedTuple):
+    """The events of a log, and the residuals of the angle with them (SI)."""
+
+    places: list[int]
+    residual: Array
+
+
+def _settled(bench: TrialBench, point: Point, k: int, kind: _Kind, already: list[int]) -> _Chosen:
     """Return the events of one log, chosen until they stay: only then do numbers move that could make up for some."""
+    (here,) = _with(bench, point, k, kind, [already])
+    found = _Chosen(already, here)
     for _ in range(_TIMES):
-        chosen = _chosen(bench, point, k, kind, already)
-        if chosen == already:
+        before = found
+        found = _chosen(bench, point, k, kind, before)
+        if found.places == before.places:
             break
-        already = chosen
-    return already
+    return found
 
 
-def _chosen(bench: TrialBench, point: Point, k: int, kind: _Kind, already: list[int]) -> list[int]:
-    """Return the events of one log: those that are known, less those that pay no more, and further ones.
+def _chosen(bench: TrialBench, point: Point, k: int, kind: _Kind, before: _Chosen) -> _Chosen:
+    """Return the events of one log: further ones by matching pursuit, less those without which it is as well off.
 
     None is tried where the samples after it cost less than an event has to gain.
     """
-    log = bench.setting.logs[k]
-    used, known = bench.counted(k), [abs(one) for one in already]
-    (here,) = bench.copies(k, [replace(kind.put(log, already), name=f"{log.name} as it is")], point)
+    log, used, (already, here) = bench.setting.logs[k], bench.counted(k), before
     if not _like(here, used):
-        return already
+        return before
     scale = max(bench.noise, _LEFT * _NORMAL * float(np.median(np.abs(here))))
+    known = {abs(one) for one in already}
     places = [place for place in kind.places(log) if abs(place) not in known]
-    gains = _most(bench, scale, here, here + log.measured[log.angle_name][used] if kind.delays else None)
-    most = dict(zip(places, gains[np.searchsorted(used, np.abs(places))], strict=True)) if places else {}
-    dearest = sorted(most, key=lambda place: -most[place])[:_LOOKED]
-    every = [place for place in most if most[place] > _PAYS and place in dearest]
-    tried = [*([*already, place] for place in every),
-             *([place for place in already if place != one] for one in already)]
-    if not tried:
-        return already
-    copies = [replace(kind.put(log, places), name=f"{log.name} {i}") for i, places in enumerate(tried)]
-    parts = bench.copies(k, copies, point)
-    if not all(_like(part, used) for part in parts):
-        return already
-    worth = [_worth(bench, scale, here, part, int(np.searchsorted(used, abs(place))))
-             for part, place in zip(parts, [*every, *already], strict=True)]
-    chosen = [place for place, gained in zip(already, worth[len(every):], strict=True) if gained < -_PAYS]
-    for i in np.argsort(worth[:len(every)])[::-1]:
-        far = all(abs(abs(every[i]) - abs(place)) > 2 * _SOON for place in chosen if place not in already)
-        if worth[i] > _PAYS and far and len(chosen) < _MOST + len(already):
-            chosen.append(every[i])
-    return sorted(chosen)
+    most = _most(bench, scale, here, here + log.measured[log.angle_name][used] if kind.delays else None)
+    first = np.searchsorted(used, np.abs(np.array(places, np.int64)))
+    likely = np.flatnonzero(most[first] > _PAYS)
+    alone = _with(bench, point, k, kind, [[*already, places[i]] for i in likely])
+    good = [n for n, part in enumerate(alone) if _like(part, used)]
+    further = _pursued(bench, scale, here, np.array([alone[n] - here for n in good]).reshape(-1, len(here)),
+                       first[likely[good]], round(_MOST * len(places)))
+    every = sorted([*already, *(places[likely[good[n]]] for n in further)])
+    (there,) = _with(bench, point, k, kind, [every])
+    if not every or not _like(there, used):
+        return before
+    less = _with(bench, point, k, kind, [[one for one in every if one != place] for place in every])
+    worth = [_worth(bench, scale, part, there, int(np.searchsorted(used, abs(place)))) if _like(part, used) else 0.0
+             for place, part in zip(every, less, strict=True)]
+    kept = [place for place, gained in zip(every, worth, strict=True) if gained > _PAYS]
+    if kept == already:
+        return before
+    (there,) = _with(bench, point, k, kind, [kept]) if kept != every else (there,)
+    return _Chosen(kept, there) if _like(there, used) else before
+
+
+def _with(bench: TrialBench, point: Point, k: int, kind: _Kind, several: Sequence[Sequence[int]]) -> list[Array]:
+    """Return the residuals of a log with some events each (SI)."""
+    log = bench.setting.logs[k]
+    return bench.copies(k, [kind.put(log, places) for places in several], point) if several else []
+
+
+def _pursued(bench: TrialBench, scale: float, here: Array, effects: Array, first: NDArray[np.int64],
+             most: int) -> list[int]:
+    """Return which effects are added to residuals, in turn the one that lowers the cost soon after it by most."""
+    chosen: list[int] = []
+    at = first[:, None] + np.arange(_SOON)
+    teaches = (at < len(here)) & (at % 2 == 0)  # as `teaching`
+    at = np.minimum(at, len(here) - 1)
+    rows, r = np.arange(len(first))[:, None], here.copy()
+    while len(chosen) < most and len(first):
+        gains = ((_costs(bench, r[at] / scale) - _costs(bench, (r[at] + effects[rows, at]) / scale)) * teaches).sum(1)
+        gains[chosen] = -math.inf
+        best = int(np.argmax(gains))
+        if not gains[best] > _PAYS:
+            break
+        chosen.append(best)
+        r = r + effects[best]
+    return chosen
 
 
 def _like(residual: Array, used: NDArray[np.int64]) -> bool:

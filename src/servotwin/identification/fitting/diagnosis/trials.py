@@ -12,7 +12,7 @@ from servotwin.errors import ServotwinError
 from servotwin.identification.fitting.diagnosis.bench import DEAR, Purse, Setting, Spent, TrialBench
 from servotwin.identification.fitting.diagnosis.candidates import TABLE, Candidate, mended_logs, possible
 from servotwin.identification.fitting.diagnosis.drifts import changing_supply, warming
-from servotwin.identification.fitting.diagnosis.events import dropped_samples, lost_pulses
+from servotwin.identification.fitting.diagnosis.events import MOST_LEFT, dropped_samples, lost_pulses
 from servotwin.identification.fitting.diagnosis.gain import Told, gain
 from servotwin.identification.fitting.diagnosis.holds import moved
 from servotwin.identification.fitting.diagnosis.servos import mixed_gains, two_servos
@@ -29,17 +29,17 @@ _EXPLAINED = 1.2  # times the sensor's noise: then nothing else is tried
 _ALIKE = 1.05  # times the least error: then the simpler is named first
 _MOST = 5  # causes that are told
 _SHARES = 2.0  # of what is left for a group: what one trial may take
-_KINDS = {"sign": ("sign", "an angle that counts against the command", 'mend=("sign",)'),
-          "wrap": ("wrap", "an angle that wraps", 'mend=("wrap",)'),
-          "stamps": ("stamps", "stamps that run at another rate than the servo", 'mend=("stamps",)'),
+_KINDS = {"stamps": ("stamps", "stamps that run at another rate than the servo", 'mend=("stamps",)'),
           "rows": ("dropped samples", "rows that are missing", 'mend=("rows",)'),
           "not followed": ("not followed", "commands that the servo did not follow", 'mend=("not followed",)')}
 
 
 _SPECIAL: dict[str, Try] = {
     "mixed P register": mixed_gains, "supply that changes": changing_supply, "warming": warming,
-    "lost pulses": lost_pulses, "dropped samples": dropped_samples, "two servos": two_servos}
+    "two servos": two_servos}
 """Candidates that are tried in ways of their own."""
+_EVENTS: dict[str, Try] = {"dropped samples": dropped_samples, "lost pulses": lost_pulses}
+"""Those that explain a part of whatever is missing: tried where nothing else explains what they would have to."""
 
 
 class Diagnosis(NamedTuple):
@@ -82,6 +82,8 @@ def diagnose(task: Task, point: Point, traces: Sequence[Trace], verdict: Verdict
     groups = _ordered(bench, traces)
     count, k, left = sum(map(len, groups)), 0, purse.left
     for group in groups:
+        if group is groups[-1] and any(cause.after < MOST_LEFT * cause.before for cause, _ in found):
+            break
         # No group can use up what the next one needs, and no trial what those after it need
         allowed = left if group is groups[-1] else 0.5 * left
         for waiting, (name, try_it) in zip(range(len(group), 0, -1), group, strict=True):
@@ -114,7 +116,7 @@ def _told(bench: TrialBench, try_it: Try) -> Told | None:
 
 
 def _ordered(bench: TrialBench, traces: Sequence[Trace]) -> list[list[tuple[str, Try]]]:
-    """Return all candidates with what tries them: what the checks suggest and what is cheap, what is dear, events."""
+    """Return all candidates with what tries them: what checks suggest and is cheap, what is dear, changes, events."""
     cheap: list[tuple[str, Try]] = []
     dear: list[tuple[str, Try]] = []
     for candidate in (*_of_findings(bench, traces), *TABLE):
@@ -122,7 +124,7 @@ def _ordered(bench: TrialBench, traces: Sequence[Trace]) -> list[list[tuple[str,
         if settings:
             (dear if settings[0].price > DEAR else cheap).append(
                 (candidate.name, partial(_tried, candidate=candidate, settings=settings)))
-    return [cheap, dear, list(_SPECIAL.items())]
+    return [cheap, dear, list(_SPECIAL.items()), list(_EVENTS.items())]
 
 
 def _chosen(task: Task, traces: Sequence[Trace]) -> list[int]:
@@ -152,7 +154,10 @@ def _tried(bench: TrialBench, candidate: Candidate, settings: Sequence[Setting])
     if not any(map(bench.may_gain, settings)) and not any(map(bench.gains_soon, promising)):
         return None
     trials = [bench.searched(setting, bench.base.point) for setting in promising]
-    trials += [bench.afresh(setting) for setting in settings if setting.afresh]
+    try:
+        trials += [bench.afresh(setting) for setting in promising if setting.afresh]
+    except Spent:
+        pass  # what was searched from the fit counts
     good = [trial for trial in trials if all(np.isfinite(r).all() for r in trial.residuals)]
     if not good:
         return None
