@@ -1,6 +1,7 @@
 """Registers that logs do not record: assumed of a robot, and found by whole lanes."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -121,6 +122,22 @@ def test_registers_that_were_given_are_held_and_doubted():
     assert found.taken is None or found.taken.servo.firmware.proportional_gain == servo.firmware.proportional_gain
     assert found.doubted.servo.firmware.proportional_gain == pytest.approx(true.firmware.proportional_gain, rel=0.15)
     assert found.sentences[-1].startswith("the registers that were given are doubtful: as if with")
+
+
+@pytest.mark.long
+def test_a_sheet_is_not_given_up_for_a_register_that_is_doubted():
+    """A P of twice the true one, given by the user, bends inertia and friction by over 10 standard errors."""
+    given = {"P_Coefficient": 32, "D_Coefficient": 32, "Acceleration": 254, "Maximum_Acceleration": 254}
+    servo = st.feetech_sts(given, servo=STS)
+    names = [name for group in ("motor", "friction") for name in servo.names() if name.startswith(f"{group}.")
+             and isinstance(servo.get(name), float) and servo.get(name) > 0.0]
+    sure = {name: replace(servo.source(name), lower=None, upper=None, std=0.02 * servo.get(name)) for name in names}
+    log = recorded(st.feetech_sts({**given, "P_Coefficient": 16}, servo=STS))
+    fit = st.identify([log], replace(servo, quantities={**servo.quantities, **sure}), starts=1, intervals=False,
+                      compare_with=(), diagnose=False)
+    assert fit.registers.doubted is not None
+    assert fit.yielded == ()
+    assert fit.warnings[0].startswith("the registers that were given are doubtful: as if with P_Coefficient 16")
 
 
 @pytest.mark.long

@@ -199,6 +199,7 @@ def identify(
         checks.checked_count("starts", starts, least=1), others=_beginnings(registers, names))
     task = Task(forecast, Loss(checks.checked_loss(loss, HUBER)), fitted, seed, begin,
                 checks.checked_noise(noise, seen))
+    task.doubted = registers is not None and registers.doubted is not None
     with running.crew, course.watching(), checks.shown(progress) as show, explained(noticed):
         course.show = show
         fit = _run(task, held_out, beside, level, course, intervals=intervals, trials=trials)

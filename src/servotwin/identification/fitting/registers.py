@@ -496,13 +496,22 @@ def _swept(bench: _Bench, states: Sequence[_State], free: Sequence[Varied]) -> l
 
 
 def _refined(bench: _Bench, state: _State, free: Sequence[Varied]) -> _State:
-    """Return a state with registers at the best values about those that they have."""
+    """Return a state with registers at the best values about those that they have: all that gain, or the best one."""
     for step in _FINER:
+        near = []
         for one in free:
             now = _value_of(bench, state, one)
             if now:
-                near = {max(round(now * step), now + 1), min(round(now / step), now - 1)}
-                state = bench.ranked([state, *(state.having(one.name, value) for value in near if value > 0)])[0]
+                values = {max(round(now * step), now + 1), min(round(now / step), now - 1)}
+                near.append((one, [state.having(one.name, value) for value in sorted(values) if value > 0]))
+        bench.tried([each for _, some in near for each in some])
+        better, together = [], state
+        for one, some in near:
+            best = bench.ranked([state, *some])[0]
+            if best != state:
+                better.append(best)
+                together = together.having(one.name, _value_of(bench, best, one))
+        state = bench.ranked([state, together, *better])[0]
     return state
 
 

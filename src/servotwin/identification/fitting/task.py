@@ -83,6 +83,7 @@ class Task:
         if self.noise is not None and TIME in self.noise:
             self.forecast.noise[TIME] = self.noise[TIME]
         self.remarks: list[str] = []  # on what the search found out about clocks
+        self.doubted = False  # whether registers are likely not what the caller says: what is bent then is no motor
         self.unsure: tuple[str, ...] = ()  # of which commands it is not sure which pulse carries them
         self.stamps_off: dict[int, float] = {}  # by how much the beat that replaced a log's stamps may lie off [s]
         self._best: Outcome | None = None  # of the search that goes on

@@ -168,7 +168,7 @@ def settle(task: Task, found: Outcome, tell: Told) -> tuple[Outcome, tuple[Dropp
         Is told the share that is done, and what goes on.
     """
     left: list[Dropped] = []
-    count = int((task.prior.weight > 0.0).sum())
+    count = 0 if task.doubted else int((task.prior.weight > 0.0).sum())
     for k in range(count):
         tell(k / count, "priors")
         with task.nearly(found.point):

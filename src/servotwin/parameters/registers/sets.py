@@ -80,6 +80,7 @@ SETS: Mapping[str, tuple[RegisterSet, ...]] = {
 
 _GAIN, _DAMPING = "firmware.proportional_gain", "firmware.derivative_gain"
 _ACCELERATION, _SPEED = "firmware.acceleration_limit", "firmware.speed_limit"
+_TORQUE = "firmware.torque_limit"
 _SMALL = (8, 12, 16, 24, 32, 48, 64)
 VARIED: Mapping[str, tuple[Varied, ...]] = {
     "Feetech STS": (
@@ -87,7 +88,8 @@ VARIED: Mapping[str, tuple[Varied, ...]] = {
                (10, 20, 50, 100, 150, 254), none=True),
         Varied("P", ("P_Coefficient",), _GAIN, _SMALL),
         Varied("D", ("D_Coefficient",), _DAMPING, (0, 16, 32, 64)),
-        Varied("speed", ("Maximum_Velocity_Limit",), _SPEED, (10, 20, 40, 68, 100, 160, 254))),
+        Varied("speed", ("Maximum_Velocity_Limit",), _SPEED, (10, 20, 40, 68, 100, 160, 254)),
+        Varied("torque", ("Max_Torque_Limit", "Torque_Limit"), _TORQUE, (150, 250, 400, 500, 700, 1000))),
     "Dynamixel X": (
         Varied("P", ("Position_P_Gain",), _GAIN, (100, 200, 400, 640, 800, 1500)),
         Varied("D", ("Position_D_Gain",), _DAMPING, (0, 300, 600, 1200, 4000)),
