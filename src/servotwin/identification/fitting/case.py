@@ -130,7 +130,7 @@ def make_case(log: Log, model: Model, space: Space, sensors: Sequence[str], *, d
     times = time[any_used]
     overridden = tuple(sorted(name for name in log.parameters))
     key = (log.command_kind, overridden, tuple(sorted(places)), bool(log.sent.all()))
-    signal = _signal(log, model, {} if signals is None else signals)
+    signal = command_of(log, model, {} if signals is None else signals)
     return Case(log=log, signal=signal, times=times, places=places, values=values, start=(angle, speed),
                 scatter=scatter, moving=moving, key=key, period=_period(log, model),
                 leans=_leans(log, model, angle, scatter),
@@ -221,7 +221,7 @@ def _period(log: Log, model: Model) -> float:
     return float(log.parameters.get(_FRAME_PERIOD, getattr(model, "frame_period", 0.0)))
 
 
-def _signal(log: Log, model: Model, known: dict[tuple[Any, ...], Signal]) -> Signal:
+def command_of(log: Log, model: Model, known: dict[tuple[Any, ...], Signal]) -> Signal:
     """Return the command as a model takes it; only one with pulses knows missing ones."""
     period = _period(log, model)
     which = (log.time.tobytes(), log.command.tobytes(), log.command_kind, log.command_hold, log.sent.tobytes(), period)

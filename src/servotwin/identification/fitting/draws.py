@@ -131,12 +131,12 @@ def _move(y: Array, axis: Array, precision: float, middle: Array, limits: Array,
         return True
     std = 1.0 / math.sqrt(precision)
     a, b = (low - middle) / std, (high - middle) / std
-    step = middle + std * _truncated(a, b, uniform)
+    step = middle + std * truncated(a, b, uniform)
     y += np.clip(step, low, high)[:, None] * axis
     return bool((a > -4.0).any() or (b < 4.0).any())
 
 
-def _truncated(a: Array, b: Array, uniform: Array) -> Array:
+def truncated(a: Array, b: Array, uniform: Array) -> Array:
     """Return quantiles of the standard normal law between a and b."""
     from scipy.special import log_ndtr, ndtri_exp
 

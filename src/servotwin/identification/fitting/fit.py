@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from servotwin.identification.fitting.choosing import Ladder
     from servotwin.identification.fitting.draws import Allowed
     from servotwin.identification.fitting.intervals import Ends
+    from servotwin.identification.fitting.left_out import LeftOut
     from servotwin.identification.fitting.uncertainty import Uncertainty
     from servotwin.identification.fitting.verdict import Verdict
     from servotwin.identification.fitting.yielding import Widened, Yielded
@@ -182,6 +183,8 @@ class Fit:
         The law that `draw` draws from.
     own : tuple of ndarray
         Each log's own numbers at the end of the search (scaled): its start, its delay or phases.
+    left_out : tuple of LeftOut
+        Numbers that the servo file leaves out or assumes, for which intervals and covariance allow by their ranges.
     interrupted : bool
         Whether it was stopped before its end: then this is the best so far.
     unknown : tuple of str
@@ -223,6 +226,7 @@ class Fit:
     prior_share: Mapping[str, float] = field(default_factory=dict)
     allowed: Allowed | None = field(default=None, repr=False)
     own: tuple[Array, ...] = field(default=(), repr=False)
+    left_out: tuple[LeftOut, ...] = ()
 
     def intervals(self, level: float | None = None) -> dict[str, Interval]:
         """Return the interval of every name (SI).

@@ -13,6 +13,7 @@ from servotwin.identification.fitting.arrow import Prior
 from servotwin.identification.fitting.diagnosis import diagnose
 from servotwin.identification.fitting.diagnosis.counted import counted_stamps
 from servotwin.identification.fitting.fit import Fit, Trace
+from servotwin.identification.fitting.held_out import trace_of
 from servotwin.identification.fitting.noise import SensorSeries, noise_of
 from servotwin.identification.fitting.point import Point
 from servotwin.identification.fitting.stopping import Course
@@ -73,6 +74,19 @@ def with_verdict(task: Task, point: Point, fit: Fit, course: Course, *, trials: 
     verdict = replace(verdict, causes=causes, sentence=_with_causes(verdict, causes, tried=trials))
     first = () if verdict.holds and not verdict.undecided else (verdict.sentence,)
     return replace(fit, verdict=verdict, warnings=(*first, *fit.warnings))
+
+
+def leaves_noise(task: Task, point: Point) -> bool:
+    """Tell whether what a point leaves of its fitted logs is noise of one sensor, without trials."""
+    parts = task.forecast.at(point, derivatives=False, cases=task.fitted)
+    fitted = [trace_of(task.forecast, point, k, part, held_out=False)
+              for k, part in zip(task.fitted, parts, strict=True)]
+    sensors = {trace.signal for trace in fitted}
+    if len(sensors) != 1:
+        return False
+    verdict = judge([_series(trace) for trace in fitted], sensors.pop(), _rows(task, point), task.forecast.size,
+                    max(task.forecast.running.accuracy, _FINEST))
+    return verdict.holds and not verdict.undecided
 
 
 def _half_widths(fit: Fit) -> dict[str, float]:
