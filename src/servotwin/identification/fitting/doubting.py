@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.fitting.arrow import Outcome, Prior, Search
+from servotwin.identification.fitting.assumptions import Assumption, systematic, with_assumptions
 from servotwin.identification.fitting.counts import counts_of
 from servotwin.identification.fitting.delay_range import delay_range, phase_errors, unsure_commands
 from servotwin.identification.fitting.doubts import Doubts, allowed, prior_share, sizes_at, vague
 from servotwin.identification.fitting.intervals import ends
-from servotwin.identification.fitting.left_out import LeftOut, systematic, with_left_out
 from servotwin.identification.fitting.phases import credible
 from servotwin.identification.fitting.point import FINE, STEP, LogPart
 from servotwin.identification.fitting.remedies import with_remedies
@@ -45,8 +45,8 @@ def doubts_of(task: Task, found: Outcome, level: float, show: Told) -> Doubts:
         return _doubts_of(task, found, level, show)
 
 
-def what_is_left_out(task: Task, found: Outcome) -> tuple[LeftOut, ...]:
-    """Return what a servo file leaves out, and what the logs say of it where a search ended."""
+def assumptions_at(task: Task, found: Outcome) -> tuple[Assumption, ...]:
+    """Return what a servo file leaves out or assumes, and what the logs say of it where a search ended."""
     with task.forecast.roughly():
         return systematic(task, found.point, *_straight(task, found)[:4]).numbers
 
@@ -62,7 +62,7 @@ class _Straight(NamedTuple):
     rows: list[Rows]
     doubt: Uncertainty
     information: Array
-    flags: Array
+    flags: NDArray[np.bool_]
     directions: Array
 
 
@@ -97,7 +97,8 @@ def _doubts_of(task: Task, found: Outcome, level: float, show: Told) -> Doubts:
     reaching = ends(search, found, doubt, which, level, rows=rows, deeper=seen.append,
                     tell=lambda done: show(0.76 + 0.18 * done / count, "intervals"))
     more = systematic(task, found.point, parts, beliefs, rows, doubt)
-    return Doubts(doubt, with_left_out(reaching, doubt, level, more), with_remedies(forecast, found.point, open_, names),
+    return Doubts(doubt, with_assumptions(reaching, doubt, level, more),
+                  with_remedies(forecast, found.point, open_, names),
                   prior_share(names, doubt, reaching, flags, directions, task.prior.weight),
                   allowed(task, found, rows, directions, information, flags, doubt, reaching, level),
                   _spans(task, found, parts, rows, doubt, level),

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.fitting.arrow import Outcome, Search
+from servotwin.identification.fitting.assumptions import Systematic
 from servotwin.identification.fitting.draws import Allowed
 from servotwin.identification.fitting.intervals import Ends
-from servotwin.identification.fitting.left_out import Systematic
 from servotwin.identification.fitting.task import Task
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty, uncertainty
 from servotwin.identification.fitting.words import Unidentifiable, vague_directions

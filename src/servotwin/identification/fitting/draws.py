@@ -83,7 +83,7 @@ class Allowed:
             cut = False
             for k in np.argsort(-self.precision):
                 middle = (self.shift / self._scale - y) @ back[k]
-                cut |= _move(y, axes[:, k], float(self.precision[k]), middle, limits, ends, rng)
+                cut |= move(y, axes[:, k], float(self.precision[k]), middle, limits, ends, rng)
             if sweep == 0 and not cut:  # the axes are independent where nothing is cut off
                 break
         y *= np.where(y < 0.0, self.stretch[0], self.stretch[1])
@@ -116,7 +116,7 @@ class Allowed:
         return np.asarray([np.minimum(ends[0], 0.0), np.maximum(ends[1], 0.0)])
 
 
-def _move(y: Array, axis: Array, precision: float, middle: Array, limits: Array, ends: Array,
+def move(y: Array, axis: Array, precision: float, middle: Array, limits: Array, ends: Array,
           rng: np.random.Generator) -> bool:
     """Move all points along one axis to where the law about `middle` allows; return whether limits cut it off."""
     change = limits @ axis
@@ -131,12 +131,12 @@ def _move(y: Array, axis: Array, precision: float, middle: Array, limits: Array,
         return True
     std = 1.0 / math.sqrt(precision)
     a, b = (low - middle) / std, (high - middle) / std
-    step = middle + std * truncated(a, b, uniform)
+    step = middle + std * _truncated(a, b, uniform)
     y += np.clip(step, low, high)[:, None] * axis
     return bool((a > -4.0).any() or (b < 4.0).any())
 
 
-def truncated(a: Array, b: Array, uniform: Array) -> Array:
+def _truncated(a: Array, b: Array, uniform: Array) -> Array:
     """Return quantiles of the standard normal law between a and b."""
     from scipy.special import log_ndtr, ndtri_exp
 

@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, ServotwinError
 from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.arrow import Loss, Outcome
+from servotwin.identification.fitting.assumptions import WANTED, Assumption, freed, most_wanted, plausible
 from servotwin.identification.fitting.batches import FIT_ACCURACY, Running
 from servotwin.identification.fitting.begin import Begin
 from servotwin.identification.fitting.clocks import ticking
 from servotwin.identification.fitting.common_cause import common_cause
 from servotwin.identification.fitting.comparison import BESIDE, ErrorTables, compare
-from servotwin.identification.fitting.doubting import doubts_of, what_is_left_out
+from servotwin.identification.fitting.doubting import assumptions_at, doubts_of
 from servotwin.identification.fitting.doubts import Doubts
 from servotwin.identification.fitting.findings import explained, first_looks
 from servotwin.identification.fitting.fit import Fit, Start, Trace
@@ -29,7 +30,6 @@ from servotwin.identification.fitting.free import Bounds, Priors, Space
 from servotwin.identification.fitting.held_out import trace_of, with_pulses_of
 from servotwin.identification.fitting.holdout import split
 from servotwin.identification.fitting.judging import leaves_noise, with_verdict
-from servotwin.identification.fitting.left_out import WANTED, LeftOut, freed, most_wanted, plausible
 from servotwin.identification.fitting.linearised import LINEARISED, hurried
 from servotwin.identification.fitting.point import NUISANCES, SHARED, Point
 from servotwin.identification.fitting.record import identified_servo, stopped, with_record, with_what_logs_say
@@ -304,7 +304,7 @@ def _with_what_logs_want(task: Task, found: Outcome, doubts: Doubts, level: floa
 
     A model that lacks something else takes any further number: they stay only if what is left is noise.
     """
-    other, there, said, kept = task, found, list[LeftOut](), None
+    other, there, said, kept = task, found, list[Assumption](), None
     numbers = doubts.systematic.numbers if doubts.systematic is not None else ()
     while len(said) < _FREED and (most := most_wanted(numbers)) is not None:
         show(0.9, most.words)
@@ -320,18 +320,18 @@ def _with_what_logs_want(task: Task, found: Outcome, doubts: Doubts, level: floa
         said.append(most)
         if all(plausible(other, there.point, one) for one in said) and leaves_noise(other, there.point):
             kept = other, there, tuple(said)
-        numbers = what_is_left_out(other, there)
+        numbers = assumptions_at(other, there)
     if kept is None:
         return found, doubts
-    task.become(kept[0], _said_of(kept[2]))
+    task.become(kept[0], _said_of(kept[0], kept[1].point, kept[2]))
     return kept[1], doubts_of(task, kept[1], level, show)
 
 
-def _said_of(numbers: Sequence[LeftOut]) -> str:
-    words = " and ".join(f"{one.words} other than the servo file assumes ({one.wanted:.2g} standard errors)"
-                         for one in numbers)
-    names = ", ".join(name for one in numbers for name in (one.name, *one.beside))
-    return f"the logs want {words}: searched too, {names}"
+def _said_of(task: Task, point: Point, numbers: Sequence[Assumption]) -> str:
+    values = {p.name: float(p.value(point.shared[k])) for k, p in enumerate(task.forecast.space.parameters)}
+    return "the logs want " + " and ".join(
+        f"{one.name} of {values[one.name]:.3g}{one.unit_shown} where the servo file assumes {one.assumed:z.3g} "
+        f"({one.wanted:.2g} standard errors)" for one in numbers) + ": searched too"
 
 
 def _traces(forecast: Forecast, point: Point, held_out: Sequence[int]) -> tuple[Trace, ...]:
@@ -378,4 +378,4 @@ def _fit(task: Task, found: Outcome, doubts: Doubts, dropped: tuple[Yielded, ...
                   *_explained(task, dropped)),
         doubt=doubt, ends=dict(reaching), scales={n: scales[n] for n in forecast.extra}, yielded=dropped, widened=wide,
         prior_share=doubts.prior_share, allowed=doubts.allowed, spans=doubts.spans, own=found.point.own,
-        left_out=doubts.systematic.numbers if doubts.systematic is not None else ())
+        assumptions=doubts.systematic.numbers if doubts.systematic is not None else ())

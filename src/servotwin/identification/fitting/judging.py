@@ -10,6 +10,7 @@ import numpy as np
 
 from servotwin.errors import PlausibilityWarning
 from servotwin.identification.fitting.arrow import Prior
+from servotwin.identification.fitting.assumptions import WANTED
 from servotwin.identification.fitting.diagnosis import diagnose
 from servotwin.identification.fitting.diagnosis.counted import counted_stamps
 from servotwin.identification.fitting.fit import Fit, Trace
@@ -72,8 +73,12 @@ def with_verdict(task: Task, point: Point, fit: Fit, course: Course, *, trials: 
     said = intervals_said(verdict.moved, sought=bool(fit.ends))
     verdict = replace(verdict, sentence=verdict.sentence.replace(UNHELD, said))
     verdict = replace(verdict, causes=causes, sentence=_with_causes(verdict, causes, tried=trials))
-    first = () if verdict.holds and not verdict.undecided else (verdict.sentence,)
-    return replace(fit, verdict=verdict, warnings=(*first, *fit.warnings))
+    if not verdict.holds or verdict.undecided:
+        return replace(fit, verdict=verdict, warnings=(verdict.sentence, *fit.warnings))
+    wanted = [f"the logs want {one.words} {one.mean:.2g} ± {one.std:.1g}{one.unit_shown} where {one.assumed:z.3g} is "
+              f"assumed ({one.wanted:.2g} standard errors): intervals allow for it"
+              for one in fit.assumptions if one.wanted > WANTED]
+    return replace(fit, verdict=verdict, warnings=(*fit.warnings, *wanted))
 
 
 def leaves_noise(task: Task, point: Point) -> bool:
