@@ -116,7 +116,7 @@ def test_an_interval_holds_that_of_the_file_as_it_is():
 
 def test_viscous_friction_and_back_emf_are_one_to_an_angle():
     """K²/R + B is what brakes, and K/R drives: K and R fall by B/(K²/R), and the logs say nothing of it."""
-    even = FILE.replace({"supply.bridge_drop_voltage": 0.0})  # or a load that drives the servo tells where currents begin
+    even = FILE.replace({"supply.bridge_drop_voltage": 0.0})  # or a load that drives it tells where currents begin
     (one,) = (one for one in fitted(whole(some(even)), even).assumptions if one.name == VISCOUS)
     assert one.std == pytest.approx(one.width / math.sqrt(12.0), rel=0.05)
     for name in ("output_torque_constant", "motor.armature_resistance"):

@@ -1,7 +1,7 @@
 """What a servo file leaves out or only assumes: by how much its ranges, as far as the logs allow, move a fit's numbers.
 
-Each such number is a nuisance with a uniform law over its range. One lane a log, with that number moved a little, gives
-its derivative S beside that of the fitted numbers, J. Where the cost is a parabola the fitted numbers follow it by
+Each such number is a nuisance with a uniform law over its range. A lane of each log, with that number moved, gives its
+derivative S beside that of the fitted numbers, J. Where the cost is a parabola the fitted numbers follow it by
 -(JᵀJ)⁻¹ JᵀS, and what they cannot imitate says how large it is: the Schur complement of the joint normal matrix. So
 nothing is searched. A number that the logs want elsewhere than the file has it is for a search to find (`freed`).
 """
@@ -11,14 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import ServotwinError
-from servotwin.identification.fitting.arrow import Prior, Search
+from servotwin.identification.fitting.arrow import Prior
 from servotwin.identification.fitting.case import Case, command_of
 from servotwin.identification.fitting.draws import move
 from servotwin.identification.fitting.forecast import Forecast
@@ -27,7 +26,7 @@ from servotwin.identification.fitting.free import Space, nominal
 from servotwin.identification.fitting.intervals import Ends
 from servotwin.identification.fitting.point import STEP, LogPart, Point
 from servotwin.identification.fitting.task import Task
-from servotwin.identification.fitting.uncertainty import Rows, Uncertainty, rows_of
+from servotwin.identification.fitting.uncertainty import Rows, Uncertainty
 from servotwin.models import DigitalServo
 from servotwin.parameters import Servo
 
@@ -37,8 +36,7 @@ WANTED = 3.5
 """Standard errors from what the file says, beyond which the logs want a number elsewhere: as of priors."""
 CLOCK, ROUNDED = "clock", "rounded commands"
 """What is no parameter of a servo."""
-_SHARE, _WIDE = 1e-3, 0.1  # of a range: the difference that is a derivative; among kinks
-_FAR, _REACH = 0.1, 2.0  # of a range; standard errors: how far off the cost is looked at, at most
+_STEP, _WIDE = 0.05, 0.1  # of a range: over which a number is looked at, as much again after it; among kinks
 _CHAINS, _SWEEPS = 200, 16  # of the sampling of the law of what is left out: its moments to a tenth
 _OHMS = 1.0  # of a supply, assumed: four fresh alkaline AA cells have 0.6 to 1.2 (Energizer E91: 0.15 to 0.3 each)
 _VISCOUS = 0.1  # of K²/R: the servos of github.com/Rhoban/bam (M3 files; XL330, XL-320, STS3215, MX) have up to 0.098
@@ -196,31 +194,23 @@ def systematic(task: Task, point: Point, parts: Sequence[LogPart], beliefs: Sequ
         Of its fitted logs there, with what is believed of their own numbers.
     doubt : Uncertainty
     """
-    forecast, p = task.forecast, len(point.shared)
-    names = (*forecast.space.names, *forecast.extra)
-    asked, columns = [], []
-    for one in assumptions(forecast, point):
-        found = _columns(forecast, point, task.fitted, one, parts)
-        if found is not None:
-            asked.append(one)
-            columns.append(found)
-    if not asked:
+    p, prior = len(point.shared), task.prior
+    names = (*task.forecast.space.names, *task.forecast.extra)
+    known = _Known(task, point, parts, beliefs, rows, doubt)
+    effects = [(one, effect) for one in assumptions(task.forecast, point) if (effect := known.effect(one)) is not None]
+    if not effects:
         return Systematic((), np.zeros(p), np.zeros((p, p)))
-    sides = [_rows(task, point, parts, beliefs, [of[side] for of in columns]) for side in range(len(columns[0]))]
-    d = len(asked)
-    information, across, gradient = np.zeros((d, d)), np.zeros((p, d)), np.zeros(d)
-    for r, one_side, other_side in zip(rows, sides[0], sides[-1], strict=True):
-        first, last, inside = one_side.slope, other_side.slope, r.inside[:, None]  # no kink is in both, if there are any
-        information += 0.5 * ((first * inside).T @ last + (last * inside).T @ first)
-        across += (r.slope * inside).T @ (0.5 * (first + last))
-        gradient += (0.5 * (first + last)).T @ r.score
-    A = -doubt.curvature @ across
-    pull = np.sum([r.slope.T @ r.score for r in rows], axis=0) + task.prior.weight**2 * (
-        point.shared - task.prior.mean)
-    values, vectors = np.linalg.eigh(information + across.T @ A)
-    law = _checked(task, point, asked, A, rows, sides[0],
-                   _Law((vectors * np.maximum(values, 0.0)) @ vectors.T, -(gradient + A.T @ pull)))
-    law = _Law(law.precision / doubt.inflation**2, law.wanted / doubt.inflation**2)
+    asked = [one for one, _ in effects]
+    A = np.column_stack([effect.move for _, effect in effects])
+    information = A.T @ (prior.weight[:, None] ** 2 * A)
+    gradient = A.T @ (prior.weight**2 * (point.shared - prior.mean))
+    for k, r in enumerate(rows):
+        first, second = (np.column_stack([each[k] for each in some])
+                         for some in zip(*((effect.first, effect.second) for _, effect in effects), strict=True))
+        information += 0.5 * ((first * r.inside[:, None]).T @ second + (second * r.inside[:, None]).T @ first)
+        gradient += 0.5 * (first + second).T @ r.score
+    values, vectors = np.linalg.eigh(information)
+    law = _Law((vectors * np.maximum(values, 0.0)) @ vectors.T / doubt.inflation**2, -gradient / doubt.inflation**2)
     box = np.array([[(one.lower - one.assumed) / one.width, (one.upper - one.assumed) / one.width] for one in asked]).T
     drawn = _drawn(law, box)
     mean, covariance = drawn.mean(axis=0), np.atleast_2d(np.cov(drawn.T))
@@ -229,7 +219,7 @@ def systematic(task: Task, point: Point, parts: Sequence[LogPart], beliefs: Sequ
         A[k, j] -= point.shared[k] * asked[j].width
     numbers = tuple(replace(
         one, mean=one.assumed + one.width * float(mean[j]), std=one.width * math.sqrt(float(covariance[j, j])),
-        wanted=float(law.wanted[j] * _way(one) / math.sqrt(max(law.precision[j, j], _NOTHING))),
+        wanted=_way(one) * _gain(float(law.wanted[j]), float(law.precision[j, j])),
         moves={name: float(A[k, j]) for k, name in enumerate(names) if A[k, j]}) for j, one in enumerate(asked))
     return Systematic(numbers, A @ mean, A @ covariance @ A.T)
 
@@ -241,67 +231,100 @@ class _Law(NamedTuple):
     wanted: Array
 
 
+class _Effect(NamedTuple):
+    """What a number does on its way through its range: how the fitted ones follow, and what they do not imitate.
+
+    That is the change of residuals, and of beliefs about the logs' own numbers, over one step and over the next.
+    """
+
+    move: Array
+    first: list[Array]
+    second: list[Array]
+
+
+def _gain(wanted: float, precision: float) -> float:
+    """Return the root of twice what a number gains alone about within its range; negative towards its other side."""
+    far = min(abs(wanted) / max(precision, _NOTHING), _FARTHEST)
+    return math.copysign(math.sqrt(max(2.0 * abs(wanted) * far - precision * far**2, 0.0)), wanted)
+
+
 def _way(one: Assumption) -> float:
     """Return to which side of what is assumed a range reaches farther."""
     return 1.0 if one.upper - one.assumed >= one.assumed - one.lower else -1.0
 
 
-def _checked(task: Task, point: Point, asked: Sequence[Assumption], A: Array, rows: Sequence[Rows],
-             more: Sequence[Rows], law: _Law) -> _Law:
-    """Return the law with no more precision than the cost itself has where all others move along.
+@dataclass(frozen=True)
+class _Known:
+    """What is known where a search ended, as of `systematic`."""
 
-    A kink within a difference looks like something that no other number can imitate.
-    """
-    forecast, precision, wanted = task.forecast, law.precision.copy(), law.wanted.copy()
-    least = Search(forecast, task.loss, task.prior, task.lower, task.upper, task.fitted).costs([point])[0]
-    for j, one in enumerate(asked):
-        if one.name == ROUNDED or not precision[j, j] > 1.0:  # exact, or as good as unknown
-            continue
-        step = _way(one) * min(_FAR, _REACH / math.sqrt(precision[j, j]))
-        rises = []
-        for far in (step, 2.0 * step):
-            own = list(point.own)
-            for case, r, s in zip(task.fitted, rows, more, strict=True):
-                if r.follow is not None and s.follow is not None:
-                    own[case] = own[case] + far * (r.follow @ A[:, j] + s.follow[:, j])
-            there = point._replace(shared=np.clip(point.shared + far * A[:, j], task.lower, task.upper), own=tuple(own))
-            other, at = _changed(forecast, there, one, far * one.width)
-            before = other.work
-            rises.append(Search(other, task.loss, task.prior, task.lower, task.upper, task.fitted).costs([at])[0]
-                         - least)
-            forecast.work += other.work - before
-        bends = (rises[1] - 2.0 * rises[0]) / step**2
-        if bends < precision[j, j]:
-            shrink = math.sqrt(max(bends, 0.0) / precision[j, j])
-            precision[j], precision[:, j] = precision[j] * shrink, precision[:, j] * shrink
-            wanted[j] = (rises[1] - 4.0 * rises[0]) / (2.0 * step)
-    return _Law(precision, wanted)
+    task: Task
+    point: Point
+    parts: Sequence[LogPart]
+    beliefs: Sequence[Prior]
+    rows: Sequence[Rows]
+    doubt: Uncertainty
 
+    def effect(self, one: Assumption) -> _Effect | None:
+        """Return the effect of a number; None where it has none, or cannot be simulated.
 
-def _columns(forecast: Forecast, point: Point, cases: Sequence[int], one: Assumption,
-             parts: Sequence[LogPart]) -> list[list[Array]] | None:
-    """Return by how much a number moves the residuals of each log, for its whole range; twice among kinks.
+        All others follow as the derivatives say, and once more as the residuals there want: a kink within a small
+        difference looks like something that no number can imitate, and hides what one can.
+        """
+        exact = one.name == ROUNDED
+        step = _way(one) * (1.0 if exact else _STEP if self.task.forecast.step <= STEP else _WIDE)
+        move, own = np.zeros(len(self.point.shared)), [np.zeros(part.own.shape[1]) for part in self.parts]
+        first: list[Array] = []
+        try:
+            for _ in range(1 if exact else 2):
+                changes = self._changes(one, step, move, own)
+                if not all(np.isfinite(d).all() for d in changes) or not (first or any(d.any() for d in changes)):
+                    return None
+                move, first = self._follow([d / step for d in changes], move, own)
+            if exact:
+                return _Effect(move, first, first)
+            changes = self._changes(one, 2.0 * step, move, own)
+        except ServotwinError:
+            return None
+        if not all(np.isfinite(d).all() for d in changes):
+            return None
+        return _Effect(move, first, [np.concatenate([d / step - before[:len(d)], before[len(d):]])
+                                     for d, before in zip(changes, first, strict=True)])
 
-    None where that does nothing, or cannot be simulated.
-    """
-    kinked = forecast.step > STEP
-    share = 1.0 if one.name == ROUNDED else _WIDE if kinked else _SHARE
-    way = share * one.width * _way(one)
-    steps = (1, 2) if kinked and one.name != ROUNDED else (1,)
-    there = [[part.residual for part in parts]]
-    try:
-        for step in steps:
-            other, at = _changed(forecast, point, one, step * way)
-            before = other.work
-            there.append([part.residual for part in other.at(at, derivatives=False, cases=cases)])
-            forecast.work += other.work - before
-    except ServotwinError:
-        return None
-    found = [[(b - a) * one.width / way for a, b in zip(before, after, strict=True)]
-             for before, after in pairwise(there)]
-    if not all(np.isfinite(d).all() for some in found for d in some) or not any(d.any() for d in found[0]):
-        return None
-    return found * 2 if kinked and len(found) == 1 else found
+    def _changes(self, one: Assumption, step: float, move: Array, own: Sequence[Array]) -> list[Array]:
+        """Return by how much residuals change with a number so far through its range, and all others along."""
+        task, forecast = self.task, self.task.forecast
+        moved = list(self.point.own)
+        for k, values in zip(task.fitted, own, strict=True):
+            moved[k] = moved[k] + step * values
+        there = self.point._replace(
+            shared=np.clip(self.point.shared + step * move, task.lower, task.upper), own=tuple(moved))
+        other, at = _changed(forecast, there, one, step * one.width)
+        before = other.work
+        found = other.at(at, derivatives=False, cases=task.fitted)
+        forecast.work += other.work - before
+        return [new.residual - old.residual for new, old in zip(found, self.parts, strict=True)]
+
+    def _follow(self, changes: Sequence[Array], move: Array, own: list[Array]) -> tuple[Array, list[Array]]:
+        """Return how the shared numbers follow changes for a range, and what is left; own numbers move in place."""
+        pull, left = self.task.prior.weight**2 * move, []
+        for k, (d, part, belief, r) in enumerate(zip(changes, self.parts, self.beliefs, self.rows, strict=True)):
+            m, weight = len(d), belief.weight
+            if len(own[k]):
+                weighted = part.own * r.inside[:m, None]
+                H = weighted.T @ part.own + np.diag(weight**2)
+                H += 1e-12 * np.eye(len(H)) * max(H.max(), 1.0)
+                follow = -np.linalg.solve(H, weighted.T @ d + weight**2 * own[k])
+                own[k] = own[k] + follow
+                left.append(np.concatenate([d + part.own @ follow, weight * own[k]]))
+            else:
+                left.append(d)
+            pull = pull + (r.slope * r.inside[:, None]).T @ left[k]
+        change = -self.doubt.curvature @ pull
+        for k, r in enumerate(self.rows):
+            left[k] = left[k] + r.slope @ change
+            if r.follow is not None:
+                own[k] = own[k] + r.follow @ change
+        return move + change, left
 
 
 def _changed(forecast: Forecast, point: Point, one: Assumption, way: float) -> tuple[Forecast, Point]:
@@ -333,13 +356,6 @@ def _slowed(forecast: Forecast, point: Point, factor: float) -> tuple[Forecast, 
     return forecast.with_cases(cases), point._replace(shared=shared, own=tuple(own), frames=frames)
 
 
-def _rows(task: Task, point: Point, parts: Sequence[LogPart], beliefs: Sequence[Prior],
-          columns: Sequence[Sequence[Array]]) -> list[Rows]:
-    """Return what logs say of left-out numbers, with the part that each log's own numbers can imitate taken away."""
-    return [rows_of(part._replace(shared=np.column_stack([of[k] for of in columns])), task.loss, own,
-                    point.own[task.fitted[k]]) for k, (part, own) in enumerate(zip(parts, beliefs, strict=True))]
-
-
 def _drawn(law: _Law, box: Array) -> Array:
     """Return draws from a normal law that is cut off by a box, shape (2, d): along its own axes in turn (Geweke 1991).
 
@@ -351,8 +367,9 @@ def _drawn(law: _Law, box: Array) -> Array:
     """
     rng = np.random.default_rng(0)
     values, vectors = np.linalg.eigh(law.precision)
-    axes = [(float(value), v, float(law.wanted @ v)) for value, v in zip(np.maximum(values, 0.0), vectors.T, strict=True)]
-    axes += [(float(law.precision[j, j]), v, float(law.wanted[j])) for j, v in enumerate(np.eye(len(values)))]
+    directions = [*zip(np.maximum(values, 0.0), vectors.T, strict=True),
+                  *zip(np.diag(law.precision), np.eye(len(values)), strict=True)]
+    axes = [(float(value), v, float(law.wanted @ v)) for value, v in directions]
     found = np.repeat(box.mean(axis=0)[None], _CHAINS, axis=0)
     for _ in range(_SWEEPS):
         for value, v, pull in axes:
