@@ -34,6 +34,8 @@ Array = NDArray[np.float64]
 
 WANTED = 3.5
 """Standard errors from what the file says, beyond which the logs want a number elsewhere: as of priors."""
+HINTED = 1.5
+"""The same where what is left is no noise, and widens standard errors by as much: then a search has to tell."""
 CLOCK, ROUNDED = "clock", "rounded commands"
 """What is no parameter of a servo."""
 _STEP, _WIDE = 0.05, 0.1  # of a range: over which a number is looked at, as much again after it; among kinks
@@ -45,6 +47,7 @@ _SPEEDS = (0.1, 0.3)  # rad/s at the output, assumed: 1/e of the excess; laws be
 _MICROSECOND = 1e-6  # s: `writeMicroseconds` of Arduino's Servo, and whoever sends whole microseconds
 _CLOCK = 0.015  # assumed: ceramic resonators are within 0.5 %, calibrated RC oscillators (ATmega328P) within 1
 _FARTHEST = 1.5  # of a range, assumed: a number that a search takes farther stands for something else
+_BRAKES = "motor.motor_viscous_friction"
 _NEUTRAL = {"friction.breakaway_ratio": 1.0}
 _UNTOLD = 0.25  # of a range: a uniform law has 0.29
 _NOTHING = 1e-9  # of the precision of a range: the logs do not tell
@@ -67,6 +70,8 @@ class Assumption:
         Of the range.
     beside : mapping of str to float
         Other numbers of the servo that go with it (SI).
+    told : bool
+        Whether logs can tell it; else its whole range counts.
     mean, std : float
         Of its law within the range, with what the logs say (SI).
     wanted : float
@@ -84,6 +89,7 @@ class Assumption:
     upper: float
     source: str
     beside: Mapping[str, float] = field(default_factory=dict)
+    told: bool = True
     mean: float = math.nan
     std: float = math.nan
     wanted: float = 0.0
@@ -131,7 +137,7 @@ def assumptions(forecast: Forecast, point: Point) -> list[Assumption]:
     rows: list[tuple[str, str, str, float, str, dict[str, float]]] = [
             ("supply.internal_resistance", "resistance of the supply", "ohm", _OHMS,
              "assumed: up to four fresh alkaline AA cells", {}),
-            ("motor.motor_viscous_friction", "viscous friction of the motor", "N m s/rad", _VISCOUS * damping,
+            (_BRAKES, "viscous friction of the motor", "N m s/rad", _VISCOUS * damping,
              "up to a tenth of K²/R, as servos of github.com/Rhoban/bam have", {})]
     if servo.get("friction.stribeck_speed") is None:
         rows += [("friction.breakaway_ratio", f"static over Coulomb friction, fading over {speed:g} rad/s,", "1",
@@ -148,7 +154,9 @@ def assumptions(forecast: Forecast, point: Point) -> list[Assumption]:
         low = value if quantity is None or quantity.lower is None else min(quantity.lower, value)
         high = end if quantity is None or quantity.upper is None else max(quantity.upper, end)
         if high > value and (not more or value == _NEUTRAL[name]):
-            found.append(Assumption(name, words, unit, value, low, high, source, more))
+            # To an angle it is K²/R, but for kinks where the current of a motor that is driven begins
+            told = name != _BRAKES or any("current" in sensor for sensor in forecast.sensors)
+            found.append(Assumption(name, words, unit, value, low, high, source, more, told))
     if has_pulses(forecast.model) and any(_rounded(case, forecast) is not case for case in forecast.cases):
         found.append(Assumption(ROUNDED, "commands rounded to whole microseconds, a share of", "1", 0.0, 0.0, 1.0,
                                 "Arduino's writeMicroseconds, and others"))
@@ -209,6 +217,8 @@ def systematic(task: Task, point: Point, parts: Sequence[LogPart], beliefs: Sequ
                          for some in zip(*((effect.first, effect.second) for _, effect in effects), strict=True))
         information += 0.5 * ((first * r.inside[:, None]).T @ second + (second * r.inside[:, None]).T @ first)
         gradient += 0.5 * (first + second).T @ r.score
+    hidden = [not one.told for one in asked]
+    information[hidden], information[:, hidden], gradient[hidden] = 0.0, 0.0, 0.0
     values, vectors = np.linalg.eigh(information)
     law = _Law((vectors * np.maximum(values, 0.0)) @ vectors.T / doubt.inflation**2, -gradient / doubt.inflation**2)
     box = np.array([[(one.lower - one.assumed) / one.width, (one.upper - one.assumed) / one.width] for one in asked]).T
@@ -396,9 +406,9 @@ def with_assumptions(ends: Mapping[int, Ends], doubt: Uncertainty, level: float,
     return found
 
 
-def most_wanted(numbers: Sequence[Assumption]) -> Assumption | None:
-    """Return the number of a servo that the logs want most off what its file assumes; None where none is wanted."""
-    wanted = [one for one in numbers if one.name not in (CLOCK, ROUNDED) and one.wanted > WANTED]
+def most_wanted(numbers: Sequence[Assumption], least: float) -> Assumption | None:
+    """Return the number of a servo that logs want most off what its file assumes; None where none is so far off."""
+    wanted = [one for one in numbers if one.name not in (CLOCK, ROUNDED) and one.wanted > least]
     return max(wanted, key=lambda one: one.wanted, default=None)
 
 

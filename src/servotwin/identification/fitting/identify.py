@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, ServotwinError
 from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.arrow import Loss, Outcome
-from servotwin.identification.fitting.assumptions import WANTED, Assumption, freed, most_wanted, plausible
+from servotwin.identification.fitting.assumptions import HINTED, WANTED, Assumption, freed, most_wanted, plausible
 from servotwin.identification.fitting.batches import FIT_ACCURACY, Running
 from servotwin.identification.fitting.begin import Begin
 from servotwin.identification.fitting.clocks import ticking
@@ -306,7 +306,8 @@ def _with_what_logs_want(task: Task, found: Outcome, doubts: Doubts, level: floa
     """
     other, there, said, kept = task, found, list[Assumption](), None
     numbers = doubts.systematic.numbers if doubts.systematic is not None else ()
-    while len(said) < _FREED and (most := most_wanted(numbers)) is not None:
+    noise = most_wanted(numbers, HINTED) is None or leaves_noise(task, found.point)
+    while len(said) < _FREED and (most := most_wanted(numbers, WANTED if noise else HINTED)) is not None:
         show(0.9, most.words)
         try:
             nearer, start = freed(other, there.point, most)
@@ -318,7 +319,8 @@ def _with_what_logs_want(task: Task, found: Outcome, doubts: Doubts, level: floa
         nearer.measure(reached.point)
         other, there = nearer, nearer.again(reached.point, lambda share, text: show(0.9, text))
         said.append(most)
-        if all(plausible(other, there.point, one) for one in said) and leaves_noise(other, there.point):
+        noise = leaves_noise(other, there.point)
+        if noise and all(plausible(other, there.point, one) for one in said):
             kept = other, there, tuple(said)
         numbers = assumptions_at(other, there)
     if kept is None:
