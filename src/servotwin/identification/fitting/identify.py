@@ -31,6 +31,7 @@ from servotwin.identification.fitting.held_out import trace_of, with_pulses_of
 from servotwin.identification.fitting.holdout import split
 from servotwin.identification.fitting.judging import leaves_noise, with_verdict
 from servotwin.identification.fitting.linearised import LINEARISED, hurried
+from servotwin.identification.fitting.phases import settled
 from servotwin.identification.fitting.point import NUISANCES, SHARED, Point
 from servotwin.identification.fitting.record import identified_servo, stopped, with_record, with_what_logs_say
 from servotwin.identification.fitting.robot_registers import as_logs_say
@@ -312,6 +313,8 @@ def _with_what_logs_want(task: Task, found: Outcome, doubts: Doubts, level: floa
         try:
             nearer, start = freed(other, there.point, most)
             reached = nearer.ran(start, show, 0.9)
+            if nearer.forecast.phased:  # pulses made up for it too
+                reached = nearer.ran(settled(nearer.scan(reached.point), nearer.fitted), show, 0.9)
         except ServotwinError:
             break
         if not other.pays(there.point, nearer, reached.point, 0.5 * WANTED**2):
