@@ -9,7 +9,9 @@ from servotwin.identification import Log
 
 PENDULUM = st.loads.Pendulum(mass=0.227, length=0.587 / (0.227 * 9.80665), inertia=1.06e-2,
                              hanging_angle=0.5 * np.pi)
-TRUTH = st.load_servo("hitec-hs-755hb").replace({"electronics.frame_period": 0.01})
+TRUTH = st.load_servo("hitec-hs-755hb").replace({  # what files leave out is given, so that intervals hold nothing of it
+    "electronics.frame_period": 0.01, "supply.internal_resistance": 0.0, "motor.motor_viscous_friction": 0.0,
+    "friction.breakaway_ratio": 1.0})
 ENCODER = 2.0 * np.pi / 4096.0  # rad per count
 MIDDLE = 0.5 * np.pi
 

@@ -53,11 +53,13 @@ def test_simpler_models_stand_beside():
 def test_levels(fit):
     """Of a normal law 1.645, 1.960 and 2.576 standard errors, and a little more of Student's with few samples."""
     k = fit.names.index("angle_offset")
-    std = math.sqrt(fit.covariance[k, k])
+    std, usual = float(fit.doubt.std[k]) * fit.scales["angle_offset"], fit.intervals()["angle_offset"]
     for level, reach in ((0.90, 1.644854), (0.95, 1.959964), (0.99, 2.575829)):
         lower, upper, method = fit.intervals(level)["angle_offset"]
         assert method == "normal"
-        assert 0.5 * (upper - lower) == pytest.approx(fit.doubt.quantile(level, k) * std, rel=1e-6)
+        assert upper - lower >= 2.0 * fit.doubt.quantile(level, k) * std  # and what is left out, in proportion
+        assert (upper - lower) / (usual.upper - usual.lower) == pytest.approx(
+            fit.doubt.quantile(level, k) / fit.doubt.quantile(fit.level, k), rel=1e-6)
         assert reach <= fit.doubt.quantile(level, k) < 1.05 * reach
         assert all(type(x) is float for x in (lower, upper))
 

@@ -38,6 +38,7 @@ class Servo(NamedTuple):
     forward: float = 0.263  # N m, resists w > 0
     backward: float = 0.263
     breakaway: float = 1.0
+    stribeck: float = 0.0  # rad/s, the speed by which what holds at rest has fallen to 1/e; 0: it holds at rest alone
     load_share: float = 0.0  # K_l of M3
     motor_share: float = 0.0  # K_m of M5
     external_share: float = 0.0  # K_e of M5
@@ -133,11 +134,13 @@ def _motor(s: Servo, now: Supplied, w: float, forth: float, back: float) -> floa
     return s.K * i
 
 
-def _budget(s: Servo, side: float, at_rest: bool, motor: float, external: float) -> float:
+def _budget(s: Servo, side: float, at_rest: bool, w: float, motor: float, external: float) -> float:
     """Dry friction that resists motion towards `side`."""
     coulomb = s.forward if side > 0.0 else s.backward
     if at_rest:
         coulomb *= s.breakaway
+    elif s.stribeck > 0.0:
+        coulomb *= 1.0 + (s.breakaway - 1.0) * math.exp(-abs(w) / s.stribeck)
     return (coulomb + s.load_share * abs(motor - external)
             + abs(s.motor_share * motor - s.external_share * external))
 
@@ -147,7 +150,7 @@ def _rate(s: Servo, now: Supplied, load: Load, J: float, q: float, w: float, sid
     """Acceleration of motor and what it carries, sliding towards `side`; `less` of the friction is elsewhere."""
     motor = _motor(s, now, w, forth, back)
     external = _external(load, q, w) if carries else 0.0
-    return (motor + external - s.B * w - side * (_budget(s, side, False, motor, external) - less)) / J
+    return (motor + external - s.B * w - side * (_budget(s, side, False, w, motor, external) - less)) / J
 
 
 def _slide(s: Servo, now: Supplied, load: Load, J: float, q: float, w: float, forth: float, back: float,
@@ -159,7 +162,7 @@ def _slide(s: Servo, now: Supplied, load: Load, J: float, q: float, w: float, fo
         external = _external(load, q, 0.0) if carries else 0.0
         push = motor + external
         side = math.copysign(1.0, push)
-        if abs(push) <= _budget(s, side, True, motor, external) - less:
+        if abs(push) <= _budget(s, side, True, 0.0, motor, external) - less:
             return q, 0.0
     first = _rate(s, now, load, J, q, w, side, forth, back, carries, less)
     if w == 0.0 and first * side <= 0.0:

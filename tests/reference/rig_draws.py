@@ -113,6 +113,16 @@ def free_running(rng: np.random.Generator) -> Taking:
     return {"phase": rng.uniform(0.0, 0.02), "loop_jitter": 3e-4, "clock": 2e-5}
 
 
+def with_left_out(truth: Truth) -> Truth:
+    """Return a bench with what servo files leave out: 0 to 1 Ω in the supply, viscous friction and friction at rest."""
+    rng, s = np.random.default_rng([truth.seed, 5]), truth.servo
+    return truth._replace(servo=s._replace(
+        R_b=rng.uniform(0.0, 1.0), B=rng.uniform(0.0, 0.1) * s.K**2 / s.R, breakaway=1.0 + rng.uniform(0.0, 1.0),
+        stribeck=rng.uniform(0.1, 0.3)))
+
+
+LEFT_OUT = "left out"
+"""The condition under which a bench has that, and a generator that sends whole microseconds."""
 CONDITIONS: dict[str, Callable[[np.random.Generator], Taking]] = {
     "white noise": lambda rng: {},
     "AR(1) 0.8": lambda rng: {"ar": 0.8},
@@ -130,11 +140,16 @@ SHORT = 0.8  # s, of a short log
 
 def taken(truth: Truth, condition: str) -> list[Run]:
     """Return the logs of a bench under a condition."""
+    if condition == LEFT_OUT:
+        return runs(truth, lambda rng: {"rounds": 1e-6})
     return runs(truth, CONDITIONS[condition], duration=SHORT if condition == "short logs" else None)
 
 
 def file_of(truth: Truth) -> Servo:
-    """Return the servo as its file has it: every number that a fit looks for is off by 10 to 30 %."""
+    """Return the servo as its file has it: every number that a fit looks for is off by 10 to 30 %.
+
+    What `with_left_out` adds is in it.
+    """
     rng = np.random.default_rng([truth.seed, 3])
     off = {name: getattr(truth.servo, name) * (1.0 + _either(rng) * rng.uniform(0.1, 0.3))
            for name in ("R", "K", "J", "forward", "gain", "deadband")}

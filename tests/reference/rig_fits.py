@@ -11,7 +11,7 @@ import numpy as np
 
 import servotwin as st
 
-from . import bus_rig, rig_catalog
+from . import bus_rig, rig, rig_catalog
 from . import rig_draws as draws
 from .rig_defects import WAKING, between, with_defect
 from .rig_logs import log_of, servo_of
@@ -62,6 +62,8 @@ class Judged(NamedTuple):
     off: dict[str, float]  # of the truth, in half widths
     rms: float
     seconds: float
+    half: dict[str, float]  # widths (SI)
+    holds: bool  # what its verdict says
 
 
 class Seen(NamedTuple):
@@ -87,31 +89,43 @@ def logs_of(found: list[draws.Run]) -> list[st.Log]:
     return [log_of(run.said, run.load, f"{k + 1} {run.motion}", run.motion) for k, run in enumerate(found)]
 
 
-def fitted(truth: draws.Truth, found: list[draws.Run], **more: Any) -> st.Fit:
-    """Fit logs from a servo file that is 10 to 30 % off, without priors."""
+def fitted(truth: draws.Truth, found: list[draws.Run], *, given: bool = True, **more: Any) -> st.Fit:
+    """Fit logs from a servo file that is 10 to 30 % off, without priors.
+
+    What files leave out is given as the bench has it, or left out.
+    """
+    file, none = draws.file_of(truth), rig.Servo()
+    if not given:
+        file = file._replace(R_b=none.R_b, B=none.B, breakaway=none.breakaway, stribeck=none.stribeck)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return st.identify(logs_of(found), servo_of(draws.file_of(truth)),
+        return st.identify(logs_of(found), servo_of(file, given=given),
                            **{"free": FREE, "priors": None, "compare_with": (), **more})
 
 
 def judged(condition: str, seed: int, **more: Any) -> Judged:
-    """Fit the logs of one bench, and look where the truth lies."""
+    """Fit the logs of one bench, and look where the truth lies; as if that were known, with `given`."""
     truth = draws.random_truth(seed)
+    if condition == draws.LEFT_OUT:
+        truth, more = draws.with_left_out(truth), {"given": False, **more}
     found = draws.taken(truth, condition)
+    if condition == draws.LEFT_OUT and more["given"]:  # what was sent too
+        found = [run._replace(said=run.said._replace(command=1e-6 * np.round(run.said.command / 1e-6)))
+                 for run in found]
     began = clock.process_time()
     fit = fitted(truth, found, **more)
     spent = clock.process_time() - began
-    held, endless, off = {}, {}, {}
+    held, endless, off, half = {}, {}, {}, {}
     for name, value in truths_of(truth).items():
         lower, upper, method = fit.intervals()[name]
         if math.isnan(lower) or math.isnan(upper):
             endless[name] = method
             continue
         held[name] = bool(lower <= value <= upper)
-        off[name] = (value - 0.5 * (lower + upper)) / max(0.5 * (upper - lower), 1e-300)
+        half[name] = 0.5 * (upper - lower)
+        off[name] = (value - 0.5 * (lower + upper)) / max(half[name], 1e-300)
     rms = np.sqrt(np.mean(np.concatenate([t.simulated - t.measured for t in fit.traces if not t.held_out]) ** 2))
-    return Judged(held, endless, off, float(rms), spent)
+    return Judged(held, endless, off, float(rms), spent, half, fit.verdict.holds)
 
 
 def seen(name: str, strength: float, seed: int, **more: Any) -> Seen:

@@ -13,8 +13,12 @@ REDUCTION = 280.0
 _VOLTAGE_PER_ANGLE = 0.42  # V/rad: only its product with the one-shot's slope acts
 
 
-def servo_of(servo: Servo, period: float = 0.02, name: str = "of the bench") -> st.Servo:
-    """Return the servo file of a servo of the bench; a digital one is described as analog."""
+def servo_of(servo: Servo, period: float = 0.02, name: str = "of the bench", *, given: bool = False) -> st.Servo:
+    """Return the servo file of a servo of the bench; a digital one is described as analog.
+
+    `given` says that the supply's resistance, viscous friction and friction at rest are known, 0 or not; else they are
+    assumed, as in most files.
+    """
     N = REDUCTION
     groups: dict[str, dict[str, Any]] = {
         "motor": {"armature_resistance": servo.R, "torque_constant": servo.K / N, "back_emf_constant": servo.K / N,
@@ -31,6 +35,7 @@ def servo_of(servo: Servo, period: float = 0.02, name: str = "of the bench") -> 
     more = {"friction.load_friction": servo.load_share, "friction.load_friction_motor": servo.motor_share,
             "friction.load_friction_external": servo.external_share, "gear.backlash": servo.play,
             "gear.output_inertia": servo.wheel, "potentiometer.backlash": servo.wiper_play,
+            "friction.stribeck_speed": servo.stribeck * N,
             "supply.internal_resistance": servo.R_b, "supply.bridge_drop_resistance": servo.r_c,
             "motor.brush_drop_voltage": servo.V_br}
     for dotted, value in more.items():
@@ -38,7 +43,9 @@ def servo_of(servo: Servo, period: float = 0.02, name: str = "of the bench") -> 
             groups[dotted.split(".")[0]][dotted.split(".")[1]] = value
     if math.isfinite(servo.timeout):
         groups["electronics"]["pulse_timeout"] = servo.timeout
-    return st.servo_from_values(name, groups)
+    made = st.servo_from_values(name, groups)
+    return made.replace({"supply.internal_resistance": servo.R_b, "motor.motor_viscous_friction": servo.B / N**2,
+                         "friction.breakaway_ratio": servo.breakaway}) if given else made
 
 
 def load_of(load: Load) -> st.loads.Load:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from servotwin.cli.summary import names as dotted
@@ -46,7 +47,8 @@ def sections(fit: Fit, files: Sequence[str]) -> list[RenderableType]:
     parts += [f"- {item}" for item in fit.unidentifiable]
     parts += ["- no delay is seen: it ended at 0" if name == "delay" and fit.estimates[name] == 0.0
               else f"- {name} ended at a bound of the search" for name in fit.at_bound]
-    parts += [""] if fit.unidentifiable or fit.at_bound else []
+    parts += [f"- {line}" for line in fit.allowing]
+    parts += [""] if fit.unidentifiable or fit.at_bound or fit.allowing else []
     parts.append(errors(tables_of(fit), fit.traces, "motion"))
     said = [text for text in fit.warnings if (fit.verdict is None or text != fit.verdict.sentence)
             and not (fit.interrupted and text.startswith("stopped: the best"))]
@@ -130,6 +132,8 @@ def facts(fit: Fit, files: Sequence[str]) -> dict[str, Any]:
         "registers": None if fit.registers is None else {
             **fit.registers.facts, "values": [one._asdict() for one in fit.register_values]},
         "foreseen": [vars(one) | {"words": str(one)} for one in fit.foreseen],
+        "assumptions": [{**asdict(one), "moves": dict(one.moves), "beside": dict(one.beside)}
+                        for one in fit.assumptions],
         "at_bound": list(fit.at_bound), "yielded": [_yielded(one) for one in fit.yielded],
         "errors": {which.replace(" ", "_"): error_facts(held) for which, held in tables_of(fit).items()},
         "noise": {name: float(value) for name, value in fit.noise.items()}, "warnings": list(fit.warnings),

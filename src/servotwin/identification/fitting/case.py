@@ -125,7 +125,7 @@ def make_case(log: Log, model: Model, space: Space, sensors: Sequence[str], *, d
                          allowed="measured values outside the windows that are left out")
     overridden = tuple(sorted(name for name in log.parameters))
     key = (log.command_kind, overridden, tuple(sorted(used)), bool(log.sent.all()))
-    signal = _signal(log, model, {} if signals is None else signals)
+    signal = command_of(log, model, {} if signals is None else signals)
     return Case(log=log, signal=signal, **_counted(log, used), start=(angle, speed),
                 scatter=scatter, moving=moving, key=key, period=_period(log, model),
                 leans=_leans(log, model, angle, scatter),
@@ -140,7 +140,7 @@ def case_like(case: Case, log: Log, model: Model) -> Case:
     used = {name: _usable(log, model, name) for name in case.places}
     if case.times[0] > 0.0:
         used = {name: mask & (log.time - log.time[0] >= case.times[0] - 1e-9) for name, mask in used.items()}
-    signal = case.signal if has_pulses(model) and case.period else _signal(log, model, {})
+    signal = case.signal if has_pulses(model) and case.period else command_of(log, model, {})
     return replace(case, log=log, signal=signal, **_counted(log, used), key=(*case.key[:-1], bool(log.sent.all())))
 
 
@@ -236,7 +236,7 @@ def _period(log: Log, model: Model) -> float:
     return float(log.parameters.get(_FRAME_PERIOD, getattr(model, "frame_period", 0.0)))
 
 
-def _signal(log: Log, model: Model, known: dict[tuple[Any, ...], Signal]) -> Signal:
+def command_of(log: Log, model: Model, known: dict[tuple[Any, ...], Signal]) -> Signal:
     """Return the command as a model takes it; only one with pulses knows missing ones."""
     period = _period(log, model)
     which = (log.time.tobytes(), log.command.tobytes(), log.command_kind, log.command_hold, log.sent.tobytes(), period)

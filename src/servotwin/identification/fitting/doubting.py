@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.fitting.arrow import Outcome, Prior, Search
+from servotwin.identification.fitting.assumptions import Assumption, systematic, with_assumptions
 from servotwin.identification.fitting.counts import counts_of
 from servotwin.identification.fitting.delay_range import delay_range, phase_errors, unsure_commands
 from servotwin.identification.fitting.doubts import Doubts, allowed, prior_share, sizes_at, vague
@@ -43,20 +45,47 @@ def doubts_of(task: Task, found: Outcome, level: float, show: Told) -> Doubts:
         return _doubts_of(task, found, level, show)
 
 
-def _doubts_of(task: Task, found: Outcome, level: float, show: Told) -> Doubts:
+def assumptions_at(task: Task, found: Outcome) -> tuple[Assumption, ...]:
+    """Return what a servo file leaves out or assumes, and what the logs say of it where a search ended."""
+    with task.forecast.roughly():
+        return systematic(task, found.point, *_straight(task, found)[:4]).numbers
+
+
+class _Straight(NamedTuple):
+    """The problem made straight at a point: what logs say there, and the covariance of the shared numbers.
+
+    Numbers that are not determined have flags, and directions in which nothing is known.
+    """
+
+    parts: list[LogPart]
+    beliefs: list[Prior]
+    rows: list[Rows]
+    doubt: Uncertainty
+    information: Array
+    flags: NDArray[np.bool_]
+    directions: Array
+
+
+def _straight(task: Task, found: Outcome) -> _Straight:
     forecast = task.forecast
     parts = forecast.at(found.point, central=True, cases=task.fitted)
     beliefs = [Prior(*forecast.own_belief(forecast.cases[k])) for k in task.fitted]
     rows: list[Rows] = [rows_of(part, task.loss, own, found.point.own[k], counts_of(forecast, k))
                         for k, part, own in zip(task.fitted, parts, beliefs, strict=True)]
     stuck = task.at_bound(found) | task.held
-    sizes = sizes_at(task, found)
     doubt = uncertainty(rows, task.prior, stuck)
     information = _information(task, found, parts, beliefs)
-    flags, directions = vague(information, doubt.inflation, sizes, ~task.held)
+    flags, directions = vague(information, doubt.inflation, sizes_at(task, found), ~task.held)
     directions = simplest(directions)
     if flags.any():
         doubt = uncertainty(rows, task.prior, stuck, directions)
+    return _Straight(parts, beliefs, rows, doubt, information, flags, directions)
+
+
+def _doubts_of(task: Task, found: Outcome, level: float, show: Told) -> Doubts:
+    forecast = task.forecast
+    parts, beliefs, rows, doubt, information, flags, directions = _straight(task, found)
+    stuck = task.at_bound(found) | task.held
     names = (*forecast.space.names, *forecast.extra)
     shares = [*forecast.space.shares(found.point.shared), *([math.nan] * len(forecast.extra))]
     open_ = explain(names, shares, flags, directions)
@@ -67,11 +96,13 @@ def _doubts_of(task: Task, found: Outcome, level: float, show: Told) -> Doubts:
     seen: list[Outcome] = []
     reaching = ends(search, found, doubt, which, level, rows=rows, deeper=seen.append,
                     tell=lambda done: show(0.76 + 0.18 * done / count, "intervals"))
-    return Doubts(doubt, reaching, with_remedies(forecast, found.point, open_, names),
+    more = systematic(task, found.point, parts, beliefs, rows, doubt)
+    return Doubts(doubt, with_assumptions(reaching, doubt, level, more),
+                  with_remedies(forecast, found.point, open_, names),
                   prior_share(names, doubt, reaching, flags, directions, task.prior.weight),
                   allowed(task, found, rows, directions, information, flags, doubt, reaching, level),
                   _spans(task, found, parts, rows, doubt, level),
-                  min(seen, key=lambda there: there.cost, default=None))
+                  min(seen, key=lambda there: there.cost, default=None), more)
 
 
 def _spans(task: Task, found: Outcome, parts: Sequence[LogPart], rows: Sequence[Rows], doubt: Uncertainty,

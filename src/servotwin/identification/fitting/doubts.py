@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.fitting.arrow import Outcome, Search
+from servotwin.identification.fitting.assumptions import Systematic
 from servotwin.identification.fitting.draws import Allowed
 from servotwin.identification.fitting.intervals import Ends
 from servotwin.identification.fitting.task import Task
@@ -42,6 +43,8 @@ class Doubts:
     allowed : Allowed, optional
     spans : mapping of str to tuple of float
         Ranges (SI) of what pulses tell.
+    systematic : Systematic, optional
+        What the servo file leaves out does to the numbers; `ends` hold it.
     deeper : Outcome, optional
         The best that was seen on the way, if that is clearly better than where the search ended.
     """
@@ -53,6 +56,7 @@ class Doubts:
     allowed: Allowed | None = None
     spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     deeper: Outcome | None = None
+    systematic: Systematic | None = None
 
 
 def sizes_at(task: Task, found: Outcome) -> Array:

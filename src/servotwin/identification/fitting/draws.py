@@ -83,7 +83,7 @@ class Allowed:
             cut = False
             for k in np.argsort(-self.precision):
                 middle = (self.shift / self._scale - y) @ back[k]
-                cut |= _move(y, axes[:, k], float(self.precision[k]), middle, limits, ends, rng)
+                cut |= move(y, axes[:, k], float(self.precision[k]), middle, limits, ends, rng)
             if sweep == 0 and not cut:  # the axes are independent where nothing is cut off
                 break
         y *= np.where(y < 0.0, self.stretch[0], self.stretch[1])
@@ -116,7 +116,7 @@ class Allowed:
         return np.asarray([np.minimum(ends[0], 0.0), np.maximum(ends[1], 0.0)])
 
 
-def _move(y: Array, axis: Array, precision: float, middle: Array, limits: Array, ends: Array,
+def move(y: Array, axis: Array, precision: float, middle: Array, limits: Array, ends: Array,
           rng: np.random.Generator) -> bool:
     """Move all points along one axis to where the law about `middle` allows; return whether limits cut it off."""
     change = limits @ axis

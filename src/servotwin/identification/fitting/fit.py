@@ -21,6 +21,7 @@ from servotwin.models import Model
 from servotwin.parameters import Servo
 
 if TYPE_CHECKING:
+    from servotwin.identification.fitting.assumptions import Assumption
     from servotwin.identification.fitting.choosing import Ladder
     from servotwin.identification.fitting.draws import Allowed
     from servotwin.identification.fitting.foreseen import Foreseen
@@ -184,6 +185,8 @@ class Fit:
         The law that `draw` draws from.
     own : tuple of ndarray
         Each log's own numbers at the end of the search (scaled): its start, its delay or phases.
+    assumptions : tuple of Assumption
+        Numbers that the servo file leaves out or assumes, for which intervals and covariance allow by their ranges.
     interrupted : bool
         Whether it was stopped before its end: then this is the best so far.
     unknown : tuple of str
@@ -231,6 +234,7 @@ class Fit:
     allowed: Allowed | None = field(default=None, repr=False)
     own: tuple[Array, ...] = field(default=(), repr=False)
     registers: RegisterSearch | None = field(default=None, repr=False)
+    assumptions: tuple[Assumption, ...] = ()
 
     def intervals(self, level: float | None = None) -> dict[str, Interval]:
         """Return the interval of every name (SI).
@@ -260,7 +264,13 @@ class Fit:
         first = () if self.verdict is None else (str(self.verdict),)
         said = [text for text in self.warnings if text not in "\n".join(first).split("\n")]
         lines += [f"{one.name} = {one.value:.3g} ({one.lower:.3g} to {one.upper:.3g})" for one in self.register_values]
-        return "\n".join((*first, *lines, *map(str, self.unidentifiable), *said))
+        return "\n".join((*first, *lines, *map(str, self.unidentifiable), *self.allowing, *said))
+
+    @property
+    def allowing(self) -> tuple[str, ...]:
+        """A line on what intervals allow for beside noise: what the servo file assumes; empty where that is nothing."""
+        found = "; ".join(map(str, self.assumptions))
+        return (f"intervals allow for what the servo file assumes: {found}",) if found else ()
 
     def _interval(self, k: int, name: str, level: float) -> Interval:
         nowhere = float("nan")

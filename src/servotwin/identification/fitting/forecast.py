@@ -6,6 +6,7 @@ little more than a simulation, and it is that of the same exact solution.
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import closing, contextmanager
@@ -142,6 +143,12 @@ class Forecast:
             yield
         finally:
             self.nearly = before
+
+    def with_cases(self, cases: Sequence[Case]) -> Forecast:
+        """Return the same forecast of cases that differ a little, as many: in commands, times or parameters of logs."""
+        other = copy.copy(self)
+        other.cases, other._told, other._commands = tuple(cases), {}, {}
+        return other
 
     def names_of_own(self, case: Case) -> tuple[str, ...]:
         """Return which numbers a log has for itself."""

@@ -11,15 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.errors import InputError
+from servotwin.errors import InputError, ServotwinError
 from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.arrow import Loss, Outcome
+from servotwin.identification.fitting.assumptions import HINTED, WANTED, Assumption, freed, most_wanted, plausible
 from servotwin.identification.fitting.batches import FIT_ACCURACY, Running
 from servotwin.identification.fitting.begin import Begin
 from servotwin.identification.fitting.clocks import ticking
 from servotwin.identification.fitting.common_cause import common_cause
 from servotwin.identification.fitting.comparison import BESIDE, ErrorTables, compare
-from servotwin.identification.fitting.doubting import doubts_of
+from servotwin.identification.fitting.doubting import assumptions_at, doubts_of
 from servotwin.identification.fitting.doubts import Doubts
 from servotwin.identification.fitting.findings import BY_ITSELF, explained, first_looks, mended
 from servotwin.identification.fitting.fit import Fit, Start, Trace
@@ -29,8 +30,9 @@ from servotwin.identification.fitting.frames import has_pulses
 from servotwin.identification.fitting.free import Bounds, Priors, Space
 from servotwin.identification.fitting.held_out import trace_of, with_pulses_of
 from servotwin.identification.fitting.holdout import split
-from servotwin.identification.fitting.judging import with_verdict
+from servotwin.identification.fitting.judging import leaves_noise, with_verdict
 from servotwin.identification.fitting.linearised import LINEARISED, hurried
+from servotwin.identification.fitting.phases import settled
 from servotwin.identification.fitting.point import NUISANCES, SHARED, Point
 from servotwin.identification.fitting.record import identified_servo, stopped, with_record, with_what_logs_say
 from servotwin.identification.fitting.registers import RegisterSearch, as_logs_say, register_search
@@ -45,6 +47,7 @@ from servotwin.simulation.workers import Crew
 
 Array = NDArray[np.float64]
 _VALLEYS = 3  # that a fit goes on to, at most
+_FREED = 3  # numbers that the file leaves out
 _VOLTAGE = "supply.open_circuit_voltage"
 Progress = bool | Callable[[float, str], object]
 NUISANCE = ("delay", "frame_phase", "angle_offset", "initial_state")
@@ -235,8 +238,8 @@ def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: fl
         found, ended = task.search(lambda share, text: course(0.7 * share, text))
     except KeyboardInterrupt:
         found, missing = task.best_so_far(), ["whether the search would end elsewhere", "what is left"]
-    forecast = task.forecast  # which may have one more number than it began with
     found, left, doubts = _doubted(task, found, level, course, missing, intervals=intervals)
+    forecast = task.forecast  # which may have more numbers than it began with
     dropped, wide = yielded(task, found, left, doubts), widened(task, found, left)
     with task.nearly(found.point):
         point = with_pulses_of(forecast, task.loss, found.point, held_out, task.fitted)
@@ -280,6 +283,7 @@ def _doubted(task: Task, found: Outcome, level: float, course: Course, missing: 
         try:
             course(0.76, "intervals")
             found, doubts = _with_doubts(task, found, level, course)
+            found, doubts = _with_what_logs_want(task, found, doubts, level, course)
         except KeyboardInterrupt:
             missing.append("intervals")
     if "intervals" in missing:
@@ -323,6 +327,46 @@ def _with_doubts(task: Task, found: Outcome, level: float,
     return found, doubts
 
 
+def _with_what_logs_want(task: Task, found: Outcome, doubts: Doubts, level: float,
+                         show: Callable[[float, str], None]) -> tuple[Outcome, Doubts]:
+    """Return where a search ends that has found numbers which the file leaves out too, where the logs want them so.
+
+    A model that lacks something else takes any further number: they stay only if what is left is noise.
+    """
+    other, there, said, kept = task, found, list[Assumption](), None
+    numbers = doubts.systematic.numbers if doubts.systematic is not None else ()
+    noise = most_wanted(numbers, HINTED) is None or leaves_noise(task, found.point)
+    while len(said) < _FREED and (most := most_wanted(numbers, WANTED if noise else HINTED)) is not None:
+        show(0.9, most.words)
+        try:
+            nearer, start = freed(other, there.point, most)
+            reached = nearer.ran(start, show, 0.9)
+            if nearer.forecast.phased:  # pulses made up for it too
+                reached = nearer.ran(settled(nearer.scan(reached.point), nearer.fitted), show, 0.9)
+        except ServotwinError:
+            break
+        if not other.pays(there.point, nearer, reached.point, 0.5 * WANTED**2):
+            break
+        nearer.measure(reached.point)
+        other, there = nearer, nearer.again(reached.point, lambda share, text: show(0.9, text))
+        said.append(most)
+        noise = leaves_noise(other, there.point)
+        if noise and all(plausible(other, there.point, one) for one in said):
+            kept = other, there, tuple(said)
+        numbers = assumptions_at(other, there)
+    if kept is None:
+        return found, doubts
+    task.become(kept[0], _said_of(kept[0], kept[1].point, kept[2]))
+    return kept[1], doubts_of(task, kept[1], level, show)
+
+
+def _said_of(task: Task, point: Point, numbers: Sequence[Assumption]) -> str:
+    values = {p.name: float(p.value(point.shared[k])) for k, p in enumerate(task.forecast.space.parameters)}
+    return "the logs want " + " and ".join(
+        f"{one.name} of {values[one.name]:.3g}{one.unit_shown} where the servo file assumes {one.assumed:z.3g} "
+        f"({one.wanted:.2g} standard errors)" for one in numbers) + ": searched too"
+
+
 def _traces(forecast: Forecast, point: Point, held_out: Sequence[int]) -> tuple[Trace, ...]:
     """Return every log beside the simulation; a log that was held out starts as it was measured."""
     return tuple(trace_of(forecast, point, k, part, held_out=k in held_out)
@@ -352,7 +396,8 @@ def _fit(task: Task, found: Outcome, doubts: Doubts, dropped: tuple[Yielded, ...
     covariance = np.full((len(names), len(names)), np.nan)
     if doubt is not None:
         known = np.ix_(list(reaching), list(reaching))
-        covariance[known] = (doubt.covariance * np.outer(slopes, slopes))[known]
+        more = doubts.systematic.covariance if doubts.systematic is not None else 0.0
+        covariance[known] = ((doubt.covariance + more) * np.outer(slopes, slopes))[known]
     units = {p.name: p.unit for p in space.parameters} | {name: unit for name, (_, unit) in SHARED.items()}
     return Fit(
         servo=servo, model=type(forecast.model)(servo), names=names,
@@ -365,4 +410,5 @@ def _fit(task: Task, found: Outcome, doubts: Doubts, dropped: tuple[Yielded, ...
         warnings=(*task.remarks, *task.unsure, *checks.warnings_of((*dropped, *wide), tables),
                   *_explained(task, dropped)),
         doubt=doubt, ends=dict(reaching), scales={n: scales[n] for n in forecast.extra}, yielded=dropped, widened=wide,
-        prior_share=doubts.prior_share, allowed=doubts.allowed, spans=doubts.spans, own=found.point.own)
+        prior_share=doubts.prior_share, allowed=doubts.allowed, spans=doubts.spans, own=found.point.own,
+        assumptions=doubts.systematic.numbers if doubts.systematic is not None else ())

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from servotwin.errors import PlausibilityWarning
 from servotwin.identification.fitting.arrow import Prior
+from servotwin.identification.fitting.assumptions import WANTED
 from servotwin.identification.fitting.comparison import SLEW
 from servotwin.identification.fitting.diagnosis import diagnose
 from servotwin.identification.fitting.diagnosis.counted import counted_stamps
 from servotwin.identification.fitting.fit import Fit, Trace
+from servotwin.identification.fitting.held_out import trace_of
 from servotwin.identification.fitting.noise import SensorSeries, noise_of
 from servotwin.identification.fitting.point import Point
 from servotwin.identification.fitting.stopping import Course
@@ -89,8 +91,25 @@ def with_verdict(task: Task, point: Point, fit: Fit, course: Course, slew: Mappi
     said = intervals_said(verdict.moved, sought=bool(fit.ends))
     verdict = replace(verdict, sentence=verdict.sentence.replace(UNHELD, said))
     verdict = replace(verdict, causes=causes, sentence=_with_causes(verdict, causes, tried=trials))
-    first = () if verdict.holds and not verdict.undecided else (verdict.sentence,)
-    return replace(fit, verdict=verdict, warnings=(*first, *fit.warnings))
+    if not verdict.holds or verdict.undecided:
+        return replace(fit, verdict=verdict, warnings=(verdict.sentence, *fit.warnings))
+    wanted = [f"the logs want {one.words} {one.mean:.2g} ± {one.std:.1g}{one.unit_shown} where {one.assumed:z.3g} is "
+              f"assumed ({one.wanted:.2g} standard errors): intervals allow for it"
+              for one in fit.assumptions if one.wanted > WANTED]
+    return replace(fit, verdict=verdict, warnings=(*fit.warnings, *wanted))
+
+
+def leaves_noise(task: Task, point: Point) -> bool:
+    """Tell whether what a point leaves of its fitted logs is noise of one sensor, without trials."""
+    parts = task.forecast.at(point, derivatives=False, cases=task.fitted)
+    fitted = [trace_of(task.forecast, point, k, part, held_out=False)
+              for k, part in zip(task.fitted, parts, strict=True)]
+    sensors = {trace.signal for trace in fitted}
+    if len(sensors) != 1:
+        return False
+    verdict = judge([_series(trace) for trace in fitted], sensors.pop(), _rows(task, point), task.forecast.size,
+                    max(task.forecast.running.accuracy, _FINEST))
+    return verdict.holds and not verdict.undecided
 
 
 def _rival(traces: Sequence[Trace], slew: Mapping[int, Array], noise: float) -> Rival | None:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import ServotwinError
+from servotwin.identification.fitting.assumptions import assumptions
 from servotwin.identification.fitting.diagnosis.bench import Setting, TrialBench
 from servotwin.identification.fitting.diagnosis.candidates import TABLE, possible
 from servotwin.identification.fitting.point import joined
@@ -41,7 +42,9 @@ def moved(bench: TrialBench, half: Mapping[str, float], named: str = "") -> dict
     named : str
         The cause that a trial found.
     """
-    settings = [(one.name, several[0]) for one in TABLE if one.name in _SIZES and (several := possible(one, bench))]
+    known = {one.name for one in assumptions(bench.task.forecast, bench.whole)}  # intervals allow for these already
+    settings = [(one.name, several[0]) for one in TABLE if one.name in _SIZES and (several := possible(one, bench))
+                and (one.name == named or not set(several[0].values) <= known)]
     r, J = _slopes(bench)
     names = (*bench.old.space.names, *bench.old.extra)
     asked = {k: name for k, name in enumerate(names) if half.get(name, 0.0) > 0.0}

@@ -1,0 +1,444 @@
+"""What a servo file leaves out or only assumes: by how much its ranges, as far as the logs allow, move a fit's numbers.
+
+Each such number is a nuisance with a uniform law over its range. A lane of each log, with that number moved, gives its
+derivative S beside that of the fitted numbers, J. Where the cost is a parabola the fitted numbers follow it by
+-(JᵀJ)⁻¹ JᵀS, and what they cannot imitate says how large it is: the Schur complement of the joint normal matrix. So
+nothing is searched. A number that the logs want elsewhere than the file has it is for a search to find (`freed`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import ServotwinError
+from servotwin.identification.fitting.arrow import Prior
+from servotwin.identification.fitting.case import Case, command_of
+from servotwin.identification.fitting.draws import move
+from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.frames import has_pulses
+from servotwin.identification.fitting.free import Space, nominal
+from servotwin.identification.fitting.intervals import Ends
+from servotwin.identification.fitting.point import STEP, LogPart, Point
+from servotwin.identification.fitting.task import Task
+from servotwin.identification.fitting.uncertainty import Rows, Uncertainty
+from servotwin.models import DigitalServo
+from servotwin.parameters import Servo
+
+Array = NDArray[np.float64]
+
+WANTED = 3.5
+"""Standard errors from what the file says, beyond which the logs want a number elsewhere: as of priors."""
+HINTED = 1.5
+"""The same where what is left is no noise, and widens standard errors by as much: then a search has to tell."""
+CLOCK, ROUNDED = "clock", "rounded commands"
+"""What is no parameter of a servo."""
+_STEP, _WIDE = 0.05, 0.1  # of a range: over which a number is looked at, as much again after it; among kinks
+_CHAINS, _SWEEPS = 200, 16  # of the sampling of the law of what is left out: its moments to a tenth
+_OHMS = 1.0  # of a supply, assumed: four fresh alkaline AA cells have 0.6 to 1.2 (Energizer E91: 0.15 to 0.3 each)
+_VISCOUS = 0.1  # of K²/R: the servos of github.com/Rhoban/bam (M3 files; XL330, XL-320, STS3215, MX) have up to 0.098
+_BREAKAWAY = 2.0  # assumed, as in the catalog: no source
+_SPEEDS = (0.1, 0.3)  # rad/s at the output, assumed: 1/e of the excess; laws between are about mixtures of both
+_MICROSECOND = 1e-6  # s: `writeMicroseconds` of Arduino's Servo, and whoever sends whole microseconds
+_CLOCK = 0.015  # assumed: ceramic resonators are within 0.5 %, calibrated RC oscillators (ATmega328P) within 1
+_FARTHEST = 1.5  # of a range, assumed: a number that a search takes farther stands for something else
+_BRAKES = "motor.motor_viscous_friction"
+_NEUTRAL = {"friction.breakaway_ratio": 1.0}
+_UNTOLD = 0.25  # of a range: a uniform law has 0.29
+_NOTHING = 1e-9  # of the precision of a range: the logs do not tell
+
+
+@dataclass(frozen=True)
+class Assumption:
+    """A number that the servo file leaves out or assumes.
+
+    Parameters
+    ----------
+    name : str
+        Dotted, or `CLOCK` or `ROUNDED`.
+    words : str
+    unit : str
+        SI.
+    assumed, lower, upper : float
+        What the file assumes, and the range (SI).
+    source : str
+        Of the range.
+    beside : mapping of str to float
+        Other numbers of the servo that go with it (SI).
+    told : bool
+        Whether logs can tell it; else its whole range counts.
+    mean, std : float
+        Of its law within the range, with what the logs say (SI).
+    wanted : float
+        By how many standard errors the logs want it off what is assumed, the others being as assumed; negative where
+        they want it outside the range.
+    moves : mapping of str to float
+        By how much each fitted number moves (scaled) when it goes through its range.
+    """
+
+    name: str
+    words: str
+    unit: str
+    assumed: float
+    lower: float
+    upper: float
+    source: str
+    beside: Mapping[str, float] = field(default_factory=dict)
+    told: bool = True
+    mean: float = math.nan
+    std: float = math.nan
+    wanted: float = 0.0
+    moves: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def width(self) -> float:
+        """Of its range (SI)."""
+        return self.upper - self.lower
+
+    def __str__(self) -> str:
+        told = self.std < _UNTOLD * self.width
+        said = f"the logs say {self.mean:z.3g} ± {self.std:.2g}" if told else "the logs do not tell"
+        return f"{self.words} {self.lower:z.3g} to {self.upper:z.3g}{self.unit_shown} ({said})"
+
+    @property
+    def unit_shown(self) -> str:
+        """The unit after a number; nothing of a plain one."""
+        return f" {self.unit}" if self.unit != "1" else ""
+
+
+class Systematic(NamedTuple):
+    """What left-out numbers do to the fitted ones (scaled): where their mean would be, and its covariance."""
+
+    numbers: tuple[Assumption, ...]
+    shift: Array
+    covariance: Array
+
+
+def assumptions(forecast: Forecast, point: Point) -> list[Assumption]:
+    """Return what the servo's file leaves out or assumes, and the logs do not say: each with its range.
+
+    A number with an origin other than "assumed" is given, and so is one that a person set.
+    """
+    servo, space = forecast.model.servo, forecast.space
+    reduction = nominal(servo, "gear.gear_reduction") or 1.0
+    values = {p.name: float(p.value(point.shared[k])) for k, p in enumerate(space.parameters)}
+
+    def of(name: str) -> float:
+        found = values.get(name, nominal(servo, name))
+        return float(found) if found else 0.0
+
+    gain, resistance = of("output_torque_constant"), of("motor.armature_resistance")
+    damping = gain**2 / resistance / reduction**2 if resistance > 0.0 else 0.0
+    rows: list[tuple[str, str, str, float, str, dict[str, float]]] = [
+            ("supply.internal_resistance", "resistance of the supply", "ohm", _OHMS,
+             "assumed: up to four fresh alkaline AA cells", {}),
+            (_BRAKES, "viscous friction of the motor", "N m s/rad", _VISCOUS * damping,
+             "up to a tenth of K²/R, as servos of github.com/Rhoban/bam have", {})]
+    if servo.get("friction.stribeck_speed") is None:
+        rows += [("friction.breakaway_ratio", f"static over Coulomb friction, fading over {speed:g} rad/s,", "1",
+                  _BREAKAWAY, "assumed, as in the catalog", {"friction.stribeck_speed": speed * reduction})
+                 for speed in _SPEEDS]
+    found = []
+    for name, words, unit, end, source, more in rows:
+        read = (*forecast.model.requires, *forecast.model.optional)
+        if any(one not in read or one in space.names or any(one in case.log.parameters for case in forecast.cases)
+               for one in (name, *more)) or _given(servo, name):
+            continue
+        value = float(servo.get(name) or _NEUTRAL.get(name, 0.0))  # type: ignore[arg-type]
+        quantity = servo.quantities.get(name)
+        low = value if quantity is None or quantity.lower is None else min(quantity.lower, value)
+        high = end if quantity is None or quantity.upper is None else max(quantity.upper, end)
+        if high > value and (not more or value == _NEUTRAL[name]):
+            # To an angle it is K²/R, but for kinks where the current of a motor that is driven begins
+            told = name != _BRAKES or any("current" in sensor for sensor in forecast.sensors)
+            found.append(Assumption(name, words, unit, value, low, high, source, more, told))
+    if has_pulses(forecast.model) and any(_rounded(case, forecast) is not case for case in forecast.cases):
+        found.append(Assumption(ROUNDED, "commands rounded to whole microseconds, a share of", "1", 0.0, 0.0, 1.0,
+                                "Arduino's writeMicroseconds, and others"))
+    period = forecast.nuisance_of(point.shared, "frame_period")
+    if period:
+        off = period / forecast.cases[0].period - 1.0
+        off = math.copysign(min(abs(off), _CLOCK), off)
+        if off:
+            found.append(Assumption(CLOCK, "stamps too far apart, by a share of", "1", 0.0, min(off, 0.0),
+                                    max(off, 0.0), "assumed: 1.5 % at most, and so that pulses may have their usual "
+                                    "period"))
+    return found
+
+
+def _given(servo: Servo, name: str) -> bool:
+    """Tell whether a file gives a number, rather than assuming it; what a person sets is given."""
+    quantity = servo.quantities.get(name)
+    return quantity is not None and (quantity.origin != "assumed" or quantity.was_set)
+
+
+def _rounded(case: Case, forecast: Forecast) -> Case:
+    """Return a log whose pulses are whole microseconds; itself where they are."""
+    log = case.log
+    if log.command_kind != "pulse_width":
+        return case
+    command = _MICROSECOND * np.round(log.command / _MICROSECOND)
+    if np.allclose(command, log.command, rtol=0.0, atol=1e-3 * _MICROSECOND, equal_nan=True):
+        return case
+    log = replace(log, command=command)
+    return replace(case, log=log, signal=command_of(log, forecast.model, {}))
+
+
+def systematic(task: Task, point: Point, parts: Sequence[LogPart], beliefs: Sequence[Prior], rows: Sequence[Rows],
+               doubt: Uncertainty) -> Systematic:
+    """Return what left-out numbers do to the fitted ones.
+
+    Parameters
+    ----------
+    task : Task
+    point : Point
+        Where its search ended.
+    parts, beliefs, rows
+        Of its fitted logs there, with what is believed of their own numbers.
+    doubt : Uncertainty
+    """
+    p, prior = len(point.shared), task.prior
+    names = (*task.forecast.space.names, *task.forecast.extra)
+    known = _Known(task, point, parts, beliefs, rows, doubt)
+    effects = [(one, effect) for one in assumptions(task.forecast, point) if (effect := known.effect(one)) is not None]
+    if not effects:
+        return Systematic((), np.zeros(p), np.zeros((p, p)))
+    asked = [one for one, _ in effects]
+    A = np.column_stack([effect.move for _, effect in effects])
+    information = A.T @ (prior.weight[:, None] ** 2 * A)
+    gradient = A.T @ (prior.weight**2 * (point.shared - prior.mean))
+    for k, r in enumerate(rows):
+        first, second = (np.column_stack([each[k] for each in some])
+                         for some in zip(*((effect.first, effect.second) for _, effect in effects), strict=True))
+        information += 0.5 * ((first * r.inside[:, None]).T @ second + (second * r.inside[:, None]).T @ first)
+        gradient += 0.5 * (first + second).T @ r.score
+    hidden = [not one.told for one in asked]
+    information[hidden], information[:, hidden], gradient[hidden] = 0.0, 0.0, 0.0
+    values, vectors = np.linalg.eigh(information)
+    law = _Law((vectors * np.maximum(values, 0.0)) @ vectors.T / doubt.inflation**2, -gradient / doubt.inflation**2)
+    box = np.array([[(one.lower - one.assumed) / one.width, (one.upper - one.assumed) / one.width] for one in asked]).T
+    drawn = _drawn(law, box)
+    mean, covariance = drawn.mean(axis=0), np.atleast_2d(np.cov(drawn.T))
+    if CLOCK in (one.name for one in asked) and "frame_period" in names:  # pulses are as far apart as stamps say
+        j, k = [one.name for one in asked].index(CLOCK), names.index("frame_period")
+        A[k, j] -= point.shared[k] * asked[j].width
+    numbers = tuple(replace(
+        one, mean=one.assumed + one.width * float(mean[j]), std=one.width * math.sqrt(float(covariance[j, j])),
+        wanted=_way(one) * _gain(float(law.wanted[j]), float(law.precision[j, j])),
+        moves={name: float(A[k, j]) for k, name in enumerate(names) if A[k, j]}) for j, one in enumerate(asked))
+    return Systematic(numbers, A @ mean, A @ covariance @ A.T)
+
+
+class _Law(NamedTuple):
+    """A normal law of left-out numbers, in units of their ranges: its precision, and that times its mean."""
+
+    precision: Array
+    wanted: Array
+
+
+class _Effect(NamedTuple):
+    """What a number does on its way through its range: how the fitted ones follow, and what they do not imitate.
+
+    That is the change of residuals, and of beliefs about the logs' own numbers, over one step and over the next.
+    """
+
+    move: Array
+    first: list[Array]
+    second: list[Array]
+
+
+def _gain(wanted: float, precision: float) -> float:
+    """Return the root of twice what a number gains alone about within its range; negative towards its other side."""
+    far = min(abs(wanted) / max(precision, _NOTHING), _FARTHEST)
+    return math.copysign(math.sqrt(max(2.0 * abs(wanted) * far - precision * far**2, 0.0)), wanted)
+
+
+def _way(one: Assumption) -> float:
+    """Return to which side of what is assumed a range reaches farther."""
+    return 1.0 if one.upper - one.assumed >= one.assumed - one.lower else -1.0
+
+
+@dataclass(frozen=True)
+class _Known:
+    """What is known where a search ended, as of `systematic`."""
+
+    task: Task
+    point: Point
+    parts: Sequence[LogPart]
+    beliefs: Sequence[Prior]
+    rows: Sequence[Rows]
+    doubt: Uncertainty
+
+    def effect(self, one: Assumption) -> _Effect | None:
+        """Return the effect of a number; None where it has none, or cannot be simulated.
+
+        All others follow as the derivatives say, and once more as the residuals there want: a kink within a small
+        difference looks like something that no number can imitate, and hides what one can.
+        """
+        exact = one.name == ROUNDED
+        step = _way(one) * (1.0 if exact else _STEP if self.task.forecast.step <= STEP else _WIDE)
+        move, own = np.zeros(len(self.point.shared)), [np.zeros(part.own.shape[1]) for part in self.parts]
+        first: list[Array] = []
+        try:
+            for _ in range(1 if exact else 2):
+                changes = self._changes(one, step, move, own)
+                if not all(np.isfinite(d).all() for d in changes) or not (first or any(d.any() for d in changes)):
+                    return None
+                move, first = self._follow([d / step for d in changes], move, own)
+            if exact:
+                return _Effect(move, first, first)
+            changes = self._changes(one, 2.0 * step, move, own)
+        except ServotwinError:
+            return None
+        if not all(np.isfinite(d).all() for d in changes):
+            return None
+        return _Effect(move, first, [np.concatenate([d / step - before[:len(d)], before[len(d):]])
+                                     for d, before in zip(changes, first, strict=True)])
+
+    def _changes(self, one: Assumption, step: float, move: Array, own: Sequence[Array]) -> list[Array]:
+        """Return by how much residuals change with a number so far through its range, and all others along."""
+        task, forecast = self.task, self.task.forecast
+        moved = list(self.point.own)
+        for k, values in zip(task.fitted, own, strict=True):
+            moved[k] = moved[k] + step * values
+        there = self.point._replace(
+            shared=np.clip(self.point.shared + step * move, task.lower, task.upper), own=tuple(moved))
+        other, at = _changed(forecast, there, one, step * one.width)
+        before = other.work
+        found = other.at(at, derivatives=False, cases=task.fitted)
+        forecast.work += other.work - before
+        return [new.residual - old.residual for new, old in zip(found, self.parts, strict=True)]
+
+    def _follow(self, changes: Sequence[Array], move: Array, own: list[Array]) -> tuple[Array, list[Array]]:
+        """Return how the shared numbers follow changes for a range, and what is left; own numbers move in place."""
+        pull, left = self.task.prior.weight**2 * move, []
+        for k, (d, part, belief, r) in enumerate(zip(changes, self.parts, self.beliefs, self.rows, strict=True)):
+            m, weight = len(d), belief.weight
+            if len(own[k]):
+                weighted = part.own * r.inside[:m, None]
+                H = weighted.T @ part.own + np.diag(weight**2)
+                H += 1e-12 * np.eye(len(H)) * max(H.max(), 1.0)
+                follow = -np.linalg.solve(H, weighted.T @ d + weight**2 * own[k])
+                own[k] = own[k] + follow
+                left.append(np.concatenate([d + part.own @ follow, weight * own[k]]))
+            else:
+                left.append(d)
+            pull = pull + (r.slope * r.inside[:, None]).T @ left[k]
+        change = -self.doubt.curvature @ pull
+        for k, r in enumerate(self.rows):
+            left[k] = left[k] + r.slope @ change
+            if r.follow is not None:
+                own[k] = own[k] + r.follow @ change
+        return move + change, left
+
+
+def _changed(forecast: Forecast, point: Point, one: Assumption, way: float) -> tuple[Forecast, Point]:
+    """Return a forecast in which a number is so far off what is assumed (SI), and where the point stands there."""
+    if one.name == ROUNDED:
+        return forecast.with_cases([_rounded(case, forecast) for case in forecast.cases]), point
+    if one.name == CLOCK:
+        return _slowed(forecast, point, 1.0 + way)
+    changed = {one.name: one.assumed + way, **one.beside}
+    cases = [replace(case, log=replace(case.log, parameters={**case.log.parameters, **changed}),
+                     key=(*case.key, *changed)) for case in forecast.cases]
+    other = forecast.with_cases(cases)
+    if one.beside and isinstance(forecast.model, DigitalServo):  # friction that fades has no closed form
+        other.bent = other.nearly = True
+    return other, point
+
+
+def _slowed(forecast: Forecast, point: Point, factor: float) -> tuple[Forecast, Point]:
+    """Return logs whose stamps were too far apart by a factor, pulses included."""
+    cases = []
+    for case in forecast.cases:
+        log = replace(case.log, time=case.log.time[0] + (case.log.time - case.log.time[0]) / factor)
+        cases.append(replace(case, log=log, signal=command_of(log, forecast.model, {}), times=case.times / factor))
+    shared, own = point.shared.copy(), []
+    shared[len(forecast.space) + forecast.extra.index("frame_period")] /= factor
+    for case, values in zip(forecast.cases, point.own, strict=True):
+        own.append(values / np.where([name == "frame_phase" for name in forecast.names_of_own(case)], factor, 1.0))
+    frames = tuple(f._replace(phase=f.phase / factor, period=f.period / factor) for f in point.frames)
+    return forecast.with_cases(cases), point._replace(shared=shared, own=tuple(own), frames=frames)
+
+
+def _drawn(law: _Law, box: Array) -> Array:
+    """Return draws from a normal law that is cut off by a box, shape (2, d): along its own axes in turn (Geweke 1991).
+
+    Examples
+    --------
+    >>> drawn = _drawn(_Law(np.diag([1e4, 0.0]), np.array([1e4 * 0.3, 0.0])), np.array([[0.0, 0.0], [1.0, 1.0]]))
+    >>> [round(float(x), 2) for x in (*drawn.mean(axis=0), *drawn.std(axis=0))]
+    [0.3, 0.5, 0.01, 0.29]
+    """
+    rng = np.random.default_rng(0)
+    values, vectors = np.linalg.eigh(law.precision)
+    directions = [*zip(np.maximum(values, 0.0), vectors.T, strict=True),
+                  *zip(np.diag(law.precision), np.eye(len(values)), strict=True)]
+    axes = [(float(value), v, float(law.wanted @ v)) for value, v in directions]
+    found = np.repeat(box.mean(axis=0)[None], _CHAINS, axis=0)
+    for _ in range(_SWEEPS):
+        for value, v, pull in axes:
+            middle = (pull - found @ law.precision @ v) / max(value, _NOTHING)
+            move(found, v, value, middle, np.eye(len(v)), box, rng)
+    return found
+
+
+def with_assumptions(ends: Mapping[int, Ends], doubt: Uncertainty, level: float, more: Systematic) -> dict[int, Ends]:
+    """Return ends of intervals that hold for what is left out too.
+
+    An interval holds those of the file as it stands, and those of a number whose mean and variance are those with what
+    is left out.
+    """
+    found = {}
+    for k, one in ends.items():
+        std, reach = float(doubt.std[k]), doubt.quantile(level, k)
+        if not std > 0.0:
+            found[k] = one
+            continue
+        middle, wider = more.shift[k] / std, reach**2 * more.covariance[k, k] / std**2
+        found[k] = replace(one, lower=min(one.lower, middle - math.hypot(one.lower, math.sqrt(wider))),
+                           upper=max(one.upper, middle + math.hypot(one.upper, math.sqrt(wider))))
+    return found
+
+
+def most_wanted(numbers: Sequence[Assumption], least: float) -> Assumption | None:
+    """Return the number of a servo that logs want most off what its file assumes; None where none is so far off."""
+    wanted = [one for one in numbers if one.name not in (CLOCK, ROUNDED) and one.wanted > least]
+    return max(wanted, key=lambda one: one.wanted, default=None)
+
+
+def plausible(task: Task, point: Point, one: Assumption) -> bool:
+    """Tell whether a number that was searched too ended about within its range."""
+    k = task.forecast.space.names.index(one.name)
+    value = float(task.forecast.space.parameters[k].value(point.shared[k]))
+    return abs(value - one.assumed) <= _FARTHEST * one.width
+
+
+def freed(task: Task, point: Point, one: Assumption) -> tuple[Task, Point]:
+    """Return a search in which a number is searched too, and where it begins: where the logs want it, to first order.
+
+    Raises
+    ------
+    ServotwinError
+        If that cannot be.
+    """
+    old, x = task.forecast, point.shared
+    n = len(old.space)
+    more = {one.name: one.assumed + max(one.mean - one.assumed, 0.1 * one.width), **one.beside}
+    known = old.space.parameters
+    space = Space(old.model, (*old.space.names, *more),
+                  bounds={p.name: (p.lower, p.upper) for p in known if p.bounded} or None,
+                  priors={p.name: p.prior for p in known if p.prior is not None} or None,
+                  load={p.name: p.start for p in known if p.name.startswith("load.")})
+    forecast = Forecast([case.log for case in old.cases], old.model, space, old.nuisance, old.sensors)
+    prior = Prior(*(np.insert(values, n, np.zeros(len(more))) for values in (task.prior.mean, task.prior.weight)))
+    other = task.like(forecast, prior)
+    share = (more[one.name] - one.assumed) / one.width
+    moved = x + share * np.array([one.moves.get(name, 0.0) for name in (*old.space.names, *old.extra)])
+    begin = [p.scaled(min(max(more[p.name], p.lower), p.upper)) for p in space.parameters[n:]]
+    return other, point._replace(shared=np.clip(np.insert(moved, n, begin), other.lower, other.upper))
