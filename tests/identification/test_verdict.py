@@ -69,7 +69,7 @@ def bench(seed, kind="white", wrong=0.0, rests=True, logs=4):
 
 
 @pytest.mark.long(but="counts")
-@pytest.mark.parametrize("kind", ["white", "remembers", "counts", "jitters"])
+@pytest.mark.parametrize("kind", ["white", "remembers", "jitters", pytest.param("counts", marks=pytest.mark.long)])
 def test_noise_of_a_true_model_passes(kind):
     """Of 15 benches none: two tests of one in a thousand each blame one in 33 such rows of a new seed."""
     assert [seed for seed in range(15) if not judge(bench(seed, kind), "output_angle").holds] == []

@@ -46,6 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _ran(list(arguments))
     words = sys.argv[1:]
     interrupts.watch(words)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small: more threads of numpy's only wait
     interrupts.leave(_ran(words))
 
 

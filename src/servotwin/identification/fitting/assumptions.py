@@ -48,6 +48,9 @@ _MICROSECOND = 1e-6  # s: `writeMicroseconds` of Arduino's Servo, and whoever se
 _CLOCK = 0.015  # assumed: ceramic resonators are within 0.5 %, calibrated RC oscillators (ATmega328P) within 1
 _FARTHEST = 1.5  # of a range, assumed: a number that a search takes farther stands for something else
 _BRAKES = "motor.motor_viscous_friction"
+_LIKE_BRAKES = {"output_torque_constant", "motor.torque_constant", "motor.back_emf_constant",
+                "motor.armature_resistance"}
+"""What K²/R is made of: where all of it is known, an angle tells viscous friction."""
 _NEUTRAL = {"friction.breakaway_ratio": 1.0}
 _UNTOLD = 0.25  # of a range: a uniform law has 0.29
 _NOTHING = 1e-9  # of the precision of a range: the logs do not tell
@@ -155,7 +158,8 @@ def assumptions(forecast: Forecast, point: Point) -> list[Assumption]:
         high = end if quantity is None or quantity.upper is None else max(quantity.upper, end)
         if high > value and (not more or value == _NEUTRAL[name]):
             # To an angle it is K²/R, but for kinks where the current of a motor that is driven begins
-            told = name != _BRAKES or any("current" in sensor for sensor in forecast.sensors)
+            told = name != _BRAKES or not _LIKE_BRAKES & {*space.names} or any(
+                "current" in sensor for sensor in forecast.sensors)
             found.append(Assumption(name, words, unit, value, low, high, source, more, told))
     if has_pulses(forecast.model) and any(_rounded(case, forecast) is not case for case in forecast.cases):
         found.append(Assumption(ROUNDED, "commands rounded to whole microseconds, a share of", "1", 0.0, 0.0, 1.0,
@@ -210,8 +214,7 @@ def systematic(task: Task, point: Point, parts: Sequence[LogPart], beliefs: Sequ
         return Systematic((), np.zeros(p), np.zeros((p, p)))
     asked = [one for one, _ in effects]
     A = np.column_stack([effect.move for _, effect in effects])
-    information = A.T @ (prior.weight[:, None] ** 2 * A)
-    gradient = A.T @ (prior.weight**2 * (point.shared - prior.mean))
+    information, gradient = np.zeros((len(asked), len(asked))), np.zeros(len(asked))
     for k, r in enumerate(rows):
         first, second = (np.column_stack([each[k] for each in some])
                          for some in zip(*((effect.first, effect.second) for _, effect in effects), strict=True))
@@ -219,6 +222,8 @@ def systematic(task: Task, point: Point, parts: Sequence[LogPart], beliefs: Sequ
         gradient += 0.5 * (first + second).T @ r.score
     hidden = [not one.told for one in asked]
     information[hidden], information[:, hidden], gradient[hidden] = 0.0, 0.0, 0.0
+    information += A.T @ (prior.weight[:, None] ** 2 * A)  # what is believed of the fitted numbers tells of it
+    gradient += A.T @ (prior.weight**2 * (point.shared - prior.mean))
     values, vectors = np.linalg.eigh(information)
     law = _Law((vectors * np.maximum(values, 0.0)) @ vectors.T / doubt.inflation**2, -gradient / doubt.inflation**2)
     box = np.array([[(one.lower - one.assumed) / one.width, (one.upper - one.assumed) / one.width] for one in asked]).T

@@ -175,27 +175,35 @@ class _Filtered(NamedTuple):
 
 def _filtered(part: _Part, row: Rows | None, taps: Array, weight: Array) -> _Filtered:
     """Return a log as filtered, less its first samples, and less what its own numbers can imitate."""
-    from scipy.signal import lfilter
-
     count, order = len(part.residual), len(taps) - 1
     own, shared = np.ones((count, 1)), np.zeros((count, 0))
     if row is not None and len(row.residual) == count:  # else other sensors are among them
         shared = row.slope[:count]
         own = own if row.alone is None else np.column_stack([own, row.alone])
     every = np.column_stack([part.residual, part.changes, shared, own]) * weight[:, None]
-    done = np.concatenate([lfilter(taps, [1.0], piece, axis=0)[order:]
-                           for piece in np.split(every, part.begins[1:]) if len(piece)])
+    done = np.concatenate([every[:0], *(_convolved(piece, taps) for piece in np.split(every, part.begins[1:])
+                                        if len(piece) > order)])
     first, last = 1 + part.changes.shape[1], 1 + part.changes.shape[1] + shared.shape[1]
     basis = _basis(done[:, last:])
     done = done[:, :last] - basis @ (basis.T @ done[:, :last])
     return _Filtered(done[:, 0], done[:, 1:first], done[:, first:], basis.shape[1])
 
 
+def _convolved(values: Array, taps: Array) -> Array:
+    """Return values as filtered, less the first ones, of which not all are known that count."""
+    order = len(taps) - 1
+    found = taps[0] * values[order:]
+    for k in range(1, len(taps)):
+        found = found + taps[k] * values[order - k:len(values) - k]
+    return np.asarray(found)
+
+
 def _basis(columns: Array) -> Array:
     """Return unit vectors, a column each, that span some columns, whatever their sizes."""
     sizes = np.linalg.norm(columns, axis=0)
-    vectors, values, _ = np.linalg.svd(columns[:, sizes > 0.0] / sizes[sizes > 0.0], full_matrices=False)
-    return np.asarray(vectors[:, values > _NOTHING])
+    plane, corner = np.linalg.qr(columns[:, sizes > 0.0] / sizes[sizes > 0.0])  # far less work than of all samples
+    vectors, values, _ = np.linalg.svd(corner, full_matrices=False)
+    return np.asarray(plane @ vectors[:, values > _NOTHING])
 
 
 def _whitening(pieces: Sequence[Array]) -> Array:

@@ -84,6 +84,23 @@ def _bases(rows: Sequence[Rows], directions: Array) -> list[tuple[Array, Array]]
     return list(zip(joint, own, strict=True))
 
 
+def echo(columns: Array, rho: float) -> Array:
+    """Return columns y of columns x that go on by y_k = x_k + ρ y_(k−1), as first-order noise does.
+
+    Examples
+    --------
+    >>> echo(np.array([[1.0], [0.0], [0.0], [1.0]]), 0.5)[:, 0].tolist()
+    [1.0, 0.5, 0.25, 1.125]
+    """
+    from scipy.linalg import solve_banded  # scipy.signal, which has a filter for it, takes 0.7 s to load
+
+    if not columns.size:
+        return columns.copy()
+    bands = np.ones((2, len(columns)))
+    bands[1] = -rho
+    return np.asarray(solve_banded((1, 0), bands, columns))
+
+
 def _orthonormal(columns: Array) -> Array:
     size = np.sqrt(np.sum(columns**2, axis=0))
     vectors, values, _ = np.linalg.svd(columns[:, size > 0.0] / size[size > 0.0], full_matrices=False)
@@ -96,16 +113,13 @@ def _left(bases: Sequence[tuple[Array, Array]], rho: float) -> Array:
     With P = U Uᵀ the projection that a fit makes, R the noise's correlation and L the shift by one sample, they are the
     traces of (1 − P) R and of L (1 − P) R (1 − P).
     """
-    from scipy.signal import lfilter
-
     p = bases[0][0].shape[1]
     squares, products = 0.0, 0.0
     R_ss, L_ss = np.zeros((p, p)), np.zeros((p, p))
     for shared, own in bases:
         U = np.concatenate([shared, own], axis=1)
         n = len(U)
-        ahead = lfilter([1.0], [1.0, -rho], U, axis=0)
-        back = lfilter([1.0], [1.0, -rho], U[::-1], axis=0)[::-1]
+        ahead, back = echo(U, rho), echo(U[::-1], rho)[::-1]
         RU = ahead + back - U
         LU = np.zeros_like(U)
         LU[:-1] = U[1:]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.fitting.arrow import Loss, Prior
-from servotwin.identification.fitting.memory import NoiseMemory, memory_of
+from servotwin.identification.fitting.memory import NoiseMemory, echo, memory_of
 from servotwin.identification.fitting.point import LogPart
 
 Array = NDArray[np.float64]
@@ -261,14 +261,12 @@ def _varying(held: NDArray[np.bool_], vague: Array | None) -> Array:
 
 def _first_order(rows: Sequence[Rows], memory: NoiseMemory) -> Array:
     """Return the covariance of the gradient if residuals are first-order autoregressive."""
-    from scipy.signal import lfilter
-
     total = np.zeros((rows[0].slope.shape[1],) * 2)
     for r in rows:
         m = len(r.residual)
         g = r.slope[:m]
-        echo = lfilter([1.0], [1.0, -memory.correlation], g, axis=0)
-        total += memory.power * (echo.T @ g + g.T @ echo - g.T @ g) + r.slope[m:].T @ r.slope[m:]
+        later = echo(g, memory.correlation)
+        total += memory.power * (later.T @ g + g.T @ later - g.T @ g) + r.slope[m:].T @ r.slope[m:]
     return total
 
 

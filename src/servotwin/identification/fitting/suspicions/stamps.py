@@ -31,9 +31,9 @@ def wrong_stamps(looks: Sequence[Look]) -> list[Finding]:
     tell = sum(vote.tell for vote in votes)
     if not tell:
         return []
-    from scipy.stats import binom  # slow to load
+    from scipy.special import bdtrc
 
-    if binom.sf(sum(vote.beat for vote in votes) - 1, tell, _WRONG_VOTES) > _CHANCE:
+    if bdtrc(sum(vote.beat for vote in votes) - 1, tell, _WRONG_VOTES) > _CHANCE:
         return []
     return [_restamped(one, beat) for (one, beat), vote in zip(beats, votes, strict=True) if 2 * vote.beat >= vote.tell]
 
