@@ -114,6 +114,7 @@ def test_servos_without_registers_have_none_to_search(model):
     assert register_search(model, [log(robot="")]) is None
 
 
+@pytest.mark.long
 def test_registers_that_were_given_are_held_and_doubted():
     servo = st.feetech_sts({"P_Coefficient": 32, "Acceleration": 0}, servo=STS)
     assert known_registers(register_family_of(servo), servo) == {"P_Coefficient", "Acceleration"}
