@@ -54,10 +54,20 @@ def late(log: st.Log, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return time, command[row]
 
 
+def measured_of(log: st.Log) -> tuple[st.Log, np.ndarray]:
+    """Return a log from where its angle was measured first on, and which of its rows have one."""
+    first = int(np.argmax(np.isfinite(log.measured["output_angle"])))
+    log = log.part(float(log.time[first]), math.inf)
+    return log, np.isfinite(log.measured["output_angle"])
+
+
 def angle_of(log: st.Log, servo: Servo) -> np.ndarray:
     """Return what a log asks for as angles [rad], by the calibration in the servo file."""
-    return log.held if log.command_kind == "angle" else np.asarray(
-        default_model(servo).start_angle(st.signals.samples(log.time - log.start, log.held, unit="s")(log.time)))
+    if log.command_kind == "angle":
+        return log.held
+    model = default_model(servo)
+    drive = model.command(st.signals.samples(log.time - log.start, log.held, unit="s"))
+    return np.asarray(model.start_angle(drive(log.time - log.start)))
 
 
 def fit(logs: Sequence[st.Log], servo: Servo) -> Callable[[st.Log], float]:
@@ -84,6 +94,7 @@ def fit(logs: Sequence[st.Log], servo: Servo) -> Callable[[st.Log], float]:
         return spec.compile()
 
     def sequences(log: st.Log) -> object:
+        log, seen = measured_of(log)
         spec = hinge(log)
         model = spec.compile()
         data, measured = mujoco.MjData(model), log.measured["output_angle"]
@@ -92,7 +103,7 @@ def fit(logs: Sequence[st.Log], servo: Servo) -> Callable[[st.Log], float]:
         return sysid.ModelSequences(
             log.name, spec, log.name, sysid.create_initial_state(model, data.qpos, data.qvel, data.act),
             sysid.TimeSeries(time, command[:, None]),
-            sysid.TimeSeries.from_names(log.time - log.start, measured[:, None], model))
+            sysid.TimeSeries.from_names(log.time[seen] - log.start, measured[seen, None], model))
 
     numbers = sysid.ParameterDict()
     for name, (start, low, high) in NUMBERS.items():
@@ -102,6 +113,7 @@ def fit(logs: Sequence[st.Log], servo: Servo) -> Callable[[st.Log], float]:
         found, _ = sysid.optimize(numbers, residual, optimizer="mujoco", verbose=False, max_iters=STEPS)
 
     def error(log: st.Log) -> float:
+        log, _ = measured_of(log)
         model, measured = model_of(found, hinge(log)), log.measured["output_angle"]
         data = mujoco.MjData(model)
         data.qpos[:] = measured[0]
