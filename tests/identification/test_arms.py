@@ -131,7 +131,8 @@ def test_a_payload_is_named_and_none_where_only_single_joints_look_like_one():
     healthy = fitted([recorded(seed, 8.0) for seed in range(2)])
     episodes = episodes_from([recorded(0, 8.0)], JOINTS, dict.fromkeys(JOINTS, SERVO))
     what = Problem(PLANT, healthy.numbers, dynamics.links_of(PLANT, JOINTS), episodes,
-                   [used_rows(one) for one in episodes], lambda: None)
+                   [used_rows(one) for one in episodes], lambda: None,
+                   dynamics.Demand(PLANT, JOINTS, dynamics.links_of(PLANT, JOINTS)))
     arm, noise = what.whole(), Noise(np.array([healthy.noise[joint] for joint in JOINTS]), healthy.noise["clock"])
     slopes = [one.slopes for one in what.search(arm, noise).linear(healthy.best, central=True)]
     assert confirmed([ArmCause("masses", "as the first stage has it", 99.0)], what, arm, noise, healthy.best,
@@ -206,7 +207,8 @@ def test_derivatives_are_of_steps_that_an_arm_answers_by_about_its_noise():
     low = st.parameters.Supply(open_circuit_voltage=2.0, internal_resistance=None)
     numbers = Numbers({joint: Mount(st.DigitalServo(SERVO)) for joint in JOINTS}, (), low)
     episode = episodes_from([recorded(3, 8.0)], JOINTS, dict.fromkeys(JOINTS, SERVO))[0]
-    problem = Problem(PLANT, numbers, [], [episode], [used_rows(episode)], lambda: None)
+    problem = Problem(PLANT, numbers, [], [episode], [used_rows(episode)], lambda: None,
+                      dynamics.Demand(PLANT, JOINTS, []))
     search = problem.search(problem.lanes(), Noise(np.full(2, 5e-4), 0.0))
     k = numbers.names.index("motor.armature_resistance")
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.arms.copies import Copies
+from servotwin.identification.arms.dynamics import Demand
 from servotwin.identification.arms.episodes import Episode
 from servotwin.identification.arms.lanes import JointLanes
 from servotwin.identification.arms.numbers import Numbers
@@ -22,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 class Problem(NamedTuple):
-    """What is fitted: robot, numbers, links, episodes and their samples, and what is called while it lasts."""
+    """What is fitted: robot, numbers, links, episodes and their samples, what is called, and what motions ask for."""
 
     plant: Any
     numbers: Numbers
@@ -30,6 +31,7 @@ class Problem(NamedTuple):
     episodes: list[Episode]
     used: list[Mask]
     look: Callable[[], object]
+    demand: Demand
 
     @property
     def prior(self) -> Prior:
@@ -38,7 +40,7 @@ class Problem(NamedTuple):
 
     def lanes(self) -> JointLanes:
         """Return the joints one by one."""
-        return JointLanes(self.plant, self.numbers, self.links, self.look)
+        return JointLanes(self.plant, self.numbers, self.links, self.look, self.demand)
 
     def whole(self) -> WholeArm:
         """Return the whole robot."""

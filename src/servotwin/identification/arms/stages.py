@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
@@ -15,6 +15,7 @@ from servotwin.identification.arms.causes import causes_of, confirmed
 from servotwin.identification.arms.doubts import Doubts, doubts_of
 from servotwin.identification.arms.numbers import LATENCY, Numbers
 from servotwin.identification.arms.problem import Problem
+from servotwin.identification.arms.registers import arm_registers
 from servotwin.identification.arms.rows import (
     Linear,
     Noise,
@@ -27,7 +28,9 @@ from servotwin.identification.arms.rows import (
 )
 from servotwin.identification.arms.whole import WholeArm
 from servotwin.identification.arms.windows import LeftOut, strange_windows, without
+from servotwin.identification.fitting.registers import RegisterSearch
 from servotwin.identification.fitting.stopping import Stops
+from servotwin.robots import Mount
 
 Array = NDArray[np.float64]
 Show = Callable[[float, str], None]
@@ -61,6 +64,8 @@ class Way:
         What is not known yet.
     seconds : dict of str to float
         CPU time that each stage took.
+    registers : RegisterSearch, optional
+        What stands in registers that nobody recorded.
     """
 
     what: Problem
@@ -73,6 +78,7 @@ class Way:
     doubts: Doubts | None = None
     missing: list[str] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
+    registers: RegisterSearch | None = None
 
     def keep(self, other: Way, best: Array) -> None:
         """Take over what another one fits, with the best so far."""
@@ -93,17 +99,21 @@ class Way:
             self.seconds[stage] = clock.process_time() - began
 
 
-def searched(what: Problem, make: Callable[[Sequence[str]], Numbers], course: Stops, *, intervals: bool,
+def searched(what: Problem, make: Callable[[Sequence[str], Mapping[str, Mount]], Numbers], course: Stops, *, intervals: bool,
              diagnose: bool) -> Way:
     """Return where a fit ends; a stop ends the stage that it meets, and those that come after it are left out."""
     way = Way(what, what.numbers.start.copy(), Noise(np.zeros(0), 0.0))
     way.missing = [JOINTS_ALONE, *([CAUSES] if diagnose else []), *([WHOLE, INTERVALS] if intervals else [])]
     try:
+        with way.timed("registers"):
+            course(0.0, "registers")
+            way.registers, mounts = arm_registers(what, lambda having: make((), having))
+            what = what._replace(numbers=make((), mounts))
         with way.timed("first"):
             _first_stage(way, what, course)
         if diagnose:
             with way.timed("causes"):
-                _look_for_causes(way, make, course)
+                _look_for_causes(way, lambda gains: make(gains, mounts), course)
         with way.timed("second"):
             _second_stage(way, course, intervals=intervals)
     except KeyboardInterrupt:
