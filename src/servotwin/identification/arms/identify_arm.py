@@ -105,8 +105,8 @@ def identify_arm(logs: Any, robot: Any, servos: Any = None, *, bus: Supply | Non
     counted = counts_turns([one.time for one in episodes])
 
     def make(gains: Sequence[str] = (), having: Mapping[str, Mount] | None = None) -> Numbers:
-        return Numbers(having or mounts, link_names(plant, links), supply, each=each, free=free, zeros=zeros, gains=gains,
-                       masses=max(masses, 2.0) if robot == UNKNOWN else masses, counted=counted)
+        return Numbers(having or mounts, link_names(plant, links), supply, each=each, free=free, zeros=zeros,
+                       gains=gains, masses=max(masses, 2.0) if robot == UNKNOWN else masses, counted=counted)
 
     level, course = checks.checked_level(level), Stops(limit)
     count = _held_out(len(episodes), holdout)
@@ -178,7 +178,8 @@ def _late(share: float, std: float) -> list[str]:
 Tables = tuple[RobotValidation, RobotValidation, RobotValidation | None, RobotValidation | None]
 
 
-def _tables(what: Problem, x: Array, mounts: Mapping[str, Mount], fitted: Sequence[Motion], unseen: Sequence[Motion]) -> Tables:
+def _tables(what: Problem, x: Array, mounts: Mapping[str, Mount], fitted: Sequence[Motion],
+            unseen: Sequence[Motion]) -> Tables:
     """Return errors on fitted and unseen episodes, after the fit and before, with servos as they were given."""
     numbers, found = what.numbers, list[RobotValidation | None]()
     after = with_masses(what.plant, what.links, numbers.masses(x))

@@ -71,8 +71,8 @@ class JointLanes(Copies):
             tick.output_angle, tick.output_speed = angles + (k + 1) * row, speeds + (k + 1) * row
             entry.advance(tick)
         late = np.array([self.numbers.latency(x) for x in points])
-        found = _hermite(grid, *(some[:, same].reshape(-1, copies, joints) for some in (angle, speed)),
-                         time[:, None] - late)
+        angle, speed = (some[:, same].reshape(-1, copies, joints) for some in (angle, speed))
+        found = _hermite(grid, angle, speed, time[:, None] - late)
         return np.asarray(np.moveaxis(found, 0, 1) * self._gain + self._zero)
 
     def _asked(self, episode: Episode, points: Array, grid: Array) -> tuple[Array, Array]:
@@ -88,7 +88,7 @@ class JointLanes(Copies):
 
 
 def _alike(joints: int, torque: Array, inertia: Array, numbers: Mapping[str, Array]) -> tuple[Indices, Indices]:
-    """Return lanes that differ from all others, and which of these each lane is like: many a number moves few joints."""
+    """Return lanes that differ, and which of these each lane is like: many a number moves few joints."""
     lanes = torque.shape[1]
     rows = np.column_stack([np.arange(lanes) % joints, *(some for some in numbers.values() if some.dtype.kind == "f"),
                             np.round(torque.T, _DIGITS), np.round(inertia.T, _DIGITS)])

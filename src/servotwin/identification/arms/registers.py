@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,18 +20,16 @@ from servotwin.identification.fitting.registers import (
     RegisterSearch,
     State,
     Tried,
-    busiest,
     has_registers,
     numbers_apart,
     searched,
 )
 from servotwin.parameters import Servo
-from servotwin.parameters.registers.held import register_family_of
 from servotwin.robots import Mount
 
 Array = NDArray[np.float64]
 Make = Callable[[Mapping[str, Mount]], Numbers]
-_EPISODES = 2  # that are looked at, those in which goals go furthest
+_EPISODES, _SECONDS = 2, 12.0  # that are looked at, those in which goals go furthest, and of each [s]
 _MOVES = 0.05  # rad: a joint that moves less tells nothing
 
 
@@ -52,7 +49,7 @@ class _ArmBench(Bench):
         self.used = [used_rows(one)[:, 0] for one in self.episodes]
 
     def simplest(self, seen: Mapping[State, Tried]) -> list[State]:
-        """Return the states with as few choices as do not leave twice as much as others, those of fewest registers first."""
+        """Return the states with as few choices as do not leave twice what others do, of fewest registers first."""
         least = min(one.error for one in seen.values())
         few = min(state.choices for state, one in seen.items() if TAKEN * one.error <= least)
         some = {state: one for state, one in seen.items() if state.choices == few}
@@ -102,9 +99,8 @@ def arm_registers(what: Problem, make: Make) -> tuple[RegisterSearch | None, dic
     mounts = dict(what.numbers.mounts)
     if not has_registers([mount.model for mount in mounts.values()]):
         return None, mounts
-    count = register_family_of(next(iter(mounts.values())).model.servo).count
     episodes = sorted(what.episodes, key=lambda one: -float(np.abs(np.diff(one.goals, axis=0)).sum()))[:_EPISODES]
-    some = [_part(one, busiest(one.time, one.goals, one.measured, count)) for one in episodes]
+    some = what._replace(episodes=episodes).shorter(_SECONDS).episodes
     bench = _ArmBench(what, make, some)
     search = searched(bench, bench, names=[*mounts])
     if search is None:
@@ -113,11 +109,3 @@ def arm_registers(what: Problem, make: Make) -> tuple[RegisterSearch | None, dic
     servos = [search.joints[joint].servo if joint in search.joints else servo
               for joint, servo in zip(mounts, servos, strict=True)]
     return search, with_servos(mounts, servos)
-
-
-def _part(episode: Episode, span: tuple[float, float] | None) -> Episode:
-    if span is None:
-        return episode
-    rows = (episode.time >= span[0]) & (episode.time <= span[1])
-    return replace(episode, **{name: getattr(episode, name)[rows] for name in (
-        "time", "goals", "measured", "angle", "speed", "acceleration")})

@@ -35,6 +35,7 @@ from servotwin.robots import Mount
 Array = NDArray[np.float64]
 Show = Callable[[float, str], None]
 _ROUNDS, _STEPS = 2, 8  # of the first stage
+_SECONDS = 20.0  # of each episode, that its first round and the search for causes look at
 _WHOLE_TURNS, _WHOLE_STEPS = 2, 6  # of the second: derivatives, and steps by them
 _FAR = 1.0  # widths of a belief, over which derivatives change
 _TRIED = 1.5  # widths of a belief, that make causes be tried
@@ -99,8 +100,8 @@ class Way:
             self.seconds[stage] = clock.process_time() - began
 
 
-def searched(what: Problem, make: Callable[[Sequence[str], Mapping[str, Mount]], Numbers], course: Stops, *, intervals: bool,
-             diagnose: bool) -> Way:
+def searched(what: Problem, make: Callable[[Sequence[str], Mapping[str, Mount]], Numbers], course: Stops, *,
+             intervals: bool, diagnose: bool) -> Way:
     """Return where a fit ends; a stop ends the stage that it meets, and those that come after it are left out."""
     way = Way(what, what.numbers.start.copy(), Noise(np.zeros(0), 0.0))
     way.missing = [JOINTS_ALONE, *([CAUSES] if diagnose else []), *([WHOLE, INTERVALS] if intervals else [])]
@@ -122,11 +123,12 @@ def searched(what: Problem, make: Callable[[Sequence[str], Mapping[str, Mount]],
 
 
 def _first_stage(way: Way, what: Problem, show: Show) -> None:
-    """Search with lanes of single joints, and leave out what no numbers explain."""
+    """Search with lanes of single joints, of parts of long episodes first, and leave out what no numbers explain."""
     lanes, x, steps = what.lanes(), what.numbers.start.copy(), usual_steps(what.numbers)
     windows: tuple[LeftOut, ...] = ()
     for turn in range(_ROUNDS):
-        noise = noise_of(what.episodes, what.left(lanes, x), what.used)
+        some = what if turn else what.shorter(_SECONDS)
+        noise = noise_of(some.episodes, some.left(lanes, x), some.used)
         now = Way(what, x, noise, left_out=windows)
 
         def tell(step: int, best: Array, now: Way = now, turn: int = turn) -> None:
@@ -134,7 +136,7 @@ def _first_stage(way: Way, what: Problem, show: Show) -> None:
                 way.keep(now, best)
             show(0.4 * (turn + step / _STEPS) / _ROUNDS, "joints one by one")
 
-        search = what.search(lanes, noise, steps=steps)
+        search = some.search(lanes, noise, steps=steps)
         x, steps = search.run(x, most=_STEPS, tell=tell), search.steps
         if turn == 0:
             left = what.left(lanes, x)
@@ -151,7 +153,7 @@ def _look_for_causes(way: Way, make: Callable[[Sequence[str]], Numbers], show: S
     off = np.abs(way.x - what.numbers.start) * what.numbers.weight
     if off.max() >= _TRIED or noise.positions.max() >= _NOISY:
         show(0.4, "causes")
-        way.causes = causes_of(what, noise, way.x, make)
+        way.causes = causes_of(what.shorter(_SECONDS), noise, way.x, make)
     if way.causes and way.causes[0].joints:  # what the wrong gain has bent is found anew with that gain searched
         _first_stage(way, what._replace(numbers=make(way.causes[0].joints),
                                         used=[used_rows(one) for one in what.episodes]), show)

@@ -175,10 +175,9 @@ class RegisterSearch:
             said.append(f"registers that nobody recorded are not as the servo file has them: as if with "
                         f"{self.taken.said}, {_degrees(self.taken.error)} instead of {_degrees(self.given.error)} are "
                         f"left before anything is fitted{more}; read them back, or say them by --register")
-        said += [f"the servo of {joint} has other registers than the others: as if with "
-                 f"{_words(one.registers, ())}, {_degrees(one.error)} instead of "
-                 f"{_degrees(one.with_those_of_others)} are left of it before anything is fitted; read them back, or say "
-                 "them by --register" for joint, one in self.joints.items()]
+        said += [f"the servo of {joint} has other registers than the others: as if with {_words(one.registers, ())}, "
+                 f"{_degrees(one.error)} instead of {_degrees(one.with_those_of_others)} are left of it before "
+                 "anything is fitted; read them back" for joint, one in self.joints.items()]
         if self.doubted is not None:
             left = (self.taken or self.given).error
             said.append(f"the registers that were given are doubtful: as if with {self.doubted.said}, "
@@ -246,6 +245,7 @@ class State(NamedTuple):
         return len(self.varied) + (self.first != _AS_GIVEN.name)
 
     def having(self, name: str, value: int | None) -> State:
+        """Return a state in which one register has another value."""
         return self._replace(varied=(*((n, v) for n, v in self.varied if n != name), (name, value)))
 
 
@@ -471,8 +471,8 @@ def register_search(model: Model, logs: Sequence[Log]) -> RegisterSearch | None:
     seen = sorted(seen, key=lambda log: -float(np.nanstd(log.measured["output_angle"])))[:_LOGS]
     if not seen:
         return None
-    bench, count = _LogBench(model, seen), register_family_of(model.servo).count
-    spans = [busiest(log.time, log.held[:, None], log.measured["output_angle"][:, None], count) for log in seen]
+    bench, still = _LogBench(model, seen), _RESTS * register_family_of(model.servo).count
+    spans = [busiest(log.time, log.held[:, None], log.measured["output_angle"][:, None], still) for log in seen]
     some = [log if span is None else log.part(*span) for log, span in zip(seen, spans, strict=True)]
     first = bench if spans == [None] * len(seen) else _LogBench(model, some)
     return searched(first, bench, _recorded(seen, tuple(bench.varied.values())))
@@ -489,8 +489,8 @@ def searched(first: Bench, bench: Bench, recorded: frozenset[str] = frozenset(),
              names: Sequence[str] = ()) -> RegisterSearch | None:
     """Return what stands in registers; None where servos as they were given cannot be simulated.
 
-    Those that somebody said for a servo, or that were recorded, are held, and doubted where others would leave less than
-    half.
+    Those that somebody said for a servo, or that were recorded, are held, and doubted where others would leave less
+    than half.
 
     Parameters
     ----------
@@ -523,8 +523,8 @@ def searched(first: Bench, bench: Bench, recorded: frozenset[str] = frozenset(),
 def _odd_joints(bench: Bench, state: State, known: frozenset[str], names: Sequence[str]) -> dict[str, OddJoint]:
     """Return servos that are clearly less off with another value in one register than all others have it.
 
-    That is less than half of what is left, and of what it leaves of the others: a value that does all of them good makes
-    up for wrong numbers that they share.
+    That is less than half of what is left, and of what it leaves of the others: a value that does all of them good
+    makes up for wrong numbers that they share.
     """
     here = bench.tried([state])[0]
     free = [one for one in bench.varied.values() if not known & {*one.registers}]
@@ -541,7 +541,8 @@ def _odd_joints(bench: Bench, state: State, known: frozenset[str], names: Sequen
     return found
 
 
-def busiest(time: Array, goals: Array, angles: Array, count: float) -> tuple[float, float] | None:
+def busiest(time: Array, goals: Array, angles: Array, still: float,
+            seconds: float = _SECONDS) -> tuple[float, float] | None:
     """Return start and end of the part in which goals go furthest, from rest on [s]; None of what is short.
 
     In motion nobody knows where the profile of the program stands.
@@ -551,18 +552,20 @@ def busiest(time: Array, goals: Array, angles: Array, count: float) -> tuple[flo
     time : ndarray, shape (n,)
     goals, angles : ndarray, shape (n, servos)
         [rad]
-    count : float
-        Step of the encoder [rad].
+    still : float
+        By how much a shaft that rests may move between samples [rad].
+    seconds : float
+        Of the part.
     """
-    if time[-1] - time[0] <= _SECONDS:
+    if time[-1] - time[0] <= seconds:
         return None
     ways = np.abs(np.diff(goals, axis=0)).sum(axis=1)
     way = np.concatenate([[0.0], np.cumsum(ways)])
     steps = np.abs(np.diff(angles, axis=0, prepend=angles[:1])).max(axis=1)
-    moved = (steps > _RESTS * count) | (np.diff(way, prepend=0.0) > 0.0)
+    moved = (steps > still) | (np.diff(way, prepend=0.0) > 0.0)
     last_moved = np.maximum.accumulate(np.where(moved, time, time[0]))
-    ends = np.searchsorted(time, time + _SECONDS, side="right") - 1
-    rests = (time - last_moved >= _RESTED) & (time <= time[-1] - _SECONDS)
+    ends = np.searchsorted(time, time + seconds, side="right") - 1
+    rests = (time - last_moved >= _RESTED) & (time <= time[-1] - seconds)
     rests[0] = True
     first = int(np.argmax(np.where(rests, way[ends] - way, -1.0)))
     return float(time[first]), float(time[ends[first]])
