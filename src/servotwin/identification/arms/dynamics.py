@@ -58,19 +58,31 @@ class Demand:
         self.model, self.joints, self.links = model, [*joints], [*links]
         self._known: dict[tuple[int, ...], _Known] = {}
 
-    def torques(self, episode: Episode, zeros: Array, factors: Array) -> tuple[Array, Array]:
-        """Return torque [N m] and inertia [kg m²] at each joint, shape (n, joints), for zeros and factors on masses."""
-        key = (id(episode), *np.round(zeros / _NEAR).astype(int).tolist())
+    def torques(self, episode: Episode, zeros: Array, factors: Array) -> list[tuple[Array, Array]]:
+        """Return torque [N m] and inertia [kg m²] at the joints, shape (n, joints) each, of several copies.
+
+        All of them are about the zeros near those of the first one, so that differences of copies have no steps.
+
+        Parameters
+        ----------
+        episode : Episode
+        zeros : ndarray, shape (copies, joints)
+            [rad]
+        factors : ndarray, shape (copies, links)
+        """
+        key = (id(episode), *np.round(zeros[0] / _NEAR).astype(int).tolist())
         if key not in self._known:
-            self._known[key] = _Known(episode, zeros, self._asked(episode, zeros), {})
-        known = self._known[key]
-        torque, inertia = known.base.of(factors)
-        for j in np.flatnonzero(zeros != known.zeros).tolist():
-            if j not in known.slopes:
-                moved = known.zeros + _NUDGE * (np.arange(len(zeros)) == j)
-                known.slopes[j] = (self._asked(episode, moved).torque - known.base.torque) / _NUDGE
-            torque = torque + (zeros[j] - known.zeros[j]) * (known.slopes[j] @ factors)
-        return torque, inertia
+            self._known[key] = _Known(episode, zeros[0], self._asked(episode, zeros[0]), {})
+        known, found = self._known[key], []
+        for off, masses in zip(zeros - known.zeros, factors, strict=True):
+            torque, inertia = known.base.of(masses)
+            for j in np.flatnonzero(off).tolist():
+                if j not in known.slopes:
+                    moved = known.zeros + _NUDGE * (np.arange(len(off)) == j)
+                    known.slopes[j] = (self._asked(episode, moved).torque - known.base.torque) / _NUDGE
+                torque = torque + off[j] * (known.slopes[j] @ masses)
+            found.append((torque, inertia))
+        return found
 
     def _asked(self, episode: Episode, zeros: Array) -> Asked:
         return asked_of(self.model, self.joints, self.links, episode.angle + zeros, episode.speed,

@@ -22,7 +22,7 @@ from servotwin.simulation import VectorSimulator
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 _PARTS = 2  # of a sample: over each of them the torque stays
-_DIGITS = 9  # of torques [N m] and inertias [kg m²] that tell lanes apart
+_DIGITS = 12  # of torques [N m] and inertias [kg m²] that tell lanes apart
 
 
 class JointLanes(Copies):
@@ -78,8 +78,8 @@ class JointLanes(Copies):
     def _asked(self, episode: Episode, points: Array, grid: Array) -> tuple[Array, Array]:
         """Return external torques and inertias at the servos between the times of a grid, shape (parts, lanes)."""
         middles, found = 0.5 * (grid[1:] + grid[:-1]), []
-        for x in points:
-            torque, inertia = self.demand.torques(episode, self.numbers.zeros(x), self.numbers.masses(x))
+        zeros, masses = (np.array([of(x) for x in points]) for of in (self.numbers.zeros, self.numbers.masses))
+        for x, (torque, inertia) in zip(points, self.demand.torques(episode, zeros, masses), strict=True):
             late = middles + self.numbers.latency(x)
             found.append([np.stack([np.interp(late, episode.time, column) for column in some.T], axis=1)
                           for some in (torque * self._gain, inertia * self._gain**2)])
