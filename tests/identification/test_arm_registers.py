@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 import servotwin as st
+from reference import arm_rig as rig
+from reference import arm_rig_recorder as recorder
+from reference.arm_rig_fits import FREE, files_of
 from robots.robots_cases import links
 from servotwin.identification.arms import dynamics
 from servotwin.identification.arms.episodes import episodes_from
@@ -15,7 +18,7 @@ from servotwin.identification.arms.registers import arm_registers
 from servotwin.identification.arms.rows import used_rows
 from servotwin.parameters.registers.held import register_family_of
 from servotwin.parameters.registers.table import set_registers, written
-from servotwin.robots import Motion, Mount, run_motion
+from servotwin.robots import Motion, Mount, robot_model, run_motion
 
 mujoco = pytest.importorskip("mujoco", reason="the extra `robots` is not installed")
 JOINTS, COUNT, SECONDS = ("shoulder", "elbow"), 2.0 * math.pi / 4096.0, 6.0
@@ -104,3 +107,38 @@ def test_servos_without_registers_have_none_to_search():
     numbers = Numbers({joint: Mount(st.PulseServo(servo)) for joint in JOINTS}, (), BUS)
     problem = Problem(PLANT, numbers, [], [], [], lambda: None, dynamics.Demand(PLANT, JOINTS, []))
     assert arm_registers(problem, lambda mounts: numbers) == (None, numbers.mounts)
+
+
+def unsaid(servo, registers):
+    """Return a servo of the rig's files of whose registers nobody said anything."""
+    plain = servo.replace({name: None for name in servo.names() if name.startswith("firmware.")})
+    return set_registers(register_family_of(servo), registers, plain, assumed=True)
+
+
+@pytest.mark.long
+@pytest.mark.skipif(rig.compiler() is None, reason="no C compiler")
+@pytest.mark.parametrize(("seed", "believed", "odd", "P", "alone"), [
+    (520, "lerobot", None, 16, {}), (521, {}, None, 16, {}), (522, "lerobot", 3, 16, {"wrist_flex": 8}),
+    (523, {}, 1, 16, {"shoulder_lift": 8}),
+])
+def test_registers_of_an_arm_that_others_simulated(tmp_path, seed, believed, odd, P, alone):
+    """An SO-101 with LeRobot's registers, in one servo half of P; masses, servos and stamps are not as files say."""
+    truth = rig.random_truth(rig.SO101, "feetech", seed)
+    truth = truth if odd is None else rig.with_wrong_gain(truth, odd, 0.5)
+    made, joints = recorder.record(truth, 20.0, "mixed"), truth.robot.joints
+    (tmp_path / "so101.xml").write_text(rig.mjcf(truth.robot))
+    plant = robot_model(tmp_path / "so101.xml")
+    motion = Motion(time=made.time, angles=dict(zip(joints, made.action.T, strict=True)), source="rig",
+                    measured=dict(zip(joints, made.state.T, strict=True)))
+    mounts = {joint: Mount(st.DigitalServo(unsaid(servo, believed))) for joint, servo in files_of(truth).items()}
+    bodies, episodes = dynamics.links_of(plant, joints), episodes_from([motion], joints, mounts)
+
+    def make(mounts):
+        return Numbers(mounts, dynamics.link_names(plant, bodies), BUS, free=FREE)
+
+    found, after = arm_registers(Problem(plant, make(mounts), bodies, episodes, [used_rows(one) for one in episodes],
+                                         lambda: None, dynamics.Demand(plant, joints, bodies)), make)
+    raw = {joint: written(register_family_of(LEROBOT), mount.model.servo) for joint, mount in after.items()}
+    assert {joint: one["P_Coefficient"] for joint, one in raw.items()} == {joint: P for joint in joints} | alone
+    assert {one["Acceleration"] for one in raw.values()} == {254}
+    assert {joint: one.registers["P_Coefficient"] for joint, one in found.joints.items()} == alone

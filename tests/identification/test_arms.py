@@ -14,6 +14,7 @@ from servotwin.identification.arms.arm_fit import BELIEFS, ArmCause
 from servotwin.identification.arms.causes import confirmed
 from servotwin.identification.arms.doubts import shaken
 from servotwin.identification.arms.episodes import episodes_from
+from servotwin.identification.arms.lanes import JointLanes
 from servotwin.identification.arms.numbers import Numbers
 from servotwin.identification.arms.problem import Problem
 from servotwin.identification.arms.rows import Noise, beyond_scatter, used_rows, whitened
@@ -181,6 +182,23 @@ def test_a_fit_simulates_what_a_run_does():
         told = run.record[joint]["joint_command"]
         begun = run.time - run.model.opt.timestep
         np.testing.assert_allclose(told[np.searchsorted(begun, motion.time - 1e-6)], motion.angles[joint], atol=1e-9)
+
+
+def test_copies_are_what_each_of_them_is_alone():
+    """Copies of which a number moves one joint only share the lanes of the others."""
+    bodies = dynamics.links_of(PLANT, JOINTS)
+    numbers = Numbers({joint: Mount(st.DigitalServo(SERVO)) for joint in JOINTS}, dynamics.link_names(PLANT, bodies),
+                      BUS, each=True)
+    episode = episodes_from([recorded(0, 3.0)], JOINTS, dict.fromkeys(JOINTS, SERVO))[0]
+    lanes = JointLanes(PLANT, numbers, bodies, lambda: None, dynamics.Demand(PLANT, JOINTS, bodies))
+    points = numbers.start + 0.01 * np.vstack([np.zeros(len(numbers)), np.eye(len(numbers))])
+    found = lanes.angles(episode, points)
+    for k in range(0, len(points), 5):
+        np.testing.assert_allclose(found[k], lanes.angles(episode, points[k:k + 1])[0], atol=1e-9)
+    moved = np.abs(found - found[0]).max(axis=1)
+    assert (moved.max(axis=0) > 0.0).all()
+    own = [k for k, name in enumerate(numbers.names) if name.startswith("elbow: ")]
+    np.testing.assert_array_equal(moved[1:][own, 0], 0.0)
 
 
 def test_rows_are_whitened_by_positions_and_clock():
