@@ -6,7 +6,6 @@ import time as clock
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -170,20 +169,17 @@ def _second_stage(way: Way, show: Show, *, intervals: bool) -> None:
         way.know(CAUSES)
         return
 
-    def tell(step: int, best: Array, begins: float = 0.4) -> None:
-        way.x = best
-        show(begins + 0.05 * step / _WHOLE_STEPS, "the whole robot")
-
-    tell(0, way.x)  # derivatives of single joints cost little, and lead near
-    near = what.search(what.lanes(), noise, steps=way.steps).linear(way.x)
-    way.x = what.search(arm, noise).along(way.x, [one.slopes for one in near], most=_WHOLE_STEPS, tell=tell)
     for turn in range(_WHOLE_TURNS):
+        def tell(step: int, best: Array, turn: int = turn) -> None:
+            way.x = best
+            show(0.6 + 0.2 * turn + 0.05 * step / _WHOLE_STEPS, "the whole robot")
+
         show(0.45 + 0.2 * turn, "the whole robot")
         search, x = what.search(arm, noise, steps=way.steps), way.x
         steps, linear = search.steps, search.linear(x, central=True)
         slopes, shakes = _clean(what, linear, noise), [one.scatter * steps for one in linear]
         way.steps = search.steps
-        way.x = search.along(x, slopes, most=_WHOLE_STEPS, tell=partial(tell, begins=0.6 + 0.2 * turn))
+        way.x = search.along(x, slopes, most=_WHOLE_STEPS, tell=tell)
         far = float(np.abs((way.x - x) * np.where(what.numbers.weight > 0.0, what.numbers.weight, 1.0)).max())
         if far < _FAR:
             break
