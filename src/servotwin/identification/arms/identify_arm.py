@@ -46,9 +46,9 @@ def identify_arm(logs: Any, robot: Any, servos: Any = None, *, bus: Supply | Non
     """Fit the servos of a robot, their supply, the masses of its links, the zeros of its joints and the loop's latency.
 
     Registers of bus servos that nobody recorded are tried first, all servos alike and single ones; those that leave
-    less than half of the error are fitted from, and a warning says so. In a first stage every joint is a lane, under the
-    torque and inertia that the measured motion of all joints asks of it; a second one drives the whole robot, with copies
-    in which one number is moved, and gives errors and intervals.
+    less than half of the error are fitted from, and a warning says so. In a first stage every joint is a lane,
+    under the torque and inertia that the measured motion of all joints asks of it; a second one drives the whole
+    robot, with copies in which one number is moved, and gives errors and intervals.
 
     Parameters
     ----------
