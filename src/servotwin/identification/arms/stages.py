@@ -35,7 +35,7 @@ from servotwin.robots import Mount
 Array = NDArray[np.float64]
 Show = Callable[[float, str], None]
 _ROUNDS, _STEPS = 2, 8  # of the first stage
-_SECONDS = 20.0  # of each episode, that its first round and the search for causes look at
+_SECONDS = 20.0  # of each episode, that the search for causes looks at
 _WHOLE_TURNS, _WHOLE_STEPS = 2, 6  # of the second: derivatives, and steps by them
 _FAR = 1.0  # widths of a belief, over which derivatives change
 _TRIED = 1.5  # widths of a belief, that make causes be tried
@@ -123,12 +123,11 @@ def searched(what: Problem, make: Callable[[Sequence[str], Mapping[str, Mount]],
 
 
 def _first_stage(way: Way, what: Problem, show: Show) -> None:
-    """Search with lanes of single joints, of parts of long episodes first, and leave out what no numbers explain."""
+    """Search with lanes of single joints, and leave out what no numbers explain."""
     lanes, x, steps = what.lanes(), what.numbers.start.copy(), usual_steps(what.numbers)
     windows: tuple[LeftOut, ...] = ()
     for turn in range(_ROUNDS):
-        some = what if turn else what.shorter(_SECONDS)
-        noise = noise_of(some.episodes, some.left(lanes, x), some.used)
+        noise = noise_of(what.episodes, what.left(lanes, x), what.used)
         now = Way(what, x, noise, left_out=windows)
 
         def tell(step: int, best: Array, now: Way = now, turn: int = turn) -> None:
@@ -136,7 +135,7 @@ def _first_stage(way: Way, what: Problem, show: Show) -> None:
                 way.keep(now, best)
             show(0.4 * (turn + step / _STEPS) / _ROUNDS, "joints one by one")
 
-        search = some.search(lanes, noise, steps=steps)
+        search = what.search(lanes, noise, steps=steps)
         x, steps = search.run(x, most=_STEPS, tell=tell), search.steps
         if turn == 0:
             left = what.left(lanes, x)
