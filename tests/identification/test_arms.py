@@ -14,6 +14,7 @@ from servotwin.identification.arms.arm_fit import BELIEFS, ArmCause
 from servotwin.identification.arms.causes import confirmed
 from servotwin.identification.arms.doubts import shaken
 from servotwin.identification.arms.episodes import episodes_from
+from servotwin.identification.arms.lanes import JointLanes
 from servotwin.identification.arms.numbers import Numbers
 from servotwin.identification.arms.problem import Problem
 from servotwin.identification.arms.rows import Noise, beyond_scatter, used_rows, whitened
@@ -131,7 +132,8 @@ def test_a_payload_is_named_and_none_where_only_single_joints_look_like_one():
     healthy = fitted([recorded(seed, 8.0) for seed in range(2)])
     episodes = episodes_from([recorded(0, 8.0)], JOINTS, dict.fromkeys(JOINTS, SERVO))
     what = Problem(PLANT, healthy.numbers, dynamics.links_of(PLANT, JOINTS), episodes,
-                   [used_rows(one) for one in episodes], lambda: None)
+                   [used_rows(one) for one in episodes], lambda: None,
+                   dynamics.Demand(PLANT, JOINTS, dynamics.links_of(PLANT, JOINTS)))
     arm, noise = what.whole(), Noise(np.array([healthy.noise[joint] for joint in JOINTS]), healthy.noise["clock"])
     slopes = [one.slopes for one in what.search(arm, noise).linear(healthy.best, central=True)]
     assert confirmed([ArmCause("masses", "as the first stage has it", 99.0)], what, arm, noise, healthy.best,
@@ -182,6 +184,23 @@ def test_a_fit_simulates_what_a_run_does():
         np.testing.assert_allclose(told[np.searchsorted(begun, motion.time - 1e-6)], motion.angles[joint], atol=1e-9)
 
 
+def test_copies_are_what_each_of_them_is_alone():
+    """Copies of which a number moves one joint only share the lanes of the others."""
+    bodies = dynamics.links_of(PLANT, JOINTS)
+    numbers = Numbers({joint: Mount(st.DigitalServo(SERVO)) for joint in JOINTS}, dynamics.link_names(PLANT, bodies),
+                      BUS, each=True)
+    episode = episodes_from([recorded(0, 3.0)], JOINTS, dict.fromkeys(JOINTS, SERVO))[0]
+    lanes = JointLanes(PLANT, numbers, bodies, lambda: None, dynamics.Demand(PLANT, JOINTS, bodies))
+    points = numbers.start + 0.01 * np.vstack([np.zeros(len(numbers)), np.eye(len(numbers))])
+    found = lanes.angles(episode, points)
+    for k in range(0, len(points), 5):
+        np.testing.assert_allclose(found[k], lanes.angles(episode, points[k:k + 1])[0], atol=1e-9)
+    moved = np.abs(found - found[0]).max(axis=1)
+    assert (moved.max(axis=0) > 0.0).all()
+    own = [k for k, name in enumerate(numbers.names) if name.startswith("elbow: ")]
+    np.testing.assert_array_equal(moved[1:][own, 0], 0.0)
+
+
 def test_rows_are_whitened_by_positions_and_clock():
     class Row:
         speed = np.array([[1.0, -2.0, 0.5]])
@@ -206,7 +225,8 @@ def test_derivatives_are_of_steps_that_an_arm_answers_by_about_its_noise():
     low = st.parameters.Supply(open_circuit_voltage=2.0, internal_resistance=None)
     numbers = Numbers({joint: Mount(st.DigitalServo(SERVO)) for joint in JOINTS}, (), low)
     episode = episodes_from([recorded(3, 8.0)], JOINTS, dict.fromkeys(JOINTS, SERVO))[0]
-    problem = Problem(PLANT, numbers, [], [episode], [used_rows(episode)], lambda: None)
+    problem = Problem(PLANT, numbers, [], [episode], [used_rows(episode)], lambda: None,
+                      dynamics.Demand(PLANT, JOINTS, []))
     search = problem.search(problem.lanes(), Noise(np.full(2, 5e-4), 0.0))
     k = numbers.names.index("motor.armature_resistance")
 

@@ -40,7 +40,7 @@ def class_of(name: str, among: Sequence[str] | None = None) -> type[Model]:
 
 
 def model_of(servo: str, name: str | None, change: Sequence[str], among: Sequence[str] | None = None,
-             register: Sequence[str] = (), supply: str | None = None) -> Model:
+             register: Sequence[str] = (), supply: str | None = None, assumed: Sequence[str] = ()) -> Model:
     """Return the model of a servo.
 
     Parameters
@@ -57,6 +57,8 @@ def model_of(servo: str, name: str | None, change: Sequence[str], among: Sequenc
         Words of `--register`; they come first.
     supply : str, optional
         Words of `--supply`; what `--set` says comes after it.
+    assumed : sequence of str
+        Sets of registers that nobody said; those of `--register` go before them.
 
     Raises
     ------
@@ -71,11 +73,12 @@ def model_of(servo: str, name: str | None, change: Sequence[str], among: Sequenc
     from servotwin.models import default_model
 
     kind = None if name is None else class_of(name, among)
-    changed = servo_of(servo, change, register, supply)
+    changed = servo_of(servo, change, register, supply, assumed)
     return default_model(changed) if kind is None else kind(changed)
 
 
-def servo_of(servo: str, change: Sequence[str], register: Sequence[str] = (), supply: str | None = None) -> Servo:
+def servo_of(servo: str, change: Sequence[str], register: Sequence[str] = (), supply: str | None = None,
+             assumed: Sequence[str] = ()) -> Servo:
     """Return a servo with the registers of `--register`, on the supply of `--supply`, as `--set` changes it.
 
     Examples
@@ -86,8 +89,13 @@ def servo_of(servo: str, change: Sequence[str], register: Sequence[str] = (), su
     from servotwin.cli.register_words import with_registers
     from servotwin.cli.settings import settings
     from servotwin.parameters import load_servo
+    from servotwin.parameters.registers.held import register_family_of
+    from servotwin.parameters.registers.table import set_registers
 
-    known = found = with_registers(load_servo(servo), register)
+    plain = load_servo(servo)
+    for name in assumed:
+        plain = set_registers(register_family_of(plain), name, plain, assumed=True)
+    known = found = with_registers(plain, register)
     if supply is not None:
         from servotwin.datasheet.conditions import on_supply
         from servotwin.parameters import Supply

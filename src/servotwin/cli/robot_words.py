@@ -29,7 +29,7 @@ _ARM_SERVO = "feetech-sts3215-12v"
 
 
 class Chosen(NamedTuple):
-    """A servo of the catalog or a file, and words for registers that it has from the start."""
+    """A servo of the catalog or a file, and sets of registers that it is assumed to have."""
 
     servo: str
     registers: Sequence[str] = ()
@@ -164,7 +164,7 @@ def models_of(chosen: Mapping[str, Chosen], model: str | None, change: Sequence[
     for joint, (servo, own) in chosen.items():
         key = servo, tuple(own)
         if key not in made:
-            made[key] = model_of(servo, model, change, MODELS, [*own, *register])
+            made[key] = model_of(servo, model, change, MODELS, register, assumed=own)
         found[joint] = made[key]
     return found
 

@@ -15,6 +15,7 @@ from servotwin.identification.arms.numbers import Numbers
 from servotwin.identification.arms.windows import LeftOut
 from servotwin.identification.fitting.checks import checked_level
 from servotwin.identification.fitting.fit import Interval
+from servotwin.identification.fitting.registers import RegisterSearch
 from servotwin.identification.fitting.uncertainty import Uncertainty
 from servotwin.identification.fitting.words import Unidentifiable
 from servotwin.parameters import Servo, Supply
@@ -77,6 +78,8 @@ class ArmFit:
         Whether it was stopped before its end.
     unknown : tuple of str
         What is not known because of that.
+    registers : RegisterSearch, optional
+        Of bus servos of one family: what stands in registers that nobody recorded.
     """
 
     model: Any = field(repr=False)
@@ -106,6 +109,7 @@ class ArmFit:
     level: float = 0.95
     interrupted: bool = False
     unknown: tuple[str, ...] = ()
+    registers: RegisterSearch | None = field(default=None, repr=False)
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -174,7 +178,8 @@ class ArmFit:
             "before_unseen": told(self.before_holdout), "noise": dict(self.noise),
             "left_out": [window._asdict() for window in self.left_out],
             "causes": [cause._asdict() for cause in self.causes], "warnings": list(self.warnings),
-            "interrupted": self.interrupted, "unknown": list(self.unknown), "cpu_seconds": dict(self.stages)}
+            "interrupted": self.interrupted, "unknown": list(self.unknown),
+            "registers": None if self.registers is None else self.registers.facts, "cpu_seconds": dict(self.stages)}
 
     def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write an HTML page.

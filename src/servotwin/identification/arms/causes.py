@@ -102,7 +102,7 @@ def _named(name: str, what: Problem, search: ArmSearch, ended: Array, here: floa
     gain = here - search.costs(ended[None])[0] if sentence else 0.0
     if gain <= max(_LEAST_GAIN, _LEAST_SHARE * here):
         return []
-    joints = tuple(what.numbers.names[k].removeprefix("gain.") for k in loose) if name == _GAIN else ()
+    joints = tuple(_other_gains(what.numbers, ended, loose)) if name == _GAIN else ()
     return [ArmCause(name, sentence, gain, joints)]
 
 
@@ -142,9 +142,14 @@ def _loose(name: str, numbers: Numbers) -> list[int]:
     return [k for k, one in enumerate(numbers.names) if one.startswith(begin)]
 
 
+def _other_gains(numbers: Numbers, x: Array, loose: Sequence[int]) -> dict[str, float]:
+    """Return the joints whose gain ended clearly elsewhere than their registers say, and how many times that is."""
+    return {numbers.names[k].removeprefix("gain."): math.exp(x[k]) for k in loose if abs(x[k]) >= 2.0 * _APART}
+
+
 def _gain_words(numbers: Numbers, x: Array, loose: Sequence[int]) -> str:
-    ratios = {numbers.names[k].removeprefix("gain."): math.exp(x[k]) for k in loose}
-    if all(abs(math.log(ratio)) < 2.0 * _APART for ratio in ratios.values()):
+    ratios = _other_gains(numbers, x, loose)
+    if not ratios:
         return ""
     said = ", ".join(f"{ratio:.2g} times ({joint}{_register(numbers, joint, ratio)})"
                      for joint, ratio in ratios.items())

@@ -11,15 +11,17 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.identification.arms.episodes import Episode
 from servotwin.robots.coupling import couple, couplings_of
 from servotwin.robots.places import load_mujoco
 
 Array = NDArray[np.float64]
+_NUDGE, _NEAR = 0.01, 0.05  # rad
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +42,60 @@ class Asked:
     def of(self, factors: Array) -> tuple[Array, Array]:
         """Return torque and inertia of all links whose masses are so many times those of the model."""
         return self.torque @ factors, self.inertia @ factors
+
+
+class Demand:
+    """What motions of a robot ask of its joints, of zeros near those that were asked for before: worked out once.
+
+    Parameters
+    ----------
+    model : MjModel
+    joints : sequence of str
+    links : sequence of int
+    """
+
+    def __init__(self, model: Any, joints: Sequence[str], links: Sequence[int]) -> None:
+        self.model, self.joints, self.links = model, [*joints], [*links]
+        self._known: dict[tuple[int, ...], _Known] = {}
+
+    def torques(self, episode: Episode, zeros: Array, factors: Array) -> list[tuple[Array, Array]]:
+        """Return torque [N m] and inertia [kg m²] at the joints, shape (n, joints) each, of several copies.
+
+        All of them are about the zeros near those of the first one, so that differences of copies have no steps.
+
+        Parameters
+        ----------
+        episode : Episode
+        zeros : ndarray, shape (copies, joints)
+            [rad]
+        factors : ndarray, shape (copies, links)
+        """
+        key = (id(episode), *np.round(zeros[0] / _NEAR).astype(int).tolist())
+        if key not in self._known:
+            self._known[key] = _Known(episode, zeros[0], self._asked(episode, zeros[0]), {})
+        known, found = self._known[key], []
+        for off, masses in zip(zeros - known.zeros, factors, strict=True):
+            torque, inertia = known.base.of(masses)
+            for j in np.flatnonzero(off).tolist():
+                if j not in known.slopes:
+                    moved = known.zeros + _NUDGE * (np.arange(len(off)) == j)
+                    known.slopes[j] = (self._asked(episode, moved).torque - known.base.torque) / _NUDGE
+                torque = torque + off[j] * (known.slopes[j] @ masses)
+            found.append((torque, inertia))
+        return found
+
+    def _asked(self, episode: Episode, zeros: Array) -> Asked:
+        return asked_of(self.model, self.joints, self.links, episode.angle + zeros, episode.speed,
+                        episode.acceleration)
+
+
+class _Known(NamedTuple):
+    """What an episode asks for at some zeros, and how the torque changes with those that were asked for."""
+
+    episode: Episode
+    zeros: Array
+    base: Asked
+    slopes: dict[int, Array]
 
 
 def links_of(model: Any, joints: Sequence[str]) -> list[int]:

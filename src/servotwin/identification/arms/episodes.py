@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
+from servotwin.identification.fitting.registers import busiest
 from servotwin.logs.log import Log
 from servotwin.robots import Motion, joint_names, joint_ranges, read_motion
 from servotwin.robots.episode import episodes_of
@@ -18,6 +19,7 @@ from servotwin.robots.episode import episodes_of
 Array = NDArray[np.float64]
 _FEWEST = 30  # samples
 _SAME = 1e-6  # s
+_STILL = 2.5e-3  # rad, between samples: a joint that rests
 _WINDOW = 0.25  # s, over which measured positions are smoothed
 
 
@@ -48,6 +50,16 @@ class Episode:
     def name(self) -> str:
         """Where it was read."""
         return self.motion.source
+
+    def busiest(self, seconds: float) -> NDArray[np.bool_]:
+        """Return which samples the part of so many seconds has in which goals go furthest, from rest on."""
+        span = busiest(self.time, self.goals, self.measured, _STILL, seconds)
+        return np.ones(len(self.time), np.bool_) if span is None else (self.time >= span[0]) & (self.time <= span[1])
+
+    def part(self, rows: NDArray[np.bool_]) -> Episode:
+        """Return some samples of it."""
+        return replace(self, **{name: getattr(self, name)[rows] for name in (
+            "time", "goals", "measured", "angle", "speed", "acceleration")})
 
 
 def motions_of(logs: Any, plant: Any) -> list[Motion]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.identification.arms.arm_fit import HALF, ArmFit
-from servotwin.identification.arms.dynamics import link_names, links_of, with_masses
+from servotwin.identification.arms.dynamics import Demand, link_names, links_of, with_masses
 from servotwin.identification.arms.episodes import episodes_from, motions_of
 from servotwin.identification.arms.numbers import CLOCK, GAIN, Numbers
 from servotwin.identification.arms.plant import UNKNOWN, mounts_of, plant_of, supply_of
@@ -27,7 +27,7 @@ from servotwin.identification.fitting.stopping import Stops, Within
 from servotwin.parameters import Servo, Supply
 from servotwin.parameters.output_side import OUTPUT_SIDE
 from servotwin.parameters.quantity import Quantity
-from servotwin.robots import Motion, RobotValidation, validate_robot
+from servotwin.robots import Motion, Mount, RobotValidation, validate_robot
 from servotwin.robots.contacts import leave_out_measured
 from servotwin.robots.episode import joints_of_dataset
 from servotwin.units import is_finite
@@ -45,8 +45,10 @@ def identify_arm(logs: Any, robot: Any, servos: Any = None, *, bus: Supply | Non
                  within: float | Within | None = None, progress: Any = False) -> ArmFit:
     """Fit the servos of a robot, their supply, the masses of its links, the zeros of its joints and the loop's latency.
 
-    In a first stage every joint is a lane, under the torque and inertia that the measured motion of all joints asks of
-    it; a second one drives the whole robot, with copies in which one number is moved, and gives errors and intervals.
+    Registers of bus servos that nobody recorded are tried first, all servos alike and single ones; those that leave
+    less than half of the error are fitted from, and a warning says so. In a first stage every joint is a lane,
+    under the torque and inertia that the measured motion of all joints asks of it; a second one drives the whole
+    robot, with copies in which one number is moved, and gives errors and intervals.
 
     Parameters
     ----------
@@ -104,16 +106,16 @@ def identify_arm(logs: Any, robot: Any, servos: Any = None, *, bus: Supply | Non
     episodes = episodes_from(first, joints, mounts)
     counted = counts_turns([one.time for one in episodes])
 
-    def make(gains: Sequence[str] = ()) -> Numbers:
-        return Numbers(mounts, link_names(plant, links), supply, each=each, free=free, zeros=zeros, gains=gains,
-                       masses=max(masses, 2.0) if robot == UNKNOWN else masses, counted=counted)
+    def make(gains: Sequence[str] = (), having: Mapping[str, Mount] | None = None) -> Numbers:
+        return Numbers(having or mounts, link_names(plant, links), supply, each=each, free=free, zeros=zeros,
+                       gains=gains, masses=max(masses, 2.0) if robot == UNKNOWN else masses, counted=counted)
 
     level, course = checks.checked_level(level), Stops(limit)
     count = _held_out(len(episodes), holdout)
     fitted, unseen = ([one.motion for one in some] for some in (
         episodes[:len(episodes) - count], episodes[len(episodes) - count:]))
     what = Problem(plant, make(), links, episodes[:len(fitted)], [used_rows(one) for one in episodes[:len(fitted)]],
-                   course.look)
+                   course.look, Demand(plant, joints, links))
     with course.watching(), checks.shown(progress) as show:
         course.show = show
         way = searched(what, make, course, intervals=intervals, diagnose=diagnose)
@@ -121,8 +123,9 @@ def identify_arm(logs: Any, robot: Any, servos: Any = None, *, bus: Supply | Non
         with contextlib.suppress(KeyboardInterrupt):
             course(0.9, "errors")
         with way.timed("errors"):
-            tables = _tables(way.what, way.x, fitted, unseen)
-    warnings = (*_stopped(way), *said, *assumed, *_pushed(way), *(() if count else (
+            tables = _tables(way.what, way.x, mounts, fitted, unseen)
+    found = () if way.registers is None else way.registers.sentences
+    warnings = (*_stopped(way), *found, *said, *assumed, *_pushed(way), *(() if count else (
         "one episode: nothing was held out, so nothing says how well another one is predicted",)))
     return _fit(way, warnings=warnings, tables=tables, level=level)
 
@@ -177,8 +180,9 @@ def _late(share: float, std: float) -> list[str]:
 Tables = tuple[RobotValidation, RobotValidation, RobotValidation | None, RobotValidation | None]
 
 
-def _tables(what: Problem, x: Array, fitted: Sequence[Motion], unseen: Sequence[Motion]) -> Tables:
-    """Return errors on fitted and unseen episodes, after the fit and before."""
+def _tables(what: Problem, x: Array, mounts: Mapping[str, Mount], fitted: Sequence[Motion],
+            unseen: Sequence[Motion]) -> Tables:
+    """Return errors on fitted and unseen episodes, after the fit and before, with servos as they were given."""
     numbers, found = what.numbers, list[RobotValidation | None]()
     after = with_masses(what.plant, what.links, numbers.masses(x))
     zeros, turn = dict(zip(numbers.joints, numbers.zeros(x).tolist(), strict=True)), numbers.turn(x)
@@ -191,7 +195,7 @@ def _tables(what: Problem, x: Array, fitted: Sequence[Motion], unseen: Sequence[
                          measured={name: one.measured[name] + zeros[name] for name in zeros}) for one in plain]
         found.append(validate_robot(after, numbers.mounts_at(x), moved, bus=numbers.supply(x), rivals=(),
                                     latency=numbers.latency(x), joint_friction="keep", assume_heat=False))
-        found.append(validate_robot(what.plant, numbers.mounts, plain, bus=numbers.bus, rivals=(),
+        found.append(validate_robot(what.plant, mounts, plain, bus=numbers.bus, rivals=(),
                                     joint_friction="keep", assume_heat=False))
     if found[0] is None or found[1] is None:
         raise InputError("logs of a robot", got="none that is fitted", allowed="at least one episode")
@@ -213,7 +217,7 @@ def _fit(way: Way, *, warnings: tuple[str, ...], tables: Tables, level: float) -
         noise={**dict(zip(numbers.joints, noise.positions.tolist(), strict=True)), "clock": noise.stamps},
         left_out=way.left_out, causes=way.causes, warnings=warnings, numbers=numbers, best=x,
         doubt=doubts.all if doubts else None, prior_share=doubts.shares if doubts else {}, stages=way.seconds,
-        level=level, interrupted=bool(way.missing), unknown=tuple(way.missing))
+        registers=way.registers, level=level, interrupted=bool(way.missing), unknown=tuple(way.missing))
     return replace(fit, servos=_servos(fit))
 
 

@@ -7,86 +7,93 @@ joint at a stamp t is where its lane is at t less the latency.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.arms.copies import Copies
-from servotwin.identification.arms.dynamics import Asked, asked_of
+from servotwin.identification.arms.dynamics import Demand
 from servotwin.identification.arms.episodes import Episode
 from servotwin.identification.arms.numbers import Numbers, model_columns
 from servotwin.simulation import VectorSimulator
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 _PARTS = 2  # of a sample: over each of them the torque stays
-_NUDGE, _NEAR = 0.01, 0.05  # rad
+_DIGITS = 12  # of torques [N m] and inertias [kg m²] that tell lanes apart
 
 
 class JointLanes(Copies):
-    """Lanes of the joints of a robot; parameters as of `Copies`."""
+    """Lanes of the joints of a robot; parameters as of `Copies`, and what its motions ask of them."""
 
-    def __init__(self, plant: Any, numbers: Numbers, links: Sequence[int],
-                 look: Callable[[], object] = lambda: None) -> None:
+    def __init__(self, plant: Any, numbers: Numbers, links: Sequence[int], look: Callable[[], object],
+                 demand: Demand) -> None:
         super().__init__(plant, numbers, links, look)
+        self.demand = demand
         self.models = [mount.model for mount in numbers.mounts.values()]
         self._gain = np.array([mount.gain for mount in numbers.mounts.values()])
         self._zero = np.array([mount.zero for mount in numbers.mounts.values()])
-        self._known: dict[tuple[int, ...], tuple[Array, Asked, list[Array]]] = {}
 
     def angles(self, episode: Episode, points: Array, *, fine: bool = False) -> Array:
         """Return where the joints are, shape (copies, n, joints) [rad]; nan of a failed lane."""
+        return self.run(episode, points, self.numbers.columns(points), fine=fine)
+
+    def run(self, episode: Episode, points: Array, columns: Sequence[Mapping[str, Array]], *,
+            fine: bool = False) -> Array:
+        """Return where the joints are with servos whose numbers are columns (copies,), a mapping for each joint."""
         copies, joints = len(points), len(self.models)
         time = episode.time
         grid = np.interp(np.arange(_PARTS * (len(time) - 1) + 1) / _PARTS, np.arange(len(time)), time)
         torque, inertia = self._asked(episode, points, grid)
-        sims = VectorSimulator(self.models[0], copies * joints, threads=1, parameters=model_columns(
-            self.models, self.numbers.columns(points), copies, fine=fine))
-        goals = np.tile((episode.goals - self._zero) / self._gain, (1, copies))
-        first = np.tile((episode.measured[0] - self._zero) / self._gain, copies)
+        numbers = model_columns(self.models, columns, copies, fine=fine)
+        own, same = _alike(joints, torque, inertia, numbers)
+        torque, inertia = (np.ascontiguousarray(some[:, own]) for some in (torque, inertia))
+        sims = VectorSimulator(self.models[0], len(own), threads=1,
+                               parameters={name: values[own] for name, values in numbers.items()})
+        goals = np.ascontiguousarray(((episode.goals - self._zero) / self._gain)[:, own % joints])
+        first = ((episode.measured[0] - self._zero) / self._gain)[own % joints]
         sims.reset(command_angle=goals[0], output_angle=first)
-        angle, speed = np.zeros((2, len(grid), copies * joints))
+        angle, speed = np.zeros((2, len(grid), len(own)))
         angle[0] = first
+        entry = sims.c_entry()  # one call of compiled code for each step
+        tick, row = entry.tick(), angle.strides[0]
+        command, outside, load, angles, speeds = (some.ctypes.data for some in (goals, torque, inertia, angle, speed))
         for k, step in enumerate(np.diff(grid).tolist()):
-            if k % _PARTS == 0:
+            begins = k % _PARTS == 0
+            if begins:
                 self.look()
-                sims.set(load_inertia=inertia[k])
-            sims.advance(step, command_angle=goals[k // _PARTS], external_torque=torque[k])
-            angle[k + 1], speed[k + 1] = sims["output_angle"], sims["output_speed"]
+            tick.duration = step
+            tick.command_angle = command + k // _PARTS * row if begins else None
+            tick.set_load_inertia = load + k * row if begins else None
+            tick.external_torque = outside + k * row
+            tick.output_angle, tick.output_speed = angles + (k + 1) * row, speeds + (k + 1) * row
+            entry.advance(tick)
         late = np.array([self.numbers.latency(x) for x in points])
-        found = _hermite(grid, angle.reshape(-1, copies, joints), speed.reshape(-1, copies, joints),
-                         time[:, None] - late)
+        angle, speed = (some[:, same].reshape(-1, copies, joints) for some in (angle, speed))
+        found = _hermite(grid, angle, speed, time[:, None] - late)
         return np.asarray(np.moveaxis(found, 0, 1) * self._gain + self._zero)
 
     def _asked(self, episode: Episode, points: Array, grid: Array) -> tuple[Array, Array]:
         """Return external torques and inertias at the servos between the times of a grid, shape (parts, lanes)."""
         middles, found = 0.5 * (grid[1:] + grid[:-1]), []
-        zeros = np.array([self.numbers.zeros(x) for x in points])
-        about, base, slopes = self._about(episode, zeros[0])
-        for x, zero in zip(points, zeros, strict=True):
-            factors = self.numbers.masses(x)
-            torque, inertia = base.of(factors)
-            for j in np.flatnonzero(zero != about).tolist():
-                torque = torque + (zero[j] - about[j]) / _NUDGE * (slopes[j] @ factors)
+        zeros, masses = (np.array([of(x) for x in points]) for of in (self.numbers.zeros, self.numbers.masses))
+        for x, (torque, inertia) in zip(points, self.demand.torques(episode, zeros, masses), strict=True):
             late = middles + self.numbers.latency(x)
             found.append([np.stack([np.interp(late, episode.time, column) for column in some.T], axis=1)
                           for some in (torque * self._gain, inertia * self._gain**2)])
         torques, inertias = (np.concatenate([one[k] for one in found], axis=1) for k in range(2))
         return torques, inertias
 
-    def _about(self, episode: Episode, zeros: Array) -> tuple[Array, Asked, list[Array]]:
-        """Return zeros near some others, what a motion asks for there, and how that torque changes with each zero."""
-        key = (id(episode), *np.round(zeros / _NEAR).astype(int).tolist())
-        if key not in self._known:
-            def asked(at: Array) -> Asked:
-                return asked_of(self.plant, list(self.numbers.mounts), self.links, episode.angle + at, episode.speed,
-                                episode.acceleration)
 
-            base = asked(zeros)
-            self._known[key] = zeros, base, [asked(zeros + _NUDGE * one).torque - base.torque
-                                             for one in np.eye(len(zeros))]
-        return self._known[key]
+def _alike(joints: int, torque: Array, inertia: Array, numbers: Mapping[str, Array]) -> tuple[Indices, Indices]:
+    """Return lanes that differ, and which of these each lane is like: many a number moves few joints."""
+    lanes = torque.shape[1]
+    rows = np.column_stack([np.arange(lanes) % joints, *(some for some in numbers.values() if some.dtype.kind == "f"),
+                            np.round(torque.T, _DIGITS), np.round(inertia.T, _DIGITS)])
+    _, own, same = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    return own, same.ravel()
 
 
 def _hermite(grid: Array, angle: Array, speed: Array, at: Array) -> Array:

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.arms.copies import Copies
+from servotwin.identification.arms.dynamics import Demand
 from servotwin.identification.arms.episodes import Episode
 from servotwin.identification.arms.lanes import JointLanes
 from servotwin.identification.arms.numbers import Numbers
-from servotwin.identification.arms.rows import Mask, Noise, residuals
+from servotwin.identification.arms.rows import Mask, Noise, residuals, used_rows
 from servotwin.identification.arms.search import ArmSearch
 from servotwin.identification.arms.whole import WholeArm
 from servotwin.identification.fitting.arrow import Loss, Prior
@@ -22,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 class Problem(NamedTuple):
-    """What is fitted: robot, numbers, links, episodes and their samples, and what is called while it lasts."""
+    """What is fitted: robot, numbers, links, episodes and their samples, what is called, and what motions ask for."""
 
     plant: Any
     numbers: Numbers
@@ -30,15 +31,22 @@ class Problem(NamedTuple):
     episodes: list[Episode]
     used: list[Mask]
     look: Callable[[], object]
+    demand: Demand
 
     @property
     def prior(self) -> Prior:
         """The beliefs."""
         return Prior(self.numbers.start, self.numbers.weight)
 
+    def shorter(self, seconds: float) -> Problem:
+        """Return the problem of the parts of so many seconds in which goals go furthest."""
+        parts = [(one, used) if rows.all() else (part := one.part(rows), used[rows] & used_rows(part))
+                 for one, used in zip(self.episodes, self.used, strict=True) for rows in (one.busiest(seconds),)]
+        return self._replace(episodes=[one for one, _ in parts], used=[used for _, used in parts])
+
     def lanes(self) -> JointLanes:
         """Return the joints one by one."""
-        return JointLanes(self.plant, self.numbers, self.links, self.look)
+        return JointLanes(self.plant, self.numbers, self.links, self.look, self.demand)
 
     def whole(self) -> WholeArm:
         """Return the whole robot."""

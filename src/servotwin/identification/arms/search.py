@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,14 @@ _LEAST_GAIN = 3e-3  # of the cost: servos that count make it rough
 _LEAST_GAIN_ALONG = 3e-4  # likewise, where a step costs little
 _ROUGH = 2e-3  # of the cost: what counting servos scatter it by
 _RETRIES, _FIRMER = 2, 300.0  # of steps that gained nothing, with so many times the damping
+
+
+class Trial(NamedTuple):
+    """A point that a step leads to, its cost, and the residuals of all episodes there."""
+
+    x: Array
+    cost: float
+    residuals: list[Array]
 
 
 class ArmSearch:
@@ -64,8 +73,12 @@ class ArmSearch:
 
     def costs(self, points: Array) -> list[float]:
         """Return the costs of several points."""
+        return [self.cost(x, found) for x, found in zip(points, self.left(points), strict=True)]
+
+    def left(self, points: Array) -> list[list[Array]]:
+        """Return the residuals of all episodes at several points."""
         found = [residuals(self.simulated, episode, points) for episode in self.episodes]
-        return [self.cost(x, [one[k] for one in found]) for k, x in enumerate(points)]
+        return [[one[k] for one in found] for k in range(len(points))]
 
     def linear(self, x: Array, *, central: bool = False) -> list[Linear]:
         """Return residuals and derivatives of all episodes at a point."""
@@ -85,26 +98,26 @@ class ArmSearch:
                 g, H = g + one.g_s, H + one.H_ss
         return g, H
 
-    def tried(self, x: Array, g: Array, H: Array, scale: float) -> tuple[Array, list[float]]:
-        """Return points of steps that are damped more and more, and their costs."""
+    def tried(self, x: Array, g: Array, H: Array, scale: float) -> list[Trial]:
+        """Return points of steps that are damped more and more, their costs and residuals."""
         lower, upper = self.simulated.numbers.lower, self.simulated.numbers.upper
-        trials = np.stack([stepped(x, g, H, scale * damping, lower, upper, self.held) for damping in _DAMPINGS])
-        return trials, self.costs(trials)
+        points = np.stack([stepped(x, g, H, scale * damping, lower, upper, self.held) for damping in _DAMPINGS])
+        return [Trial(point, self.cost(point, found), found)
+                for point, found in zip(points, self.left(points), strict=True)]
 
     def along(self, x: Array, slopes: Sequence[Array], *, most: int, tell: Tell = lambda step, x: None) -> Array:
         """Return the best point that steps by the same derivatives come to."""
-        scale = 1.0
+        scale, found = 1.0, self.left(x[None])[0]
+        best = self.cost(x, found)
         for turn in range(most):
             tell(turn, x)
-            found = [residuals(self.simulated, episode, x[None])[0] for episode in self.episodes]
-            best = self.cost(x, found)
-            trials, costs = self.tried(x, *self.normal(x, found, slopes), scale)
-            k = int(np.argmin(costs))
-            if turn == 0 and costs[0] < best * (1.0 + _ROUGH):  # what no data hold goes back to what is believed
+            trials = self.tried(x, *self.normal(x, found, slopes), scale)
+            k = int(np.argmin([one.cost for one in trials]))
+            if turn == 0 and trials[0].cost < best * (1.0 + _ROUGH):  # what no data hold goes back to what is believed
                 k = 0
-            elif not costs[k] < best * (1.0 - _LEAST_GAIN_ALONG):
+            elif not trials[k].cost < best * (1.0 - _LEAST_GAIN_ALONG):
                 break
-            x, scale = trials[k], scale * (1.0 if k < 2 else 10.0)
+            (x, best, found), scale = trials[k], scale * (1.0 if k < 2 else 10.0)
         return x
 
     def run(self, x: Array, *, most: int, tell: Tell = lambda step, x: None) -> Array:
@@ -117,15 +130,15 @@ class ArmSearch:
             best = self.cost(x, found)
             normal = self.normal(x, found, [one.slopes for one in linear])
             for _ in range(_RETRIES):
-                trials, costs = self.tried(x, *normal, scale)
-                k = int(np.argmin(costs))
-                if costs[k] < best:
+                trials = self.tried(x, *normal, scale)
+                k = int(np.argmin([one.cost for one in trials]))
+                if trials[k].cost < best:
                     break
                 scale *= _FIRMER
             else:
                 break
-            gain = best - costs[k]
-            x, scale = trials[k], max(scale * (0.3 if k == 0 else 1.0), 1e-3)
+            gain = best - trials[k].cost
+            x, scale = trials[k].x, max(scale * (0.3 if k == 0 else 1.0), 1e-3)
             if gain < _LEAST_GAIN * best:
                 break
         return x

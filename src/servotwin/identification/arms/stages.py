@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
@@ -15,6 +15,7 @@ from servotwin.identification.arms.causes import causes_of, confirmed
 from servotwin.identification.arms.doubts import Doubts, doubts_of
 from servotwin.identification.arms.numbers import LATENCY, Numbers
 from servotwin.identification.arms.problem import Problem
+from servotwin.identification.arms.registers import arm_registers
 from servotwin.identification.arms.rows import (
     Linear,
     Noise,
@@ -27,11 +28,14 @@ from servotwin.identification.arms.rows import (
 )
 from servotwin.identification.arms.whole import WholeArm
 from servotwin.identification.arms.windows import LeftOut, strange_windows, without
+from servotwin.identification.fitting.registers import RegisterSearch
 from servotwin.identification.fitting.stopping import Stops
+from servotwin.robots import Mount
 
 Array = NDArray[np.float64]
 Show = Callable[[float, str], None]
 _ROUNDS, _STEPS = 2, 8  # of the first stage
+_SECONDS = 20.0  # of each episode, that the search for causes looks at
 _WHOLE_TURNS, _WHOLE_STEPS = 2, 6  # of the second: derivatives, and steps by them
 _FAR = 1.0  # widths of a belief, over which derivatives change
 _TRIED = 1.5  # widths of a belief, that make causes be tried
@@ -61,6 +65,8 @@ class Way:
         What is not known yet.
     seconds : dict of str to float
         CPU time that each stage took.
+    registers : RegisterSearch, optional
+        What stands in registers that nobody recorded.
     """
 
     what: Problem
@@ -73,6 +79,7 @@ class Way:
     doubts: Doubts | None = None
     missing: list[str] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
+    registers: RegisterSearch | None = None
 
     def keep(self, other: Way, best: Array) -> None:
         """Take over what another one fits, with the best so far."""
@@ -93,17 +100,21 @@ class Way:
             self.seconds[stage] = clock.process_time() - began
 
 
-def searched(what: Problem, make: Callable[[Sequence[str]], Numbers], course: Stops, *, intervals: bool,
-             diagnose: bool) -> Way:
+def searched(what: Problem, make: Callable[[Sequence[str], Mapping[str, Mount]], Numbers], course: Stops, *,
+             intervals: bool, diagnose: bool) -> Way:
     """Return where a fit ends; a stop ends the stage that it meets, and those that come after it are left out."""
     way = Way(what, what.numbers.start.copy(), Noise(np.zeros(0), 0.0))
     way.missing = [JOINTS_ALONE, *([CAUSES] if diagnose else []), *([WHOLE, INTERVALS] if intervals else [])]
     try:
+        with way.timed("registers"):
+            course(0.0, "registers")
+            way.registers, mounts = arm_registers(what, lambda having: make((), having))
+            what = what._replace(numbers=make((), mounts))
         with way.timed("first"):
             _first_stage(way, what, course)
         if diagnose:
             with way.timed("causes"):
-                _look_for_causes(way, make, course)
+                _look_for_causes(way, lambda gains: make(gains, mounts), course)
         with way.timed("second"):
             _second_stage(way, course, intervals=intervals)
     except KeyboardInterrupt:
@@ -141,7 +152,7 @@ def _look_for_causes(way: Way, make: Callable[[Sequence[str]], Numbers], show: S
     off = np.abs(way.x - what.numbers.start) * what.numbers.weight
     if off.max() >= _TRIED or noise.positions.max() >= _NOISY:
         show(0.4, "causes")
-        way.causes = causes_of(what, noise, way.x, make)
+        way.causes = causes_of(what.shorter(_SECONDS), noise, way.x, make)
     if way.causes and way.causes[0].joints:  # what the wrong gain has bent is found anew with that gain searched
         _first_stage(way, what._replace(numbers=make(way.causes[0].joints),
                                         used=[used_rows(one) for one in what.episodes]), show)
