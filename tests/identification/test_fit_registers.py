@@ -10,7 +10,6 @@ import servotwin as st
 from servotwin.identification import validate
 from servotwin.identification.fitting.registers import as_logs_say, of_no_robot, register_search
 from servotwin.identification.fitting.stopping import Within
-from servotwin.loads import Pendulum
 from servotwin.logs.bam_logs import read_bam_log
 from servotwin.models import default_model
 from servotwin.parameters.registers.held import register_family_of
@@ -68,16 +67,16 @@ X = "dynamixel-xl430-w250"
 CHANGES = {STS: st.feetech_sts, X: st.dynamixel_x}
 
 
-def recorded(servo, *, seconds=6.0, seed=0, **more):
-    """Return a log of a servo whose encoder counts: eased and sudden moves of a pendulum, 50 rows a second."""
+def recorded(servo, *, seconds=6.0, seed=0):
+    """Return a log of a servo whose encoder counts: sudden moves of an inertia, 50 rows a second."""
     rng, t = np.random.default_rng(seed), np.arange(0.0, seconds, 0.02)
     goals = np.repeat(rng.uniform(-0.8, 0.8, 1 + int(seconds / 0.6)), 30)[:len(t)]
     goals[:10] = goals[10] = 0.0
-    load = Pendulum(mass=0.2, length=0.1, hanging_angle=-0.5 * math.pi).as_load()
+    load = st.loads.Inertia(2e-3)
     run = st.simulate(st.DigitalServo(servo), st.signals.samples(t, goals, unit="rad"), load=load, duration=t[-1],
                       output_times=t)
     count = 2.0 * math.pi / 4096.0
-    return st.Log(name="moves", time=t, command=goals, command_kind="angle", load=load, conditions=more,
+    return st.Log(name="moves", time=t, command=goals, command_kind="angle", load=load,
                   measured={"output_angle": count * np.round(run["output_angle"] / count)})
 
 
@@ -151,6 +150,7 @@ def test_a_fit_begins_with_the_registers_that_were_found():
     assert fit.warnings[0] == fit.registers.sentences[0]
 
 
+@pytest.mark.long
 def test_gains_that_bam_did_not_write_are_not_known(data_folder):
     logs = [part for path in sorted((data_folder / "bam_sts3250").glob("*.json"))
             for part in read_bam_log(path).without_torque_off()]

@@ -161,7 +161,7 @@ def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] 
         errors=ErrorTable((own,), {own: tuple(trace.error for trace in traces)}),
         nuisance={name: forecast.nuisance_of(point.shared, name) for name in forecast.extra},
         noise=_noise(forecast, parts), registers=registers,
-        warnings=(*(() if registers is None else registers.sentences), *rig, *assumed, *noticed))
+        warnings=(*(() if registers is None else registers.sentences), *assumed, *noticed, *rig))
 
 
 def _of_rig(logs: Sequence[Log], model: Model, sensors: Sequence[str], left: float) -> tuple[str, ...]:
