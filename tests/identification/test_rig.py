@@ -101,7 +101,8 @@ def test_the_rig_of_a_catalog_servo_is_not_that_of_other_logs():
     assert servo.fit["rig"]["delay"] == pytest.approx(0.034, abs=1e-3)  # it is told beside the fit
 
 
-@pytest.mark.parametrize(("delay", "offset", "said"), [(0.03, 0.05, True), (0.0, 0.0, False)])
+@pytest.mark.parametrize(("delay", "offset", "said"), [(0.03, 0.05, True), (0.09, 0.5, True), (0.0, 0.0, False),
+                                                     (0.0, 1e-3, False)])
 def test_what_a_rig_would_leave_is_said(delay, offset, said):
     found = validate([late(exact(0.02), delay, offset, noise=1e-3)], SERVO)
     words = [text for text in found.warnings if "as nuisances" in text]
@@ -109,5 +110,5 @@ def test_what_a_rig_would_leave_is_said(delay, offset, said):
     if said:
         ms, deg, left = (float(words[0].split(before)[1].split()[0])
                          for before in ("a delay of ", "a zero of ", "would leave "))
-        assert (ms, deg) == (pytest.approx(30.0, abs=3.0), pytest.approx(np.degrees(offset), abs=0.1))
+        assert (ms, deg) == (pytest.approx(1e3 * delay, abs=3.0), pytest.approx(np.degrees(offset), abs=0.1))
         assert left < 0.2 < np.degrees(found.total)

@@ -42,7 +42,7 @@ def sections(fit: Fit, files: Sequence[str]) -> list[RenderableType]:
         parts.append(f"INTERRUPTED: the best so far; not known are {', '.join(fit.unknown)}")
     parts += ["", _estimates(fit), ""]
     if fit.register_values:
-        rows = [(one.name, f"{one.value:.3g}", f"{one.lower:.3g} to {one.upper:.3g}") for one in fit.register_values]
+        rows = [(one.name, f"{one.value:.3g}", one.interval) for one in fit.register_values]
         parts += [table(("register", "raw value", f"{100.0 * fit.level:g} % interval"), rows), ""]
     parts += [f"- {item}" for item in fit.unidentifiable]
     parts += ["- no delay is seen: it ended at 0" if name == "delay" and fit.estimates[name] == 0.0

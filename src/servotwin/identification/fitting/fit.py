@@ -263,7 +263,7 @@ class Fit:
                          f"{spread}{prior}")
         first = () if self.verdict is None else (str(self.verdict),)
         said = [text for text in self.warnings if text not in "\n".join(first).split("\n")]
-        lines += [f"{one.name} = {one.value:.3g} ({one.lower:.3g} to {one.upper:.3g})" for one in self.register_values]
+        lines += [f"{one.name} = {one.value:.3g} ({one.interval})" for one in self.register_values]
         return "\n".join((*first, *lines, *map(str, self.unidentifiable), *self.allowing, *said))
 
     @property

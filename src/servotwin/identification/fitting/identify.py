@@ -72,7 +72,9 @@ def identify(
     """Fit parameters of a servo to logs.
 
     Multi-start bounded nonlinear least squares on the exact engine, with robust loss; the Jacobian comes from copies of
-    the servo that differ a little, run in one batch. The result is the same for the same arguments.
+    the servo that differ a little, run in one batch. The result is the same for the same arguments. Registers of a bus
+    servo that nobody recorded are tried first; those that leave less than half of the error are taken, and said
+    (`Fit.registers`).
 
     Parameters
     ----------

@@ -175,7 +175,8 @@ class RegisterSearch:
             more = f" ({' and '.join(also)} would leave as little)" if also else ""
             said.append(f"registers that nobody recorded are not as the servo file has them: as if with "
                         f"{self.taken.said}, {_degrees(self.taken.error)} instead of {_degrees(self.given.error)} are "
-                        f"left before anything is fitted{more}; read them back, or say them by --register")
+                        f"left before anything is fitted{more}; read them back, or say them by --register (another "
+                        "supply or servo than said may look like it)")
         said += [f"the servo of {joint} has other registers than the others: as if with {_words(one.registers, ())}, "
                  f"{_degrees(one.error)} instead of {_degrees(one.with_those_of_others)} are left of it before "
                  "anything is fitted; read them back" for joint, one in self.joints.items()]
@@ -184,7 +185,6 @@ class RegisterSearch:
             said.append(f"the registers that were given are doubtful: as if with {self.doubted.said}, "
                         f"{_degrees(self.doubted.error)} instead of {_degrees(left)} are left; read them back")
         return tuple(said)
-
 
     @property
     def facts(self) -> dict[str, Any]:
@@ -204,6 +204,11 @@ class RegisterValue(NamedTuple):
     value: float
     lower: float
     upper: float
+
+    @property
+    def interval(self) -> str:
+        """The interval in words; a dash where there is none, as of a number at its bound."""
+        return f"{self.lower:.3g} to {self.upper:.3g}" if self.lower == self.lower else "–"
 
 
 def register_values(servo: Servo, moves: Mapping[str, Varied], values: Mapping[str, float],

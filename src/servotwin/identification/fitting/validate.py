@@ -99,10 +99,12 @@ def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] 
     """Run a servo against logs, and return how far it is off.
 
     Of logs of an SO-100 or SO-101 (datasets of LeRobot) a servo with the factory's registers is taken with those that
-    LeRobot writes, and a warning says so. Every log starts at the angle and speed that it shows. Delay and angle offset
-    are those that the servo file's [fit] recorded, where it has any. When pulses come is unknown where the samples of a
-    log are not in step with the frames, and where the file's fit or `nuisance` say so: then the first half of each log
-    tells it. The errors are those of the second half where the fit or `nuisance` say so, else of all samples.
+    LeRobot writes, and a warning says so. Registers of a bus servo that would leave less than half of the error are
+    named (`Validation.registers`), and so are a delay and a zero of the rig; neither changes the errors. Every log
+    starts at the angle and speed that it shows. Delay and angle offset are those that the servo file's [fit] recorded,
+    where it has any. When pulses come is unknown where the samples of a log are not in step with the frames, and where
+    the file's fit or `nuisance` say so: then the first half of each log tells it. The errors are those of the second
+    half where the fit or `nuisance` say so, else of all samples.
 
     Parameters
     ----------
