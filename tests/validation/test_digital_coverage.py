@@ -18,6 +18,9 @@ SPREAD = {"motor.armature_resistance": 1.2, "motor.rotor_inertia": 1.4, "firmwar
 OFF = {"motor.armature_resistance": 1.15, "motor.torque_constant": 0.9, "motor.back_emf_constant": 0.9,
        "motor.rotor_inertia": 1.3, "friction.coulomb_torque_forward": 0.8, "friction.coulomb_torque_backward": 0.8,
        "firmware.proportional_gain": 1.2, "firmware.derivative_gain": 0.7}
+GIVEN = {"supply.internal_resistance": 0.0, "friction.breakaway_ratio": 1.0,
+         "motor.motor_viscous_friction": PULSED.get("motor.motor_viscous_friction")}
+"""Numbers that are the truth's, and said to be: intervals are those of chance alone, and neither narrow nor wide."""
 MOTIONS = ("step", "prbs", "triangle", "step")
 TICKS = (1e-3, 2e-3, 5e-3)  # s
 SERVOS, DRAWS = 9, 4
@@ -44,7 +47,7 @@ def test_intervals_of_digital_servos_hold_the_truth_as_often_as_they_say():
     hits, off = {}, []
     for seed in range(SERVOS):
         servo, truth, rng = bench(seed)
-        begin = servo.replace({name: factor * servo.get(name) for name, factor in OFF.items()})
+        begin = servo.replace({name: factor * servo.get(name) for name, factor in OFF.items()} | GIVEN)
         for draw in range(DRAWS):
             logs = [digital_log(servo, motion, seed=100 * seed + 10 * draw + k, duration=1.6, phase=rng.uniform(),
                                 delay=truth["delay"]) for k, motion in enumerate(MOTIONS)]
