@@ -12,8 +12,8 @@ from servotwin.errors import InputError
 from servotwin.physics.converter import supplied_count
 from servotwin.signals import constant
 from servotwin.simulation import Simulator
-from servotwin.simulation.engine import Record
-from servotwin.simulation.trajectory import Trajectory
+from servotwin.simulation.engine import RunLog
+from servotwin.simulation.trajectory import Motions, Trajectory
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -170,8 +170,8 @@ def _checked(bench: Bench, control: ControlSupply) -> float:
 
 def _advanced(simulator: Simulator, state: State, until: float, pulses: Signal) -> tuple[State, float]:
     """Return the state at `until` [s], and the voltage of the supply there [V]."""
-    record = Record([], [])
+    record = RunLog()
     after = simulator.recorded(state, until, pulses, record)
-    samples = Trajectory(tuple(record.segments)).at(np.array([until]))
+    samples = Trajectory(Motions(record.parts)).at(np.array([until]))
     bus = simulator.model.output("bus_voltage", samples, simulator.drive(pulses), simulator.load)
     return after, float(bus[0])

@@ -18,7 +18,8 @@ from servotwin.physics import feedback_voltage
 from servotwin.physics.pieces import Piece, Pieces, constant_pieces
 from servotwin.signals import Signal
 from servotwin.simulation import Result, Simulator, Status
-from servotwin.simulation.engine import Record, State
+from servotwin.simulation.engine import RunLog, State
+from servotwin.simulation.trajectory import Motions
 from servotwin.simulation.trajectory import Trajectory as Motion
 from servotwin.units import is_finite
 
@@ -153,7 +154,7 @@ class SimulatedServo:
         self._sent: list[tuple[float, float]] = [(0.0, rest)]
         self._coming: deque[tuple[float, float]] = deque()
         self._readings = Readings(self._sensors, self._seed)
-        self._record = Record([], [])
+        self._record = RunLog()
 
     @property
     def _state_names(self) -> tuple[str, ...]:
@@ -203,7 +204,7 @@ class SimulatedServo:
         command, simulator = Signal(pieces=pieces, unit=self._wire.unit, initial=self._sent[0][1]), self._simulator
         return Result(model=simulator.model, command=command, load=simulator.load,
                       drive=simulator.model.command(command), time=np.asarray(time, dtype=np.float64),
-                      trajectory=Motion(tuple(self._record.segments)), events=tuple(self._record.events),
+                      trajectory=Motion(Motions(self._record.parts)), events=tuple(self._record.events),
                       status=Status.COMPLETED, ended=self.time, cause=Status.COMPLETED.message)
 
     def record(self, time: Array) -> Mapping[str, Any]:

@@ -31,8 +31,8 @@ from servotwin.models.terms.stops import NO_STOPS, Stops
 from servotwin.physics import motor
 from servotwin.physics.pieces import constant_pieces
 from servotwin.physics.thermal import REFERENCE_TEMPERATURE
-from servotwin.simulation.engine import Plan, Record, State, run
-from servotwin.simulation.trajectory import Trajectory
+from servotwin.simulation.engine import Plan, RunLog, State, run
+from servotwin.simulation.trajectory import Motions, Trajectory
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -211,13 +211,13 @@ class FullDrive:
         """Return how the shaft turns from rest at one angle to a larger one [rad]; `load` acts all the way."""
         hung = as_load(load)
         plant = self.loaded(hung)._replace(stops=Stops(-math.inf, end, 0.0))
-        record = Record([], [])
+        record = RunLog()
         state = State(time=0.0, places=self.model.states, memory=started(_state(start, 0.0), RIGID, NOT_STARTED))
         run(Plan(plant, constant_pieces(self.voltage), hung.torque_pieces), state, _LONGEST_SWING, record)
         time = next((event.time for event in record.events if event.kind == "upper stop"), math.nan)
         if math.isnan(time):
             return Swing(math.nan, math.nan)
-        moving = Trajectory(tuple(segment for segment in record.segments if segment.start < time))
+        moving = Trajectory(Motions(record.parts).between(until=time))
         return Swing(time, float(moving.integral(self._currents)[0]) / time)
 
     def _currents(self, samples: Samples) -> NDArray[np.float64]:

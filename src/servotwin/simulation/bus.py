@@ -16,7 +16,7 @@ from servotwin.models.terms.source import Source
 from servotwin.parameters.groups import Supply
 from servotwin.signals import Signal
 from servotwin.simulation import bus_run, files, frames
-from servotwin.simulation.bus_rows import events_of, segments_of
+from servotwin.simulation.bus_rows import events_of, motions_of
 from servotwin.simulation.bus_supply import MODEL_NAMES, MODELS, check_rigid, check_supply, on_supply, source_of
 from servotwin.simulation.energy import Energy
 from servotwin.simulation.engine import Plan
@@ -255,7 +255,7 @@ def simulate_bus(servos: Mapping[str, Sequence[Any]], *, supply: Supply, duratio
     rows = bus_run.run(plans, states, source, duration)
     status = Status.of_code(rows.status)
     ended = duration if status.ok else rows.ended
-    motions, events = segments_of(plans, rows), events_of(plans, rows)
+    motions, events = motions_of(plans, rows), events_of(plans, rows)
     alone = [Trajectory(own) for own in motions]
     bus = _AllAlong(source, plans, alone, supply)
     results = {

@@ -19,6 +19,7 @@ from servotwin.models.engine.bus.coupled_motion import at_start
 from servotwin.models.engine.bus.coupled_units import Coupling, Unit
 from servotwin.models.engine.bus.event_log import Tape
 from servotwin.models.engine.demands import demanded
+from servotwin.models.engine.log import Row
 from servotwin.models.engine.memory import Memories, Memory, forgotten, resumed
 from servotwin.models.engine.step import DIVERGED
 from servotwin.models.samples import Samples
@@ -42,7 +43,7 @@ _ENTRIES = tuple(f"servotwin.models.engine.bus.bus_batch:{name}" for name in ("g
 BUSES = Recipe("buses", _ENTRIES, knows=~SPRING)
 """All servos but those with a spring between two bodies; they take hardly longer for what others lack."""
 _PLAINLY = PLAIN_RUNS.knows & ~CURVED_Q
-SHARED, SEAT, MATE = record_of(Shared), record_of(Seat), record_of(Mate)
+SHARED, SEAT, MATE, ROW = record_of(Shared), record_of(Seat), record_of(Mate), record_of(Row)
 UNIT, COUPLING = record_of(Unit), record_of(Coupling)
 
 LOADS_FROM, COMPILES_FROM = 1e2, 1.5e4  # frames of servos in one process: what it takes, and more, in plain Python
@@ -55,7 +56,7 @@ _frames_run: dict[str, float] = {}  # in plain Python, of what a recipe would do
 class Rows(NamedTuple):
     """What a run has left behind: rows of motions, of events, and numbers of common motions; status and end [s]."""
 
-    motions: Array
+    motions: NDArray[Any]
     events: Array
     numbers: Array
     status: int
@@ -66,13 +67,14 @@ def run(plans: Sequence[Plan], states: Sequence[State], source: Source, duration
     """Run servos on one source from t = 0 to `duration` [s]."""
     frames = duration * sum(
         _weight(plan) / (plan.firmware.T_c if plan.digital else plan.chip.frame_period) for plan in plans)
-    way = (_Compiled if _worth_it(plans, frames) else Plainly)(plans, states, source)
-    return taped(way, duration, tape_of(len(plans)))
+    compiled = _worth_it(plans, frames)
+    way = (_Compiled if compiled else Plainly)(plans, states, source)
+    return taped(way, duration, tape_of(len(plans), not compiled))
 
 
 def run_alone(plan: Plan, state: State, source: Source, duration: float) -> Rows:
     """Run one servo on its own source from t = 0 to `duration` [s], compiled: its way as rows, and what happened."""
-    return taped(_Compiled([plan], [state], source), duration, tape_of(1))
+    return taped(_Compiled([plan], [state], source), duration, tape_of(1, False))
 
 
 def voltages(plans: Sequence[Plan], source: Source, samples: Sequence[Samples]) -> Array:
@@ -108,9 +110,11 @@ def taped(way: _Compiled | Plainly, until: float, written: Tape,
         try:
             status, when = way.go_on(until, written)
         except (ArithmeticError, ValueError):  # numbers beyond what a float holds
-            status, when = DIVERGED, float(written.motions[:written.used[0], event_log.UNTIL].max(initial=when))
-        part = [rows[:used].copy() for rows, used in zip(written[:3], written.used.tolist(), strict=True)]
-        part[0][:, event_log.FIRST] += count
+            status = DIVERGED
+            when = float(np.array(written.motions[:written.used[0]], ROW)["end"].max(initial=when))
+        part = [np.array(rows[:used], kind) for rows, used, kind in zip(
+            written[:3], written.used.tolist(), (ROW, np.float64, np.float64), strict=True)]
+        part[0]["first"] += count
         count += len(part[2])
         found.append(part)
         if tell is not None:
@@ -119,10 +123,10 @@ def taped(way: _Compiled | Plainly, until: float, written: Tape,
     return Rows(motions, events, numbers, int(status), float(when))
 
 
-def tape_of(servos: int) -> Tape:
-    """Return a tape with room for what so many servos do."""
+def tape_of(servos: int, plain: bool) -> Tape:
+    """Return a tape with room for what so many servos do, compiled or in plain Python."""
     rows = max(_ROWS, 64 * servos)
-    return Tape(np.empty((rows, event_log.ROW)), np.empty((rows, event_log.EVENT)),
+    return Tape([None] * rows if plain else np.empty(rows, ROW), np.empty((rows, event_log.EVENT)),
                 np.empty(max(_NUMBERS, 64 * servos * ROOM)), np.zeros(3, np.int64))
 
 

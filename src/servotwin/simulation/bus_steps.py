@@ -89,7 +89,7 @@ class BusSteps:
 
     def _begun(self, source: Source, plans: Sequence[Plan], states: Sequence[State]) -> Plainly:
         if self._way is None:
-            self._way, self._tape = Plainly(plans, states, source), tape_of(len(plans))
+            self._way, self._tape = Plainly(plans, states, source), tape_of(len(plans), True)
         else:
             self._way.begin(plans, states)
             if source != self._source or self._are_others(self._way, plans, states):
@@ -110,5 +110,5 @@ class BusSteps:
             if plan.digital:
                 controller.pause(plan.inputs, memory)
                 memory = memory._replace(firm=(control.frozen(memory.firm[0]),))
-            found.append(replace(state, time=until, memory=memory, numbers=plan.numbers))
+            found.append(State(until, state.places, memory, plan.numbers, state.changes))
         return found

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from servotwin import physics
-from servotwin.models.engine.motions import motion
 from servotwin.models.engine.observe import stored_energy
+from servotwin.models.state.modes import Vector
 from servotwin.models.outputs import electrical_of, motor_speed_of, torques_of, warm_plant
 
 if TYPE_CHECKING:
@@ -83,18 +83,17 @@ def energy_of(model: Model, trajectory: Trajectory, drive: Pieces, load: Load) -
 
 def _kinetic(plant: Numbers, trajectory: Trajectory) -> tuple[float, float]:
     """Return the energy stored over the run, and what impacts took."""
-    lost = 0.0
-    segments = trajectory.segments
-    if not segments:
+    own = trajectory.segments
+    if not len(own):
         return 0.0, 0.0
 
-    def stored(k: int, at: float) -> float:
-        m = motion.prepared(segments[k].motion)
-        return stored_energy(plant, motion.state(m, at - segments[k].anchor))
+    def stored(index: Any, ages: Any, ends: bool) -> list[float]:
+        states = own.shown(np.asarray(index), np.asarray(ages), ends=ends)[:7].T.tolist()
+        return [stored_energy(plant, Vector(*y)) for y in states]
 
-    for k in range(1, len(segments)):
-        if segments[k].anchor == segments[k].start:
-            before = segments[k - 1]
-            met = motion.ended(motion.prepared(before.motion), before.end - before.anchor)
-            lost += stored_energy(plant, met) - stored(k, segments[k].start)
-    return stored(len(segments) - 1, segments[-1].end) - stored(0, segments[0].start), lost
+    lengths = own.ends - own.anchors
+    met = np.flatnonzero(own.anchors[1:] == own.starts[1:])
+    lost = sum((before - after for before, after in zip(
+        stored(met, lengths[met], True), stored(met + 1, np.zeros(len(met)), False), strict=True)), 0.0)
+    last, first = stored([len(own) - 1, 0], [lengths[-1], own.starts[0] - own.anchors[0]], False)
+    return last - first, lost

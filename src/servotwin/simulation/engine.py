@@ -1,45 +1,49 @@
-"""The engine: from event to event, exactly where the mode is linear, with error control where it is not.
+"""A run of one servo: what it is made of, what it leaves behind, and the way to the engine's loop, compiled or plain.
 
-It drives the kernels and keeps what they leave behind: states to go on from, segments of motion, and events.
+Compiled, a state is the bytes of the engine's records, and named tuples are made of these when they are asked for.
 """
 
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
+import threading
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
-from typing import NamedTuple
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from servotwin.errors import SimulationError
 from servotwin.models.base import Place
-from servotwin.models.engine import controller
+from servotwin.models.engine import log as logs
+from servotwin.models.engine import run as engine_run
+from servotwin.models.engine.at import SHOWN
 from servotwin.models.engine.events import kinds
-from servotwin.models.engine.legs.legs import MOST_SHORT
-from servotwin.models.engine.memory import (
-    ACCURACY,
-    Inputs,
-    Memory,
-    counted_anew,
-    due,
-    instant,
-    origin_of,
-    resumed,
-    time_of,
-)
-from servotwin.models.engine.motions import motion
-from servotwin.models.engine.motions.motion import Motion
-from servotwin.models.engine.runs import calmed, is_short
-from servotwin.models.engine.step import COMPLETED, MOST_IDLE, pulse_width, step
+from servotwin.models.engine.log import COUNTS, EVENTS, LEFT, MOTIONS, PAUSED, Happened, Log, Row
+from servotwin.models.engine.memory import ACCURACY, Inputs, Memories, Memory, time_of
+from servotwin.models.engine.run import Plant
+from servotwin.models.engine.step import COMPLETED
 from servotwin.models.state.modes import Mode
-from servotwin.models.terms import control, duty, firmware, frame
+from servotwin.models.state.records import fields_of, record_of
+from servotwin.models.terms import control, duty, firmware
 from servotwin.models.terms.bridge import heeds_silence
 from servotwin.models.terms.chip import NO_CHIP, Chip
+from servotwin.models.terms.control import Firm
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
-from servotwin.models.terms.frame import Frame
 from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.pieces import Pieces
+from servotwin.simulation.compile import Recipe, is_compiled, is_plain, kernels
 from servotwin.simulation.status import Status
+
+ONE = Recipe("one", ("servotwin.models.engine.run:go_on", "servotwin.models.engine.at:at",
+                     "servotwin.models.engine.at:resolution"))
+"""One servo by the one loop, and its signals at any times; kernels take hardly longer for what a servo lacks."""
+ROOM, STEPS = 4096, 4096  # rows of a log, and steps between two looks at the log, at progress and at interrupts
+_MEMORY, _FIRM, _ROW, _HAPPENED = (record_of(kind) for kind in (Memory, Firm, Row, Happened))
 
 
 class Event(NamedTuple):
@@ -100,25 +104,23 @@ class Plan:
         return self.chip.frame_period > 0.0
 
     @cached_property
-    def refuses(self) -> bool:
-        """Whether some pulse may be shorter or longer than the chip takes."""
-        shortest, longest = self.command.extremes
-        return not (self.chip.shortest <= shortest and longest <= self.chip.longest)
-
-    @cached_property
-    def heeds_silence(self) -> bool:
-        """Whether its bridge is off in another way while no pulses come."""
-        return heeds_silence(self.numbers.bridge)
-
-    @cached_property
     def inputs(self) -> Inputs:
         """What the servo is told, as a step reads it."""
         period = (self.firmware.T_f if self.digital else self.chip.frame_period) if self.edges is None else 0.0
         return Inputs(self.command.table, self.torque.table, self.external_torque, period, self.edges or (),
                       self.curve, self.seed, self.accuracy, (self.firmware,))
 
+    @cached_property
+    def plant(self) -> NDArray[Any]:
+        """Servo and load as kernels read them: a record of one."""
+        return np.array([(self.numbers, self.chip)], record_of(Plant))
 
-@dataclass(frozen=True, repr=False)
+    @cached_property
+    def compiled(self) -> Compiled:
+        """The run of this plan in compiled code."""
+        return Compiled(self)
+
+
 class State:
     """Everything that a servo remembers; picklable, comparable, and enough to go on from.
 
@@ -128,7 +130,7 @@ class State:
         [s]
     places : tuple of Place
         Which signals are states, and where the engine keeps them.
-    memory : Memory
+    memory : Memory or bytes
         All numbers of the state, its clock, and what the chip of a pulse servo has decided.
     numbers : Numbers
         The numbers of servo and load by which it moves since its motion began.
@@ -136,15 +138,46 @@ class State:
         (name, value) of the numbers that are others than the simulator's.
     """
 
-    time: float
-    places: tuple[Place, ...]
-    memory: Memory
-    numbers: Numbers | None = None
-    changes: tuple[tuple[str, object], ...] = ()
+    __slots__ = ("_bytes", "_memory", "changes", "numbers", "places", "time")
+
+    def __init__(self, time: float, places: tuple[Place, ...], memory: Memory | bytes, numbers: Numbers | None = None,
+                 changes: tuple[tuple[str, object], ...] = ()) -> None:
+        self.time, self.places, self.numbers, self.changes = time, places, numbers, changes
+        self._memory, self._bytes = (None, memory) if isinstance(memory, bytes) else (memory, None)
 
     def __repr__(self) -> str:
         values = (f"{name}={value:.6g}" for name, value in zip(self.names, self.values, strict=True))
         return f"State(time={self.time:g}, {', '.join(values)})"
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, State):
+            return NotImplemented
+        return (self.time, self.places, self.memory, self.numbers, self.changes) == (
+            other.time, other.places, other.memory, other.numbers, other.changes)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __reduce__(self) -> tuple[type[State], tuple[Any, ...]]:
+        return State, (self.time, self.places, self.memory, self.numbers, self.changes)
+
+    @property
+    def memory(self) -> Memory:
+        """What the engine remembers."""
+        if self._memory is None:
+            self._memory = _memory_in(self._bytes)
+        return self._memory
+
+    @property
+    def bytes(self) -> bytes:
+        """The same as records of `Memory` and `Firm`, one after the other."""
+        if self._bytes is None:
+            self._bytes = _bytes_of(self._memory)
+        return self._bytes
+
+    def with_memory(self, memory: Memory, *, places: tuple[Place, ...] | None = None,
+                    changes: tuple[tuple[str, object], ...] | None = None) -> State:
+        """Return a state that remembers something else, of a servo that may have other states and numbers."""
+        return State(self.time, places or self.places, memory, self.numbers, self.changes if changes is None else changes)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -166,44 +199,65 @@ class State:
                        "Simulator.observe(state, name, command)")
 
 
-class Segment(NamedTuple):
-    """A stretch of one motion between two times [s], and what holds with it.
+def _bytes_of(memory: Memory) -> bytes:
+    return np.array([tuple(memory)[:-1]], _MEMORY).tobytes() + np.array([tuple(memory.firm[0])], _FIRM).tobytes()
 
-    `error` is the latest that the chip has decided on [s], `wiper` the angle of the potentiometer at the start [rad],
-    `drive` how a bridge drives: −1, 0 or +1, `silent` whether pulses stay away from it, 1 or 0, `origin` the instant
-    from which the times of the motion count [s]. Of a digital servo `duty` is
-    that of its bridge, or `terms.duty.OPEN`, `BRAKED`; `goal` and `reference` are angles [rad], `trip` tells which.
-    """
 
-    start: float
-    end: float
-    motion: Motion
-    error: float
-    wiper: float
-    drive: float
-    silent: int = 0
-    origin: float = 0.0
-    duty: float = 0.0
-    goal: float = 0.0
-    reference: float = 0.0
-    trip: int = 0
+def _memory_in(held: bytes) -> Memory:
+    firm = named(Firm, np.frombuffer(held, _FIRM, 1, _MEMORY.itemsize).tolist()[0])
+    return named(Memory, (*np.frombuffer(held, _MEMORY, 1).tolist()[0], (firm,)))
 
-    @property
-    def anchor(self) -> float:
-        """When the motion began [s]; it may be before the segment's start."""
-        return self.origin + self.motion.t0
+
+def named(kind: Any, values: Any) -> Any:
+    """Return a record's values as the named tuple that it is of, with those in it."""
+    return kind(*(named(hint, value) if hasattr(hint, "_fields") else tuple(value) if isinstance(value, list) else value
+                  for (_, hint), value in zip(fields_of(kind), values, strict=True)))
+
+
+class Part(NamedTuple):
+    """Rows of motions of a servo whose numbers stayed the same: records of `Row`, or in plain Python a list."""
+
+    plan: Plan
+    rows: Any
 
 
 @dataclass
-class Record:
-    """What a run leaves behind: segments in order, and events; who is told how far it is [s]."""
+class RunLog:
+    """What a run leaves behind: rows of its motions, by the numbers that the servo had, and events in order.
 
-    segments: list[Segment]
-    events: list[Event]
+    Parameters
+    ----------
+    tell : callable, optional
+        Is given the time [s] that the run has come to, now and then.
+    """
+
     tell: Callable[[float], object] | None = None
+    parts: list[Part] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+
+    @cached_property
+    def room(self) -> Log:
+        """Room for compiled code to write into."""
+        return Log(np.empty(ROOM, _ROW), np.empty(ROOM, _HAPPENED), np.zeros(0), np.zeros(COUNTS, np.int64))
+
+    @cached_property
+    def lists(self) -> Log:
+        """Room for the same in plain Python."""
+        return Log([None] * ROOM, [None] * ROOM, [], [0] * COUNTS)
+
+    def read(self, plan: Plan, log: Log) -> None:
+        """Take over what a log has, and empty it."""
+        motions, events = int(log.counts[MOTIONS]), int(log.counts[EVENTS])
+        if motions:
+            self.parts.append(Part(plan, log.motions[:motions].copy()))
+        if events:
+            found = log.events[:events]
+            self.events += (Event(time, kinds.NAMES[kind], angle)
+                            for time, angle, kind in (found if isinstance(found, list) else found.tolist()))
+        log.counts[MOTIONS] = log.counts[EVENTS] = 0
 
 
-def run(plan: Plan, state: State, until: float, record: Record | None = None) -> State:
+def run(plan: Plan, state: State, until: float, record: RunLog | None = None) -> State:
     """Return the state at `until` [s], and add what happened to `record`.
 
     Raises
@@ -211,39 +265,124 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
     SimulationError
         If the run cannot go on; it carries status, time and cause.
     """
-    numbers, chip, inputs = plan.numbers, plan.chip, plan.inputs
-    memory = resumed(plan.pulsed, inputs, state.memory, numbers != state.numbers)
+    own = kernels_of_one()
+    memory, status = _plainly(plan, state, until, record) if own is None else plan.compiled.run(state, until, record)
+    if status != COMPLETED:
+        raise failure(Status.of_code(status), time_of(_memory_in(memory) if isinstance(memory, bytes) else memory))
+    return State(until, state.places, memory, plan.numbers, state.changes)
+
+
+def _plainly(plan: Plan, state: State, until: float, record: RunLog | None) -> tuple[Memory, int]:
+    """Run in plain Python; return the memory and a status."""
+    memory, status, begins = state.memory, PAUSED, True
     if plan.digital:
         memory = memory._replace(firm=(control.thawed(memory.firm[0]),))
-        controller.resume(inputs, memory)
-    end = instant(plan.pulsed, inputs, memory, until - origin_of(memory))
-    m = motion.nothing(numbers, memory.u, memory.tau)
-    idle = short = 0
-    while memory.point.time < end:
-        if due(memory):
-            memory = counted_anew(memory)
-            end = instant(plan.pulsed, inputs, memory, until - origin_of(memory))
-        before, trip = memory, memory.firm[0].trip if plan.digital else 0
-        try:
-            memory, m, event, status = step(numbers, chip, inputs, before, m, end)
-        except (ArithmeticError, ValueError):  # numbers beyond what a float holds
-            raise failure(Status.DIVERGED, time_of(before)) from None
-        if status != COMPLETED:
-            raise failure(Status.of_code(status), time_of(before))
-        idle = idle + 1 if memory.point.time == before.point.time else 0
-        if idle > MOST_IDLE:
-            raise failure(Status.CHATTER, time_of(before))
+    log = Log([], [], [], [0] * COUNTS) if record is None else record.lists
+    while status == PAUSED:
+        log.counts[LEFT] = STEPS
+        memory, status = engine_run.run(plan.numbers, plan.chip, plan.inputs, memory, until,
+                                        plan.numbers != state.numbers, begins, log)
+        begins = False
         if record is not None:
-            _keep(record, plan, before, trip, memory, m, event)
-        short = short + 1 if numbers.play.half > 0.0 and is_short(before, memory, event) else 0
-        if short >= MOST_SHORT:
-            memory, held = calmed(numbers, chip, inputs, memory)
-            if record is not None and held:
-                record.events.append(Event(time_of(memory), HELD, memory.point.y.q))
+            record.read(plan, log)
+            if record.tell is not None:
+                record.tell(time_of(memory))
     if plan.digital:
-        controller.pause(inputs, memory)
         memory = memory._replace(firm=(control.frozen(memory.firm[0]),))
-    return State(until, state.places, memory, numbers, state.changes)
+    return memory, status
+
+
+class Compiled:
+    """The run of a plan in compiled code: its arguments stand as words, and one memory is what they work on."""
+
+    def __init__(self, plan: Plan) -> None:
+        self._plan, self._lock = plan, threading.Lock()
+        self._held = bytearray(_MEMORY.itemsize + _FIRM.itemsize)
+        self._view = memoryview(self._held)
+        whole = np.frombuffer(self._held, np.uint8)
+        self._memories = Memories(whole[:_MEMORY.itemsize].view(_MEMORY), whole[_MEMORY.itemsize:].view(_FIRM))
+        self._inputs = _inputs_of(plan)
+        self._function = kernels(ONE).go_on.functions[0]
+        self._short = self._words(Log(np.empty(0, _ROW), np.empty(0, _HAPPENED), np.zeros(0),
+                                      np.zeros(COUNTS, np.int64)))
+
+    def _words(self, log: Log) -> _Words:
+        words = self._function.words((self._plan.plant, self._inputs, self._memories, 0.0, False, True, log))
+        place = self._function.size - _LOG_WORDS - 3
+        return _Words(words, words.view(np.float64), place, words.ctypes.data, log)
+
+    def run(self, state: State, until: float, record: RunLog | None) -> tuple[bytes, int]:
+        """Return what the servo remembers at a time [s], and a status; read a log whenever it waits."""
+        words, floats, place, address, log = self._short if record is None else self._words(record.room)
+        with self._lock:
+            self._view[:] = state.bytes
+            floats[place] = until
+            words[place + 1] = not (state.numbers is self._plan.numbers or state.numbers == self._plan.numbers)
+            words[place + 2] = True
+            status = PAUSED
+            while status == PAUSED:
+                log.counts[LEFT] = STEPS
+                status = self._function.call(address)
+                words[place + 2] = False
+                if record is not None:
+                    record.read(self._plan, log)
+                    if record.tell is not None:
+                        record.tell(time_of(_memory_in(bytes(self._view))))
+            return bytes(self._view), status
+
+
+class _Words(NamedTuple):
+    """Arguments of a call, where among them time, change and beginning stand, and the log that it writes."""
+
+    words: NDArray[np.int64]
+    floats: NDArray[np.float64]
+    place: int
+    address: int
+    log: Log
+
+
+_LOG_WORDS = 8  # address and length of four arrays
+
+
+def _inputs_of(plan: Plan) -> Inputs:
+    """Return what a servo is told as arrays."""
+    told = plan.inputs
+    table = np.array(plan.curve, np.float64).reshape(-1, 2)
+    return Inputs(plan.command.rows, plan.torque.rows, told.constant_torque, told.period,
+                  np.array(told.edges, np.float64), table, in_64_bits(told.seed), told.accuracy,
+                  np.array([tuple(plan.firmware)], record_of(Firmware)))
+
+
+def in_64_bits(seed: int) -> int:
+    """Return a seed that gives the same noise, which takes the lowest 64 bits alone."""
+    return (seed + 2**63) % 2**64 - 2**63
+
+
+def kernels_of_one() -> Any:
+    """Return the kernels of one servo; None where it runs in plain Python.
+
+    Where there are none yet they are made beside, and taken by whoever begins later.
+    """
+    if is_plain():
+        return None
+    if _found:
+        return _found[0]
+    if is_compiled(ONE):
+        _found.append(kernels(ONE))
+        return _found[0]
+    _make_beside()
+    return None
+
+
+_found: list[Any] = []
+
+
+@cache
+def _make_beside() -> None:
+    """Let another process make the kernels."""
+    text = "from servotwin.simulation.compile import kernels; from servotwin.simulation.engine import ONE; kernels(ONE)"
+    subprocess.Popen([sys.executable, "-c", text], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                     stderr=subprocess.DEVNULL, start_new_session=True)
 
 
 HELD = kinds.NAMES[kinds.HELD]
@@ -253,35 +392,6 @@ HELD = kinds.NAMES[kinds.HELD]
 def failure(status: Status, time: float) -> SimulationError:
     """Return the error of a run that ended at `time` [s]."""
     return SimulationError(status.name, time, status.message)
-
-
-def _keep(record: Record, plan: Plan, before: Memory, trip: int, memory: Memory, m: Motion, event: int) -> None:
-    """Add a step to a record: its chip's doings, its motion, its event."""
-    origin, point, was = origin_of(memory), memory.point, before.point
-    start, now, angle = origin + was.time, origin + point.time, was.y.q
-    if memory.chip is not before.chip:
-        keep_switch(record, before.chip, memory.chip, start, angle, plan.heeds_silence)
-        if (plan.refuses and memory.chip.number > before.chip.number
-                and not frame.accepted(plan.chip, pulse_width(plan.inputs, before))):
-            record.events.append(Event(start, kinds.NAMES[kinds.REFUSED], angle))
-    if plan.digital and memory.firm[0].trip != trip:
-        record.events.append(Event(start, TRIPS[memory.firm[0].trip], angle))
-    if now > start or not record.segments:
-        drive = sign_of(memory.firm[0].duty) if plan.digital else memory.chip.drive
-        record.segments.append(Segment(start, now, m, memory.chip.error, was.wiper, drive,
-                                       memory.chip.silent, origin, *told_by(plan, memory)))
-    if record.tell is not None:
-        record.tell(now)
-    if kinds.kind_of(event, point.mode) != kinds.NO_EVENT:
-        record.events.append(Event(now, event_name(event, point.mode), point.y.q))
-
-
-def keep_switch(record: Record, before: Frame, after: Frame, time: float, angle: float, heeds: bool) -> None:
-    """Add to a record that the bridge has switched at `time` [s], where the shaft is at `angle` [rad]."""
-    if after.drive != before.drive:
-        record.events.append(Event(time, kinds.NAMES[kinds.DRIVE_ENDS + int(after.drive)], angle))
-    if heeds and after.silent != before.silent:
-        record.events.append(Event(time, kinds.NAMES[kinds.SILENCE_ENDS + after.silent], angle))
 
 
 def sign_of(now: float) -> float:

@@ -289,8 +289,8 @@ def driven_of(result: Result) -> Driven | None:
     if not isinstance(result.model, SwitchedServo):
         return None
     digital = isinstance(result.model, DigitalServo)
-    rows = [(each.start, each.end, each.duty if digital else each.drive) for each in result.trajectory.segments]
-    return Driven(*np.array(rows, np.float64).reshape(-1, 3).T)
+    own = result.trajectory.segments
+    return Driven(own.starts, own.ends, own.rows["duty" if digital else "drive"])
 
 
 def _drives(driven: Driven | None, start: float, end: float) -> tuple[float, float]:

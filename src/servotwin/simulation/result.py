@@ -11,7 +11,6 @@ import numpy as np
 
 from servotwin.errors import MissingExtraError, SimulationError
 from servotwin.look import escape, number, table
-from servotwin.models.engine.motions.motion import is_step
 from servotwin.models.outputs import SIGNALS
 from servotwin.models.samples import Samples
 from servotwin.simulation import files
@@ -155,9 +154,9 @@ class Result:
     @cached_property
     def stats(self) -> Stats:
         """How the solution was found."""
-        closed = [not is_step(segment.motion) for segment in self.trajectory.segments]
-        method = "closed form" if all(closed) else "integrated" if not any(closed) else "closed form and integrated"
-        return Stats(method, len(closed), len(self.events), sum(event.kind == HELD for event in self.events))
+        steps = self.trajectory.segments.integrated
+        method = "closed form" if not steps.any() else "integrated" if steps.all() else "closed form and integrated"
+        return Stats(method, len(steps), len(self.events), sum(event.kind == HELD for event in self.events))
 
     @cached_property
     def remarks(self) -> tuple[Remark, ...]:

@@ -69,7 +69,7 @@ def sag_of(trajectories: Sequence[Trajectory], voltage: Callable[[Samples], Arra
     limit = math.inf if supply.current_limit is None else supply.current_limit
     if not supply.internal_resistance and math.isinf(limit):
         return None
-    different = {tuple(segment.start for segment in one.segments): one for one in reversed(trajectories)}
+    different = {one.segments.starts.tobytes(): one for one in reversed(trajectories)}
     found = [least(one, voltage) for one in different.values() if one.segments]
     if not found:  # a run that failed at once
         return None

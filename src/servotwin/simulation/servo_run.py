@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 from servotwin.errors import InputError, SimulationError
 from servotwin.models.engine.memory import ACCURACY
-from servotwin.simulation.engine import Record
+from servotwin.simulation.engine import RunLog
 from servotwin.simulation.oddities import warn_of
 from servotwin.simulation.progress import Progress, shown
 from servotwin.simulation.result import Result
 from servotwin.simulation.simulator import Simulator
 from servotwin.simulation.status import Status
 from servotwin.simulation.times import times_asked
-from servotwin.simulation.trajectory import Trajectory
+from servotwin.simulation.trajectory import Motions, Trajectory
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
@@ -90,13 +90,13 @@ def simulated(simulator: Simulator, command: Signal, duration: float, times: NDA
     """Return what `simulate` does, of arguments that it has looked at."""
     status, ended, cause = Status.COMPLETED, duration, Status.COMPLETED.message
     with shown(progress, _THOUSAND, "simulating") as show:
-        record = Record([], [], _thousandths(duration, show) if progress else None)
+        record = RunLog(_thousandths(duration, show) if progress else None)
         try:
             simulator.recorded(simulator.initial(command, initial), duration, command, record)
         except SimulationError as error:
             status, ended, cause = Status[error.status], error.time, error.cause
     return Result(model=simulator.model, command=command, load=simulator.load, drive=simulator.drive(command),
-                  time=times, trajectory=Trajectory(tuple(record.segments)), events=tuple(record.events),
+                  time=times, trajectory=Trajectory(Motions(record.parts)), events=tuple(record.events),
                   status=status, ended=ended, cause=cause)
 
 

@@ -24,7 +24,7 @@ from servotwin.models.terms.sensor import table_of
 from servotwin.physics.pieces import Pieces
 from servotwin.signals import Signal
 from servotwin.simulation import engine
-from servotwin.simulation.engine import Plan, Record, State, sign_of, told_by
+from servotwin.simulation.engine import Plan, RunLog, State, sign_of, told_by
 from servotwin.simulation.lanes.inputs import check_name
 from servotwin.simulation.lanes.load_columns import LOAD_NAMES, check_number, with_numbers
 from servotwin.simulation.start import accuracy_of, check_start, start_vector
@@ -207,7 +207,7 @@ class Simulator:
         """
         self._check(state, "changed(state)")
         if torque_enable is not None:
-            state = replace(state, memory=with_torque(self.model, state.memory, torque_enable))
+            state = state.with_memory(with_torque(self.model, state.memory, torque_enable))
             if parameters is None:
                 return state
         if not isinstance(parameters, Mapping) or not parameters:
@@ -216,7 +216,7 @@ class Simulator:
         own = self._with(changes)
         self._check(state, "changed(parameters)", own.model)
         memory = with_bodies(state.memory, own._numbers.play.half, own._numbers.elastic.k > 0.0)
-        return replace(state, changes=changes, places=own.model.states, memory=memory)
+        return state.with_memory(memory, places=own.model.states, changes=changes)
 
     def of(self, state: State) -> Simulator:
         """Return the simulator with whose numbers a state goes on: this one, unless `changed` gave it others.
@@ -260,7 +260,7 @@ class Simulator:
             raise InputError(what, got=f"a state of {', '.join(state.names)}",
                              allowed=f"one of {', '.join(own)}, as {type(model or self.model).__name__} has")
 
-    def recorded(self, state: State, until: float, command: Signal, record: Record | None, *,
+    def recorded(self, state: State, until: float, command: Signal, record: RunLog | None, *,
                  external_torque: float = 0.0) -> State:
         """Return what `advance` does, and add motions and events to a record, where one is given."""
         self._check(state, "advance(state)")

@@ -1,32 +1,195 @@
-"""The continuous solution of a run: its segments, evaluated at any time."""
+"""The continuous solution of a run: its motions, evaluated at any time."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.models.engine import at as engine_at
+from servotwin.models.engine.at import SHOWN
+from servotwin.models.engine.bus.shared_source import on_stiff_source
+from servotwin.models.engine.log import ALONE, DENSE, SERIES, Row
 from servotwin.models.engine.motions import motion
+from servotwin.models.engine.motions.motion import CREEP, Motion
+from servotwin.models.engine.run import Plant
 from servotwin.models.samples import Samples
-from servotwin.physics import play
-from servotwin.simulation.engine import Segment
+from servotwin.models.state.records import record_of
+from servotwin.simulation.engine import Part, Plan, kernels_of_one, named
 
 if TYPE_CHECKING:
     from servotwin.simulation.sag import Sag
 
 Array = NDArray[np.float64]
+_ROW = record_of(Row)
 _NODES = 12  # Gauss-Legendre nodes per interval
 _LATE = 1e-12  # of an instant
-_AT_ONCE = 1000  # segments
+_AT_ONCE = 1000  # motions
 _GRADES = 0.25 ** np.arange(1.0, 4.0)  # of an interval that ends at rest
-_SETTLING, _FADING = 4.0, 3.0  # times in which a creep settles, or friction fades, that an interval may last
-_NOTHING, _TIMES = 1e-15, 3.0  # A, what is left of a current; of 1/rate: an interval in which it fades
-_SHORTEST = 1e-307  # s: what is over in less has no time of its own
+_STEPS = (motion.STEP, motion.LONG_STEP, motion.CREEP, motion.PAIR, motion.WARMING)
+
+
+class Segment(NamedTuple):
+    """A stretch of one motion between two times [s], and what holds with it.
+
+    `error` is the latest that the chip has decided on [s], `wiper` the angle of the potentiometer at the start [rad],
+    `drive` how a bridge drives: −1, 0 or +1, `silent` whether pulses stay away from it, 1 or 0, `origin` the instant
+    from which the times of the motion count [s]. Of a digital servo `duty` is
+    that of its bridge, or `terms.duty.OPEN`, `BRAKED`; `goal` and `reference` are angles [rad], `trip` tells which.
+    """
+
+    start: float
+    end: float
+    motion: Motion
+    error: float
+    wiper: float
+    drive: float
+    silent: int = 0
+    origin: float = 0.0
+    duty: float = 0.0
+    goal: float = 0.0
+    reference: float = 0.0
+    trip: int = 0
+
+    @property
+    def anchor(self) -> float:
+        """When the motion began [s]; it may be before the segment's start."""
+        return self.origin + self.motion.t0
+
+
+class Motions(Sequence[Segment]):
+    """The motions of a run in order, as rows; each is made an object when it is asked for.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+        Rows by the plans that they are of.
+    shared : ndarray, optional
+        Numbers of common motions, of servos on one supply.
+    since, until : float
+        Only motions that are underway between these times [s].
+    """
+
+    def __init__(self, parts: Sequence[Part], shared: Array | None = None, since: float = -math.inf,
+                 until: float = math.inf) -> None:
+        self._parts, self._shared = tuple(parts), np.zeros(0) if shared is None else shared
+        self._since, self._until = since, until
+        whole = [part.rows if isinstance(part.rows, np.ndarray) else np.array(part.rows, _ROW) for part in parts]
+        rows = np.concatenate(whole) if whole else np.zeros(0, _ROW)
+        of = np.repeat(np.arange(len(whole)), [len(one) for one in whole])
+        there = (rows["origin"] + rows["end"] > since) & (rows["origin"] + rows["start"] < until)
+        if not there.all():
+            rows, of = rows[there], of[there]
+        self.rows, self._of = rows, of
+        self.ends = rows["origin"] + rows["end"]
+        self.starts = np.maximum(rows["origin"] + rows["start"], since)
+        self.anchors = rows["origin"] + rows["t0"]
+
+    def __len__(self) -> int:
+        """Return how many motions there are."""
+        return len(self.rows)
+
+    def __getitem__(self, index: Any) -> Any:
+        """Return a motion, or some of them."""
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        if not -len(self) <= index < len(self):
+            raise IndexError(index)
+        return self._made(index % len(self))
+
+    def __iter__(self) -> Iterator[Segment]:
+        return map(self._made, range(len(self)))
+
+    def between(self, since: float = -math.inf, until: float = math.inf) -> Motions:
+        """Return those that are underway between two times [s]."""
+        return Motions(self._parts, self._shared, max(since, self._since), min(until, self._until))
+
+    @property
+    def integrated(self) -> NDArray[np.bool_]:
+        """Which are steps of an integrator, or end as these do."""
+        how = self.rows["how"]
+        return (how == DENSE) | ((how == ALONE) & np.isin(self.rows["kind"], _STEPS))
+
+    @property
+    def has_program(self) -> bool:
+        """Whether a program drives."""
+        return bool(self._parts) and self._parts[0].plan.digital
+
+    @cached_property
+    def resolution(self) -> Array:
+        """What `engine.at.resolution` finds of each, shape (3, n) [s]."""
+        found = np.empty((3, len(self)))
+        for plan, places in self._by_plan():
+            own = np.empty((3, len(places)))
+            self._kernels.resolution(*self._given(plan, places), self._shared, own)
+            found[:, places] = own
+        return found
+
+    def shown(self, index: NDArray[np.intp], ages: Array, *, ends: bool = False) -> Array:
+        """Return what holds at times after the beginnings of motions [s], as `engine.at.at` shows it, shape (20, n).
+
+        `ends` says that motions end there: what is only interpolated is followed anew.
+        """
+        shown = np.empty((SHOWN, len(index)))
+        several = len(self._parts) > 1
+        for plan, places in self._by_plan():
+            which = np.flatnonzero(np.isin(index, places)) if several else slice(None)
+            own = np.empty((SHOWN, len(index[which])))
+            asked = np.searchsorted(places, index[which]) if several else index
+            plants, accuracy, rows = self._given(plan, places)
+            self._kernels.at(plants, accuracy, rows, self._shared, np.ascontiguousarray(asked, np.int64),
+                             np.ascontiguousarray(ages[which]), ends, own)
+            shown[:, which] = own
+        return shown
+
+    def _by_plan(self) -> Iterator[tuple[Plan, NDArray[np.intp]]]:
+        for k, part in enumerate(self._parts):
+            places = np.flatnonzero(self._of == k)
+            if places.size:
+                yield part.plan, places
+
+    @property
+    def _kernels(self) -> Any:
+        return kernels_of_one() or engine_at
+
+    def _given(self, plan: Plan, places: NDArray[np.intp]) -> tuple[Any, float, Any]:
+        """Return a servo and its rows as kernels take them."""
+        rows = self.rows if len(places) == len(self) else self.rows[places]
+        if kernels_of_one() is not None:
+            return plan.plant, plan.accuracy, rows
+        return [Plant(plan.numbers, plan.chip)], plan.accuracy, _Rows(rows)
+
+    def _made(self, k: int) -> Segment:
+        row = named(Row, self.rows[k].item())
+        plan = self._parts[self._of[k]].plan
+        m = engine_at.motion_of(plan.numbers, row, self._shared, plan.accuracy)
+        if row.how != ALONE:
+            m = m._replace(numbers=on_stiff_source(m.numbers, row.returns > 0))
+        if row.how == SERIES:
+            both = self._shared[row.first:row.first + 2 * row.kind].tolist()
+            m = motion.by_series(m.numbers, row.mode, row.u, row.tau, row.t0, row.y, row.length,
+                                 tuple(both[:row.kind]), tuple(both[row.kind:]))
+        return Segment(float(self.starts[k]), float(self.ends[k]), m, row.error, row.wiper, row.drive, row.silent,
+                       row.origin, row.duty, row.goal, row.reference, row.trip)
+
+
+class _Rows:
+    """Rows of numpy's records as plain Python reads them: named tuples, the latest kept."""
+
+    def __init__(self, rows: NDArray[Any]) -> None:
+        self._rows = rows
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __getitem__(self, k: int) -> Row:
+        row: Row = named(Row, self._rows[k].item())
+        return row
 
 
 class Bus(Protocol):
@@ -42,101 +205,100 @@ class Bus(Protocol):
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Segments without gaps, in order; after the last one the state is not known (nan)."""
+    """Motions without gaps, in order; after the last one the state is not known (nan)."""
 
-    segments: Sequence[Segment]
+    segments: Motions
     bus: Bus | None = None
-
-    @cached_property
-    def _starts(self) -> Array:
-        return np.array([segment.start for segment in self.segments])
 
     def at(self, time: Array) -> Samples:
         """Return the state at `time` [s], any order; at an event, just after it."""
         t = np.asarray(time, dtype=np.float64)
-        if not self.segments:
+        if not len(self.segments):
             nothing = np.full(t.size, math.nan)
             return Samples.make(t, np.tile(nothing, (7, 1)), nothing, np.zeros((5, t.size)), *np.zeros((3, t.size)))
-        now, end = self._since_ticks(t), self.segments[-1].end
+        now, end = self._since_ticks(t), self.segments.ends[-1]
         now = np.where((now > end) & (now <= end * (1.0 + _LATE)), end, now)  # sums of ticks may end a rounding early
-        index = np.maximum(np.searchsorted(self._starts, now, side="right") - 1, 0)
+        index = np.maximum(np.searchsorted(self.segments.starts, now, side="right") - 1, 0)
         return replace(self._states(now, index), time=t)
 
     def _since_ticks(self, t: Array) -> Array:
         """Return times [s] of which those next to a tick are not before it: sums of ticks may end a rounding late."""
-        if not self.segments[0].motion.numbers.bridge.pwm > 0.0:
+        if not self.segments.has_program:
             return t
-        begun = self._starts[np.minimum(np.searchsorted(self._starts, t * (1.0 + _LATE)), len(self._starts)) - 1]
+        starts = self.segments.starts
+        begun = starts[np.minimum(np.searchsorted(starts, t * (1.0 + _LATE)), len(starts) - 1)]
         return np.where(abs(begun - t) <= _LATE * t, np.maximum(begun, t), t)
 
     def since(self, start: float) -> Trajectory:
         """Return what is left of it from a time [s] on."""
-        return replace(self, segments=tuple(segment._replace(start=max(segment.start, start))
-                                            for segment in self.segments if segment.end > start))
+        return replace(self, segments=self.segments.between(since=start))
 
     def inside(self, index: int, time: Array) -> Samples:
         """Return the state at `time` [s] by the motion of one segment, its end included."""
-        segment = self.segments[index]  # by rounding, a time may lie just outside
-        return self._states(np.clip(time, segment.start, segment.end), np.full(time.size, index))
+        own = self.segments  # by rounding, a time may lie just outside
+        return self._states(np.clip(time, own.starts[index], own.ends[index]), np.full(time.size, index))
 
     def inside_each(self, times: Sequence[Array]) -> Samples:
         """Return the states at times [s] of all segments, one array for each, one after the other."""
-        clipped = [np.clip(t, segment.start, segment.end) for t, segment in zip(times, self.segments, strict=True)]
-        return self._states(np.concatenate(clipped), np.repeat(np.arange(len(times)), [t.size for t in times]))
+        index = np.repeat(np.arange(len(times)), [t.size for t in times])
+        own = self.segments
+        return self._states(np.clip(np.concatenate(times), own.starts[index], own.ends[index]), index)
 
     def _states(self, t: Array, index: NDArray[np.intp], ages: Array | None = None) -> Samples:
         """Return the states at times by the motions of segments; `ages` are t − anchor without what t rounds away."""
-        y = np.full((7, t.size), math.nan)
-        mode, wiper, drive, error, silent = np.zeros((5, t.size)), *np.zeros((4, t.size))
-        told = np.zeros((4, t.size))
-        order = np.argsort(index, kind="stable")
-        used, first = np.unique(index[order], return_index=True)
-        groups = np.split(order, first[1:]) if t.size else []
-        for k, those in zip(used.tolist(), groups, strict=True):
-            segment = self.segments[k]
-            where = those[(t[those] <= segment.end) & (t[those] >= segment.start)]
-            if where.size == 0:
-                continue
-            s = t[where] - segment.anchor if ages is None else ages[where]
-            y[:, where] = _states(segment.motion, s)
-            mode[:, where] = np.array(segment.motion.mode)[:, None]
-            drive[where], error[where], silent[where] = segment.drive, segment.error, segment.silent
-            told[:, where] = np.array([segment.duty, segment.goal, segment.reference, segment.trip])[:, None]
-            wiper[where] = play(segment.wiper, y[0, where], 2.0 * segment.motion.numbers.sensor.half_slack)
-        return Samples.make(t, y, wiper, mode, drive, error, silent, None if self.bus is None else self.bus(t),
-                            told)
+        own = self.segments
+        there = (t <= own.ends[index]) & (t >= own.starts[index])
+        since = t - own.anchors[index] if ages is None else ages
+        shown = np.zeros((SHOWN, t.size))
+        shown[:8] = math.nan
+        if there.all():
+            shown = own.shown(index, since)
+        elif there.any():
+            shown[:, there] = own.shown(index[there], since[there])
+        return Samples.make(t, shown[:7], shown[7], shown[8:13], shown[13], shown[14], shown[15],
+                            None if self.bus is None else self.bus(t), shown[16:])
 
     def intervals(self, index: int) -> Array:
         """Return the ends of short intervals of one segment, in each of which all signals are smooth and gentle.
 
         They count from the segment's anchor [s]: a motion may settle in less than its time of day can tell.
         """
-        segment = self.segments[index]
-        age, end = segment.start - segment.anchor, segment.end - segment.anchor
-        width = motion.period(segment.motion.u, segment.motion.tau, segment.start - segment.origin,
-                              segment.end - segment.origin) / 4.0
-        fine, settled = _scales(segment.motion)
-        fine = max(fine, _SHORTEST)
+        own = self.segments
+        age, end = (float(times[index] - own.anchors[index]) for times in (own.starts, own.ends))
+        fine, settled, width = own.resolution[:, index].tolist()
         edges = [age]
         while age < end:
             age = min(end, age + min(width, fine if age < settled else max(age, fine)))
             edges.append(age)
-        return _graded(segment, np.array(edges))
+        return self._graded(index, np.array(edges))
+
+    def _graded(self, index: int, edges: Array) -> Array:
+        """Return intervals that are short beside a rest from or to which a shaft creeps: there it is not smooth."""
+        own, row = self.segments, self.segments.rows[index]
+        if row["how"] != ALONE or row["kind"] != CREEP or edges.size < 2:
+            return edges
+        more = [edges]
+        if row["y"]["w"] == 0.0 and own.starts[index] == own.anchors[index]:
+            more.append(edges[0] + (edges[1] - edges[0]) * _GRADES)
+        if row["last"]["w"] == 0.0 and edges[-1] >= row["length"] * (1.0 - _LATE):
+            more.append(edges[-1] + (edges[-2] - edges[-1]) * _GRADES)
+        return np.unique(np.concatenate(more))
 
     def integral(self, integrand: Callable[[Samples], Array]) -> Array:
         """Return the integral over the whole run of a vector of signals; `integrand` returns shape (m, n)."""
         x, weight = np.polynomial.legendre.leggauss(_NODES)
         total: Array | float = 0.0
+        own = self.segments
         times, ages, weights, index = [], [], [], []
-        for k, segment in enumerate(self.segments):
+        for k in range(len(own)):
             edges = self.intervals(k)
             half = 0.5 * np.diff(edges)[:, None]
             nodes = (edges[:-1, None] + half + half * x).ravel()
             ages.append(nodes)
-            times.append(np.clip(segment.anchor + nodes, segment.start, segment.end))
+            times.append(np.clip(own.anchors[k] + nodes, own.starts[k], own.ends[k]))
             weights.append((half * weight).ravel())
             index.append(np.full(nodes.size, k))
-            if len(times) == _AT_ONCE or k == len(self.segments) - 1:
+            if len(times) == _AT_ONCE or k == len(own) - 1:
                 values = integrand(self._states(np.concatenate(times), np.concatenate(index), np.concatenate(ages)))
                 total = total + (values * np.concatenate(weights)).sum(axis=1)
                 times, ages, weights, index = [], [], [], []
@@ -144,45 +306,7 @@ class Trajectory:
 
     def dense_times(self, index: int, per_interval: int = 8) -> Array:
         """Return times that resolve one segment as far as times can, both its ends included."""
-        segment, edges = self.segments[index], self.intervals(index)
+        own, edges = self.segments, self.intervals(index)
         fractions = np.linspace(0.0, 1.0, per_interval, endpoint=False)
-        inner = segment.anchor + (edges[:-1, None] + np.diff(edges)[:, None] * fractions).ravel()
-        return np.unique(np.clip(np.append(inner, segment.end), segment.start, segment.end))
-
-
-def _scales(m: motion.Motion) -> tuple[float, float]:
-    """Return `motion.scales`; of a creep, which may be long, the time in which its speed would change at most.
-
-    Of a step of a servo that warms up, those of the current that fades, as long as anything is left of it.
-    """
-    fine, settled = motion.scales(m)
-    if m.kind == motion.WARMING:
-        *_, of, by = motion.prepared(m).long_dense
-        fast, left = of.w, abs(by.q_m) / _NOTHING
-        return (_TIMES / fast, math.log(left) / fast) if fast > 0.0 and left > 1.0 else (fine, settled)
-    if m.kind != motion.CREEP:
-        return fine, settled
-    most = max(abs(motion.rates(m, 0.0, m.start).w), abs(motion.rates(m, m.length, m.end).w))
-    change = abs(m.end.w - m.start.w)
-    change = min(_SETTLING * change, _FADING * m.numbers.friction.w_s)
-    fine = min(fine, change / most) if change > 0.0 else fine
-    return fine, 10.0 * fine
-
-
-def _graded(segment: Segment, edges: Array) -> Array:
-    """Return intervals that are short beside a rest from which or to which a shaft creeps: there it is not smooth."""
-    m = segment.motion
-    if m.kind != motion.CREEP or edges.size < 2:
-        return edges
-    more = [edges]
-    if m.start.w == 0.0 and segment.start == segment.anchor:
-        more.append(edges[0] + (edges[1] - edges[0]) * _GRADES)
-    if m.end.w == 0.0 and edges[-1] >= m.length * (1.0 - _LATE):
-        more.append(edges[-1] + (edges[-2] - edges[-1]) * _GRADES)
-    return np.unique(np.concatenate(more))
-
-
-def _states(m: motion.Motion, s: Array) -> Array:
-    """Return the states of a motion at times s after its anchor, shape (7, n)."""
-    m = motion.prepared(m)
-    return np.array([motion.state(m, x) for x in s.tolist()]).T
+        inner = own.anchors[index] + (edges[:-1, None] + np.diff(edges)[:, None] * fractions).ravel()
+        return np.unique(np.clip(np.append(inner, own.ends[index]), own.starts[index], own.ends[index]))

@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 
 from servotwin.models.engine.batch import tiles
 from servotwin.models.engine.batch.tiles import Lanes, Outputs
-from servotwin.models.engine.memory import Memories, Memory
+from servotwin.models.engine.log import Happened, Log, Row
+from servotwin.models.engine.memory import Inputs, Memories, Memory
+from servotwin.models.engine.run import Plant
 from servotwin.models.state.records import record_of, rows_of
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.control import Firm
@@ -63,7 +65,14 @@ def _outputs(real: Kind) -> Tuple:
 
 
 _GOING = (_LANES, _TABLE, *_RECORDED, _INDICES, _FLOATS, _FLOATS, _INDICES, _CUBE, _MEMORIES, _INDICES)
+_LOG_ROWS, _PLANTS = _records(record_of(Row)), _records(record_of(Plant))
+_INPUTS = _tuple(Inputs, _TABLE, constant_torque=FLOAT64, period=FLOAT64, edges=_FLOATS, seed=INT64, accuracy=FLOAT64,
+                 firmware=_records(record_of(Firmware)))
+_LOG = _tuple(Log, _FLOATS, motions=_LOG_ROWS, events=_records(record_of(Happened)), counts=_INDICES)
 _SIGNATURES: Mapping[str, tuple[Kind, ...]] = {
+    "run:go_on": (_PLANTS, _INPUTS, _MEMORIES, FLOAT64, BOOL, BOOL, _LOG),
+    "at:at": (_PLANTS, FLOAT64, _LOG_ROWS, _FLOATS, _INDICES, _FLOATS, BOOL, _TABLE),
+    "at:resolution": (_PLANTS, FLOAT64, _LOG_ROWS, _FLOATS, _TABLE),
     "runs:start": (_LANES, _INDICES, _MEMORIES), "runs:go_on": (*_GOING, _FLOATS), "runs:to_first_ticks": _GOING,
     "runs:ready": (_INDICES, _SMALLS, _FLOATS, _INDICES, _FLOATS, _INDICES),
     "runs:note_failures": (_INDICES, _INDICES, _FLOATS, _ROWS, _SMALLS, _FLOATS),
@@ -106,7 +115,7 @@ def _of_buses() -> Mapping[str, tuple[Kind, ...]]:
     shared, room = _records(record_of(Shared)), (_records(record_of(Seat)), _records(record_of(Mate)))
     units = (_records(record_of(Unit)), _records(record_of(Coupling)))
     own = (_LANES, tables, _tuple(Buses, _INDICES, memories=_MEMORIES, shared=shared, ended=_FLOATS))
-    tape = _tuple(Tape, _TABLE, numbers=_FLOATS, used=_INDICES)
+    tape = _tuple(Tape, _FLOATS, motions=_LOG_ROWS, events=_TABLE, used=_INDICES)
     return {"bus_batch:go_on": (*own, INT64, INT64, FLOAT64, FLOAT64, *room, *units, tape),
             "bus_batch:look": (*own, *room, _TABLE),
             "bus_batch:voltages": (_LANES, shared, room[1], _TABLE, _FLOATS),
@@ -127,7 +136,7 @@ def _of_the_bench() -> Mapping[str, tuple[Kind, ...]]:
     told = _tuple(Told, _TABLE, edges=_FLOATS)
     tables = _tuple(Tables, _INDICES, torques=_TABLE, curves=_TABLE)
     bus = (_LANES, tables, _records(record_of(Shared)), _records(record_of(Seat)), _records(record_of(Mate)),
-           _tuple(Tape, _TABLE, numbers=_FLOATS, used=_INDICES))
+           _tuple(Tape, _FLOATS, motions=_LOG_ROWS, events=_TABLE, used=_INDICES))
     going = (FLOAT64, FLOAT64, INT64, _CUBE, _CUBE, _CUBE, _INDICES)
     return {"bench:make": (posts, programs, INT64, INT64, _records(record_of(Given)), _records(record_of(Weights))),
             "bench:begin": (posts, INT64, told, _MEMORIES), "bench:change": (posts, INT64, _MEMORIES),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from servotwin.models.engine.bus import event_log
 from servotwin.models.engine.bus.event_log import Tape
 from servotwin.models.engine.observe import Observed
-from servotwin.simulation.bus_run import BUSES
+from servotwin.simulation.bus_run import BUSES, ROW
 from servotwin.simulation.compile.calls import Call, Now, call_of
 from servotwin.simulation.compile.layout import GIVEN
 from servotwin.simulation.lanes.form_recipes import TICKS
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-NO_TAPE = Tape(np.zeros((0, event_log.ROW)), np.zeros((0, event_log.EVENT)), np.zeros(0), np.zeros(0, np.int64))
+NO_TAPE = Tape(np.zeros(0, ROW), np.zeros((0, event_log.EVENT)), np.zeros(0), np.zeros(0, np.int64))
 """Of buses whose motions nobody keeps."""
 
 

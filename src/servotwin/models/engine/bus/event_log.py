@@ -5,28 +5,29 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.models.engine.bus.bus_records import DENSE as _DENSE
-from servotwin.models.engine.bus.bus_records import ROOM, drive_of, mode_of, vector_of
+from servotwin.models.engine.bus.bus_records import ROOM, drive_of, mode_of, piece_of, vector_of
+from servotwin.models.engine.log import ALONE, DENSE, SERIES, Row, put_row
+from servotwin.models.engine.memory import since
 from servotwin.models.engine.motions.motion import LONG_STEP
 from servotwin.models.state.modes import Mode
 from servotwin.models.terms import duty
+from servotwin.physics.pieces import Piece
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-# How a motion is written down: by its own law, or the numbers of a common one, a series or a step.
-ALONE, SERIES, DENSE = range(3)
+PLAIN = True  # the compiler takes it for False
 # Events besides those of guards: how the bridge drives after it, silence, a pulse that is not taken, a trip.
 DRIVES, SILENCE, REFUSED, TRIPS = -10, -20, -30, -50
-ROW, EVENT = 47, 6  # numbers of a row
-UNTIL, FIRST = 4, 25  # where a row of a motion has its end, and the place of its first number
+EVENT = 6  # numbers of a row
 _MOST = 8  # rows of one servo between two looks at the room that is left
 
 
 class Tape(NamedTuple):
     """Room for rows of motions, rows of events, and numbers of common motions; and how much of each is used."""
 
-    motions: NDArray[np.float64]
+    motions: Any  # records of `log.Row`
     events: NDArray[np.float64]
     numbers: NDArray[np.float64]
     used: NDArray[np.int64]
@@ -61,7 +62,7 @@ def write_alone(tape: Tape, unit: int, seat: Any, until: float) -> None:
     """Write down the motion of a servo on its own, from its point to a time by its own clock [s]."""
     track = seat.track
     _write(tape, unit, ALONE, seat, until, mode_of(seat.point.mode), track.kind, track.length, track.next_step, 0, 0,
-           track.end, seat.point.anchor)
+           seat.point.anchor_time, track.end, seat.point.anchor)
 
 
 def write_together(tape: Tape, unit: int, seat: Any, until: float, shared: Any, mate: Any) -> None:
@@ -77,23 +78,20 @@ def write_together(tape: Tape, unit: int, seat: Any, until: float, shared: Any, 
             tape.numbers[first + n] = mate.dense[n]
         tape.used[2], how = first + _DENSE, DENSE
     _write(tape, unit, how, seat, until, mode_of(mate.mode), terms, shared.length, 0.0,
-           first, mate.returns, mate.end, mate.start)
+           first, mate.returns, seat.point.anchor_time, mate.end, mate.start)
 
 
 def _write(tape: Tape, unit: int, how: int, seat: Any, until: float, mode: Mode, kind: int, length: float,
-           next_step: float, first: int, returns: int, end: Any, start: Any) -> None:
-    now, point, tau, shown, drive = seat.decided, seat.point, seat.tau, seat.shown, drive_of(seat)
-    y, z, path = vector_of(end), vector_of(start), seat.numbers.bridge
+           next_step: float, first: int, returns: int, t0: float, end: Any, start: Any) -> None:
+    now, point, shown, drive, path = seat.decided, seat.point, seat.shown, drive_of(seat), seat.numbers.bridge
     u = seat.numbers.source.V * drive * (duty.share_of(path, shown.duty) if duty.present(seat.numbers.bridge) else 1.0)
-    values = (1.0 * unit, 1.0 * how, seat.origin, point.time, until, now.error, point.wiper, drive,
-              1.0 * now.silent,
-              1.0 * mode.zone, 1.0 * mode.contact, 1.0 * mode.mesh, 1.0 * mode.motor, 1.0 * mode.share,
-              u,
-              tau.start - seat.origin, tau.value, tau.slope, tau.amplitude, tau.frequency, tau.phase, tau.sweep,
-              1.0 * kind, length, next_step, 1.0 * first, 1.0 * returns, point.anchor_time, point.step,
-              y.q, y.w, y.i, y.T_w, y.T_h, y.q_m, y.w_m, z.q, z.w, z.i, z.T_w, z.T_h, z.q_m, z.w_m,
-              shown.duty, shown.goal, shown.reference, 1.0 * shown.trip)
+    row = Row(unit, how, seat.origin, point.time, until, now.error, point.wiper, drive, now.silent, shown.duty,
+              shown.goal, shown.reference, shown.trip, kind, mode, Piece(0.0, u, 0.0, 0.0, 0.0, 0.0, 0.0),
+              since(piece_of(seat.tau), seat.origin), t0, length, next_step, vector_of(start), vector_of(end), first,
+              returns)
     n = tape.used[0]
-    for k in range(ROW):
-        tape.motions[n, k] = values[k]
+    if PLAIN:
+        tape.motions[n] = row
+    else:
+        put_row(tape.motions[n], row)
     tape.used[0] = n + 1

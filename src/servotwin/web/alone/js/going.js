@@ -60,7 +60,7 @@ export class Going {
    */
   onBus(n) {
     const { kernel } = this;
-    const { row, event, series } = kernel.layout;
+    const { event, series } = kernel.layout;
     const whole = () => kernel.take(n);
     const room = this.world.limits.at_once * n;
     const lanes = { numbers: this.none, chips: kernel.records("chips", 1), start: { ...this.none, lengths: [0, 0] }, torque: whole(),
@@ -68,7 +68,7 @@ export class Going {
       accuracy: this.world.limits.accuracy, firmware: this.programs, edges: this.told[2] };
     const tables = { torques: { ...this.none, lengths: [0, 0] }, curves: this.told[1], torque_first: whole(), torque_count: whole(),
       curve_first: whole(), curve_count: whole() };
-    const tape = [kernel.take(room, row), kernel.take(room, event), kernel.take(room * series), kernel.take(3)];
+    const tape = [kernel.records("row", room), kernel.take(room, event), kernel.take(room * series), kernel.take(3)];
     return { lanes, rest: [kernel.layout.tables.map((/** @type {string} */ name) => /** @type {any} */ (tables)[name]),
       kernel.records("shared", 1), kernel.records("seat", n), kernel.records("mate", 2 * n), tape] };
   }
