@@ -63,8 +63,9 @@ def test_compiled_a_fleet_is_what_it_is_in_plain_python(servo, monkeypatch, name
 def test_a_run_that_fills_many_tapes_is_the_same(servo, monkeypatch, name):
     usual = fleet_of(servo, name)
     rows = 60
-    monkeypatch.setattr(bus_run, "tape_of", lambda _: Tape(
-        np.empty((rows, event_log.ROW)), np.empty((rows, event_log.EVENT)), np.empty(60 * rows), np.zeros(3, np.int64)))
+    monkeypatch.setattr(bus_run, "tape_of", lambda _, plain: Tape(
+        [None] * rows if plain else np.empty(rows, bus_run.ROW),
+        np.empty((rows, event_log.EVENT)), np.empty(60 * rows), np.zeros(3, np.int64)))
     same(fleet_of(servo, name), usual, 1e-10)
 
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-import compiled_run
+import plain_run
 import servotwin as st
 from leg_cases import GOALS, INERTIAS, SERVOS, TORQUES, goals_of, values_of, written
 from reference import digital
@@ -71,9 +71,9 @@ def both(run: Run, number: int, plain: bool = False) -> tuple[st.Result, digital
     load = st.loads.Inertia(run.inertia) + st.loads.Constant(run.torque)
     asked = {"duration": DURATION, "load": load, "output_times": TIMES, "initial": {"output_angle": 0.1},
              "accuracy": 1e-12}
-    result = compiled_run.simulate(model, written(at, goals), **asked).raise_if_failed()
+    result = st.simulate(model, written(at, goals), **asked).raise_if_failed()
     if plain:
-        compiled_run.is_the_same(result, st.simulate(model, written(at, goals), **asked).raise_if_failed())
+        plain_run.is_the_same(result, plain_run.simulate(model, written(at, goals), **asked).raise_if_failed())
     pieces = [(float(t), float(goal), 0.0) for t, goal in zip(at, goals, strict=True)]
     trace = digital.run(values_of(servo), {"kind": "goal", "pieces": pieces},
                         {"inertia": run.inertia, "torque": run.torque}, DURATION, TIMES, initial_angle=0.1)

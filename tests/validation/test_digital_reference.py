@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-import compiled_run
+import plain_run
 import servotwin as st
 from reference import digital
 from servotwin.errors import CommandError
@@ -29,12 +29,12 @@ def deviations(seed, linear, lanes=False, plain=False):
     times = (np.arange(1, 60) / 60.0 + 3e-4) * 0.99 * case.duration
     asked = {"duration": case.duration, "load": load, "output_times": times, "accuracy": 1e-12}
     try:
-        result = compiled_run.simulate(model, command, initial={"output_angle": 0.0}, **asked).raise_if_failed()
+        result = st.simulate(model, command, initial={"output_angle": 0.0}, **asked).raise_if_failed()
     except CommandError:  # goals that servotwin refuses and a servo clips
         return None
     if plain:
-        again = st.simulate(model, command, initial={"output_angle": 0.0}, **asked).raise_if_failed()
-        compiled_run.is_the_same(result, again)
+        again = plain_run.simulate(model, command, initial={"output_angle": 0.0}, **asked).raise_if_failed()
+        plain_run.is_the_same(result, again)
     trace = digital.run(case.values, case.command, case.load, case.duration, times)
     angle = np.abs(result["output_angle"] - trace.output_angle).max()
     period = case.values["firmware"]["control_period"]

@@ -11,7 +11,7 @@ import sys
 import numpy as np
 import pytest
 
-import compiled_run
+import plain_run
 from reference.drivetrain import Trace, simulate_case
 from reference.drivetrain_cases import TERMS, Case, random_case
 from validation.test_drivetrain_reference import on_a_knife_edge, simulate
@@ -42,7 +42,7 @@ def drawn(many: int) -> list[tuple[Case, Trace]]:
 
 def errors(servos: list[tuple[Case, Trace]], accuracy: float) -> np.ndarray:
     """Return the largest error of each servo's angle [rad]."""
-    return np.array([np.max(np.abs(simulate(case, trace.times, compiled_run.simulate, accuracy=accuracy)["output_angle"]
+    return np.array([np.max(np.abs(simulate(case, trace.times, accuracy=accuracy)["output_angle"]
                                    - trace.output_angle)) for case, trace in servos])
 
 
@@ -60,7 +60,7 @@ def test_events_and_kinks_within_a_step_cost_no_accuracy(seed: int) -> None:
     case = case_of(seed)
     times = np.linspace(0.0, case.duration, 26)
     usual, fine = (simulate(case, times, accuracy=accuracy) for accuracy in (1e-7, 1e-13))
-    compiled_run.is_the_same(simulate(case, times, compiled_run.simulate, accuracy=1e-7), usual)
+    plain_run.is_the_same(usual, simulate(case, times, plain_run.simulate, accuracy=1e-7))
     usual, fine = usual["output_angle"], fine["output_angle"]
     assert np.max(np.abs(usual - fine)) < 2e-12
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import compiled_run
 import servotwin as st
 from conftest import EVERYTHING
 from reference.drivetrain import ENERGIES, simulate_case
@@ -58,7 +57,7 @@ def test_in_many_mixtures(seed):
     terms = frozenset(term for term in sorted(TERMS) if rng.random() < 0.5)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # random calibrations differ by design
-        check(simulate(random_case(400 + seed, terms), np.array([0.2]), compiled_run.simulate))
+        check(simulate(random_case(400 + seed, terms), np.array([0.2])))
 
 
 def test_it_is_the_energy_of_the_reference():

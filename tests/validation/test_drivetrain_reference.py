@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import compiled_run
+import plain_run
 import servotwin as st
 from reference.drivetrain import Trace, simulate_case
 from reference.drivetrain_cases import TERMS, Case, command_of, load_of, random_case, servo_of
@@ -80,9 +80,9 @@ def left_out(cases: list[Case], tolerance: float, *, plain: bool = False) -> int
         times = np.linspace(0.0, case.duration, 41)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # random calibrations differ by design
-            result = simulate(case, times, by=compiled_run.simulate)
+            result = simulate(case, times)
             if plain:
-                compiled_run.is_the_same(result, simulate(case, times))
+                plain_run.is_the_same(result, simulate(case, times, by=plain_run.simulate))
         trace = simulate_case(case, times, **COARSE)
         if on_a_knife_edge(trace):
             skipped += 1

@@ -9,8 +9,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import compiled_run
-import servotwin as st
 from reference.drivetrain import simulate_case
 from reference.drivetrain_cases import random_case
 from validation.test_drivetrain_reference import COARSE, on_a_knife_edge, simulate
@@ -31,7 +29,7 @@ def case_of(seed):
     return replace(case.replace(friction__stribeck_speed=speed, friction__stribeck_exponent=exponent), duration=0.25)
 
 
-def errors(seed, accuracies, by=compiled_run.simulate):
+def errors(seed, accuracies):
     """Largest error of the angle [rad] by accuracy; nan where rounding decides."""
     case = case_of(seed)
     times = np.linspace(0.0, case.duration, 26)
@@ -40,12 +38,12 @@ def errors(seed, accuracies, by=compiled_run.simulate):
         return [np.nan] * len(accuracies)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # random calibrations differ by design
-        return [np.max(np.abs(simulate(case, times, by, accuracy=accuracy)["output_angle"] - trace.output_angle))
+        return [np.max(np.abs(simulate(case, times, accuracy=accuracy)["output_angle"] - trace.output_angle))
                 for accuracy in accuracies]
 
 
 def test_friction_that_fades():
-    off = np.array([errors(seed, (1e-9,), st.simulate) for seed in range(FEW)])
+    off = np.array([errors(seed, (1e-9,)) for seed in range(FEW)])
     assert np.sum(np.isnan(off)) <= 1
     assert np.nanmax(off) < 1e-11
 

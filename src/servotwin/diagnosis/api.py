@@ -13,14 +13,15 @@ from servotwin import signals
 from servotwin.datasheet import thermal_masses
 from servotwin.diagnosis.causes import finest_of
 from servotwin.diagnosis.numbers import patient_of
-from servotwin.diagnosis.record import SIGNALS, angle_of, looked_at, of_log, of_run
+from servotwin.diagnosis.record import angle_of, looked_at, of_log, of_run
 from servotwin.diagnosis.symptoms import SYMPTOMS
 from servotwin.diagnosis.trials import Strength, Trials, ranked
 from servotwin.errors import InputError
 from servotwin.loads import as_load
 from servotwin.models import BoundedServo, DigitalServo, PulseServo, PulseServoInductive, default_model, mid_travel
 from servotwin.parameters import Servo
-from servotwin.simulation.watched_run import watched
+from servotwin.simulation import Simulator
+from servotwin.simulation.servo_run import simulated
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
@@ -221,8 +222,8 @@ def _diagnosed(model: Model, command: Signal | None, load: Load, duration: float
         command, duration = log.signal(), log.duration
         angle = angle_of(log, model)
         initial = {"output_angle": float(angle[np.isfinite(angle)][0])}
-        target = watched(model, command, duration=duration, outputs=("command_angle",), times=log.time - log.start,
-                         load=load, initial=initial).at("command_angle", log.time - log.start)
+        target = model.command_signal("command_angle", model.command(model.framed(command, duration))(
+            log.time - log.start))
         seen = of_log(log, model, target, finest_of(patient_of(model, load)))
         looked = Looked(duration, whole, len(seen.holds), sum(hold.end.rests for hold in seen.holds),
                         seen.noise.swing if seen.holds else math.nan)
@@ -287,8 +288,9 @@ class _Runs:
         self.commands, self._duration, self._seed, self._initial = commands, duration, seed, initial
 
     def record(self, patient: Patient, name: str, finest: float) -> Record:
-        run = watched(patient.model, self.commands[name], duration=self._duration, outputs=SIGNALS,
-                      times=looked_at(self._duration), load=patient.load, seed=self._seed, initial=self._initial)
+        simulator, command = Simulator(patient.model, patient.load, self._seed), self.commands[name]
+        run = simulated(simulator, patient.model.framed(command, self._duration), self._duration,
+                        looked_at(self._duration), self._initial).raise_if_failed()
         return of_run(run, finest, from_rest=self._initial is None)
 
     def strength(self, symptom: Symptom, name: str, finest: float) -> Callable[[Patient], Strength]:

@@ -11,17 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.logs.column_values import step_of
-from servotwin.simulation.rest import AT_REST, LEAST_REST, look_period, swing_of
+from servotwin.simulation.rest import AT_REST, LEAST_REST, look_period, rest_of, swing_of
 
 if TYPE_CHECKING:
     from servotwin.logs import Log
     from servotwin.models import Model
-    from servotwin.simulation import Rest
-    from servotwin.simulation.watched_run import WatchedRun
+    from servotwin.simulation import Rest, Result
 
 Array = NDArray[np.float64]
 
-SIGNALS = ("command_angle", "output_angle", "armature_current")
 LOOK = 2e-3  # s between two looks at a run
 _AVERAGED = 10e-3  # s over which samples of a log are averaged, at most: shafts do not swing faster than some 30 Hz
 _CHANCE = 0.01  # assumed: of all logs of a shaft at rest, in which noise may once go beyond what is taken for noise
@@ -157,15 +155,15 @@ class Record(NamedTuple):
     noise: Noise = NO_NOISE
 
 
-def of_run(run: WatchedRun, finest: float, *, from_rest: bool) -> Record:
-    """Return what a run shows that was looked at at times of `looked_at`, of a servo that tells so much apart [rad].
+def of_run(run: Result, finest: float, *, from_rest: bool) -> Record:
+    """Return what a run shows whose output times are those of `looked_at`, of a servo that tells so much apart [rad].
 
     One that begins where a log does, and not at rest, is judged as a log without noise.
     """
     end = run.ended
     time = looked_at(end)
-    target, angle = run.at("command_angle", time), run.at("output_angle", time)
-    rest, current = run.rest, run.at("armature_current", time[time >= 0.5 * end])
+    target, angle, current = run["command_angle"], run["output_angle"], run["armature_current"][time >= 0.5 * end]
+    rest = rest_of(run, with_current=False)
     first = next((event for event in run.events if event.kind.startswith(_TRIPS)), None)
     every = max(1, round(look_period(run.model, framed=run.command.edges is None) / LOOK))
     holds = holds_of(time, target, angle, None if from_rest else NO_NOISE, every=every)

@@ -9,7 +9,6 @@ from servotwin.models.engine.bus import event_log
 from servotwin.models.engine.events import guards
 from servotwin.models.state.modes import Mode
 from servotwin.simulation.engine import TRIPS, Event, Part, Plan, event_name
-from servotwin.simulation.rest import Driven
 from servotwin.simulation.trajectory import Motions
 
 if TYPE_CHECKING:
@@ -36,9 +35,3 @@ def events_of(plans: Sequence[Plan], rows: Rows) -> list[tuple[Event, ...]]:
         name = _WORDS.get(kind) or event_name(int(kind), Mode(int(zone), int(contact), 0, 0, 0))
         found[int(unit)].append(Event(time, name, angle))
     return [tuple(events) for events in found]
-
-
-def driven_in(rows: Rows, *, digital: bool) -> Driven:
-    """Return how the bridge of a servo alone on its source was driven."""
-    own = rows.motions
-    return Driven(own["origin"] + own["start"], own["origin"] + own["end"], own["duty" if digital else "drive"])

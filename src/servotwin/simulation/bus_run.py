@@ -72,11 +72,6 @@ def run(plans: Sequence[Plan], states: Sequence[State], source: Source, duration
     return taped(way, duration, tape_of(len(plans), not compiled))
 
 
-def run_alone(plan: Plan, state: State, source: Source, duration: float) -> Rows:
-    """Run one servo on its own source from t = 0 to `duration` [s], compiled: its way as rows, and what happened."""
-    return taped(_Compiled([plan], [state], source), duration, tape_of(1, False))
-
-
 def voltages(plans: Sequence[Plan], source: Source, samples: Sequence[Samples]) -> Array:
     """Return the voltage of a source at some instants, from the states of all its servos there [V]; nan after a run."""
     states = np.array([np.broadcast_arrays(
@@ -112,8 +107,9 @@ def taped(way: _Compiled | Plainly, until: float, written: Tape,
         except (ArithmeticError, ValueError):  # numbers beyond what a float holds
             status = DIVERGED
             when = float(np.array(written.motions[:written.used[0]], ROW)["end"].max(initial=when))
+        kinds: tuple[Any, ...] = (ROW, np.float64, np.float64)
         part = [np.array(rows[:used], kind) for rows, used, kind in zip(
-            written[:3], written.used.tolist(), (ROW, np.float64, np.float64), strict=True)]
+            written[:3], written.used.tolist(), kinds, strict=True)]
         part[0]["first"] += count
         count += len(part[2])
         found.append(part)

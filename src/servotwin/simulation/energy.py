@@ -9,8 +9,8 @@ import numpy as np
 
 from servotwin import physics
 from servotwin.models.engine.observe import stored_energy
-from servotwin.models.state.modes import Vector
 from servotwin.models.outputs import electrical_of, motor_speed_of, torques_of, warm_plant
+from servotwin.models.state.modes import Vector
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

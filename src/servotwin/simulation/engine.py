@@ -19,9 +19,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import SimulationError
 from servotwin.models.base import Place
-from servotwin.models.engine import log as logs
 from servotwin.models.engine import run as engine_run
-from servotwin.models.engine.at import SHOWN
 from servotwin.models.engine.events import kinds
 from servotwin.models.engine.log import COUNTS, EVENTS, LEFT, MOTIONS, PAUSED, Happened, Log, Row
 from servotwin.models.engine.memory import ACCURACY, Inputs, Memories, Memory, time_of
@@ -30,7 +28,6 @@ from servotwin.models.engine.step import COMPLETED
 from servotwin.models.state.modes import Mode
 from servotwin.models.state.records import fields_of, record_of
 from servotwin.models.terms import control, duty, firmware
-from servotwin.models.terms.bridge import heeds_silence
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.control import Firm
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
@@ -110,6 +107,9 @@ class Plan:
         return Inputs(self.command.table, self.torque.table, self.external_torque, period, self.edges or (),
                       self.curve, self.seed, self.accuracy, (self.firmware,))
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "compiled"}
+
     @cached_property
     def plant(self) -> NDArray[Any]:
         """Servo and load as kernels read them: a record of one."""
@@ -143,7 +143,8 @@ class State:
     def __init__(self, time: float, places: tuple[Place, ...], memory: Memory | bytes, numbers: Numbers | None = None,
                  changes: tuple[tuple[str, object], ...] = ()) -> None:
         self.time, self.places, self.numbers, self.changes = time, places, numbers, changes
-        self._memory, self._bytes = (None, memory) if isinstance(memory, bytes) else (memory, None)
+        self._memory: Memory | None = None if isinstance(memory, bytes) else memory
+        self._bytes: bytes | None = memory if isinstance(memory, bytes) else None
 
     def __repr__(self) -> str:
         values = (f"{name}={value:.6g}" for name, value in zip(self.names, self.values, strict=True))
@@ -155,7 +156,8 @@ class State:
         return (self.time, self.places, self.memory, self.numbers, self.changes) == (
             other.time, other.places, other.memory, other.numbers, other.changes)
 
-    __hash__ = None  # type: ignore[assignment]
+    def __hash__(self) -> int:
+        return hash((self.time, self.memory.point, self.changes))
 
     def __reduce__(self) -> tuple[type[State], tuple[Any, ...]]:
         return State, (self.time, self.places, self.memory, self.numbers, self.changes)
@@ -164,20 +166,21 @@ class State:
     def memory(self) -> Memory:
         """What the engine remembers."""
         if self._memory is None:
-            self._memory = _memory_in(self._bytes)
+            self._memory = _memory_in(self.records)
         return self._memory
 
     @property
-    def bytes(self) -> bytes:
+    def records(self) -> bytes:
         """The same as records of `Memory` and `Firm`, one after the other."""
         if self._bytes is None:
-            self._bytes = _bytes_of(self._memory)
+            self._bytes = _bytes_of(self.memory)
         return self._bytes
 
     def with_memory(self, memory: Memory, *, places: tuple[Place, ...] | None = None,
                     changes: tuple[tuple[str, object], ...] | None = None) -> State:
         """Return a state that remembers something else, of a servo that may have other states and numbers."""
-        return State(self.time, places or self.places, memory, self.numbers, self.changes if changes is None else changes)
+        return State(self.time, places or self.places, memory, self.numbers,
+                     self.changes if changes is None else changes)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -205,12 +208,14 @@ def _bytes_of(memory: Memory) -> bytes:
 
 def _memory_in(held: bytes) -> Memory:
     firm = named(Firm, np.frombuffer(held, _FIRM, 1, _MEMORY.itemsize).tolist()[0])
-    return named(Memory, (*np.frombuffer(held, _MEMORY, 1).tolist()[0], (firm,)))
+    memory: Memory = named(Memory, (*np.frombuffer(held, _MEMORY, 1).tolist()[0], (firm,)))
+    return memory
 
 
 def named(kind: Any, values: Any) -> Any:
     """Return a record's values as the named tuple that it is of, with those in it."""
-    return kind(*(named(hint, value) if hasattr(hint, "_fields") else tuple(value) if isinstance(value, list) else value
+    return kind(*(named(hint, value) if hasattr(hint, "_fields")
+                  else tuple(value.tolist()) if isinstance(value, np.ndarray) else value
                   for (_, hint), value in zip(fields_of(kind), values, strict=True)))
 
 
@@ -315,7 +320,7 @@ class Compiled:
         """Return what the servo remembers at a time [s], and a status; read a log whenever it waits."""
         words, floats, place, address, log = self._short if record is None else self._words(record.room)
         with self._lock:
-            self._view[:] = state.bytes
+            self._view[:] = state.records
             floats[place] = until
             words[place + 1] = not (state.numbers is self._plan.numbers or state.numbers == self._plan.numbers)
             words[place + 2] = True
@@ -381,8 +386,9 @@ _found: list[Any] = []
 def _make_beside() -> None:
     """Let another process make the kernels."""
     text = "from servotwin.simulation.compile import kernels; from servotwin.simulation.engine import ONE; kernels(ONE)"
-    subprocess.Popen([sys.executable, "-c", text], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                     stderr=subprocess.DEVNULL, start_new_session=True)
+    quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    threading.Thread(target=subprocess.run, args=([sys.executable, "-c", text],),
+                     kwargs={**quiet, "check": False, "start_new_session": True}, daemon=True).start()
 
 
 HELD = kinds.NAMES[kinds.HELD]

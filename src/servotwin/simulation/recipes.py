@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from servotwin.simulation import bus_run
+from servotwin.simulation import bus_run, engine
 from servotwin.simulation.compile import Recipe, calls
 from servotwin.simulation.lanes import form_recipes
 
@@ -13,7 +13,7 @@ from servotwin.simulation.lanes import form_recipes
 def all_recipes() -> tuple[Recipe, ...]:
     """Return every recipe that anything in the package asks kernels of, sorted by name."""
     found: dict[str, Recipe] = {}
-    for module in (form_recipes, bus_run, calls):
+    for module in (form_recipes, bus_run, calls, engine):
         for value in vars(module).values():
             for each in value.values() if isinstance(value, dict) else (value,):
                 if isinstance(each, Recipe):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from servotwin.physics.pieces import Piece
     from servotwin.signals import Signal
     from servotwin.simulation.result import Result
-    from servotwin.simulation.status import Status
 
 Array = NDArray[np.float64]
 
@@ -64,33 +63,6 @@ class Driven(NamedTuple):
     start: Array
     end: Array
     duty: Array
-
-
-class Watched(Protocol):
-    """A run, as far as it has to be known for what a servo does at its end."""
-
-    @property
-    def model(self) -> Model:
-        """Of the servo."""
-
-    @property
-    def command(self) -> Signal:
-        """That it followed."""
-
-    @property
-    def load(self) -> Load:
-        """That hung on it."""
-
-    @property
-    def status(self) -> Status:
-        """How it ended."""
-
-    @property
-    def ended(self) -> float:
-        """When it ended [s]."""
-
-    def at(self, name: str, time: Array) -> Array:
-        """Return a signal (SI) at times of `looks_of`, and at the end [s]."""
 
 
 class Rest(NamedTuple):
@@ -231,28 +203,21 @@ def rest_of(result: Result, *, with_current: bool = True) -> Rest | None:
     A motor, a servo that turns without end, and a run that ended before its time have none. The current, which takes
     longer than all else, is nan where it is not asked for.
     """
-    found = rest_seen(result, driven_of(result))
-    if found is None or not with_current:
-        return found
-    return found._replace(current=mean_current(result, result.ended - LEAST_REST))
-
-
-def rest_seen(run: Watched, driven: Driven | None) -> Rest | None:
-    """Return what `rest_of` does, without a current, of a run whose bridge was driven so; None: of a mean voltage."""
-    end, time = run.ended, looks_of(run)
+    end, time = result.ended, _looks_of(result)
     if time is None:
         return None
-    since = still_since(run.command, run.load, end)
-    angle = run.at("output_angle", time)
+    since, driven = still_since(result.command, result.load, end), _driven_of(result)
+    angle = result.at("output_angle", time)
     swing, middle, begun = swing_of(time, angle), 0.5 * (since + end), end - LEAST_REST
     rate, duty = _drives(driven, begun, end)
     _, before = _drives(driven, max(middle - 0.5 * LEAST_REST, since), min(middle + 0.5 * LEAST_REST, end))
+    current = mean_current(result, begun) if with_current else math.nan
     return Rest(since=since, swing=swing.swing, frequency=swing.frequency,
-                travel=float(np.ptp(angle[time >= begun - _ROUNDING])), drive_rate=rate, duty=duty, current=math.nan,
-                fades=duty < _STAYS * before, held=_held(run))
+                travel=float(np.ptp(angle[time >= begun - _ROUNDING])), drive_rate=rate, duty=duty, current=current,
+                fades=duty < _STAYS * before, held=_held(result))
 
 
-def looks_of(run: Watched) -> Array | None:
+def _looks_of(run: Result) -> Array | None:
     """Return when a shaft is looked at to see what it does at the end [s]; None where that is not to be told."""
     model, end = run.model, run.ended
     if not run.status.ok or model.endless or "command_angle" not in model.available:
@@ -271,7 +236,7 @@ def look_period(model: Model, *, framed: bool = True) -> float:
     return model.frame_period if framed and isinstance(model, PulseServo | PulseServoInductive) else _SAMPLE
 
 
-def _held(run: Watched) -> bool:
+def _held(run: Result) -> bool:
     """Tell whether friction holds the shaft against its load where it is, without any torque of the motor."""
     end, load = run.ended, run.load
     numbers, tau = run.model.plant(load), piece_value(piece_before(load.torque_pieces.rows, end, False), end)
@@ -284,7 +249,7 @@ def looks_at(since: float, end: float, step: float) -> Array:
     return np.maximum(end - step * np.arange(int((end - since) / step), -1.0, -1.0), since)
 
 
-def driven_of(result: Result) -> Driven | None:
+def _driven_of(result: Result) -> Driven | None:
     """Return how the bridge of a run was driven; None of a mean voltage."""
     if not isinstance(result.model, SwitchedServo):
         return None

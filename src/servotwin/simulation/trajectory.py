@@ -79,20 +79,34 @@ class Motions(Sequence[Segment]):
                  until: float = math.inf) -> None:
         self._parts, self._shared = tuple(parts), np.zeros(0) if shared is None else shared
         self._since, self._until = since, until
-        whole = [part.rows if isinstance(part.rows, np.ndarray) else np.array(part.rows, _ROW) for part in parts]
-        rows = np.concatenate(whole) if whole else np.zeros(0, _ROW)
-        of = np.repeat(np.arange(len(whole)), [len(one) for one in whole])
-        there = (rows["origin"] + rows["end"] > since) & (rows["origin"] + rows["start"] < until)
-        if not there.all():
-            rows, of = rows[there], of[there]
-        self.rows, self._of = rows, of
-        self.ends = rows["origin"] + rows["end"]
-        self.starts = np.maximum(rows["origin"] + rows["start"], since)
-        self.anchors = rows["origin"] + rows["t0"]
+        self._of = np.repeat(np.arange(len(parts)), [len(part.rows) for part in parts])
+        self._rows: Any = [row for part in parts for row in part.rows]
+        if parts and not all(isinstance(part.rows, list) for part in parts):
+            self._rows = np.concatenate([np.asarray(part.rows, _ROW) for part in parts])
+        times = self._times
+        there = slice(int(np.count_nonzero(times[1] <= since)), int(np.count_nonzero(times[0] < until)))
+        self._rows, self._of = self._rows[there], self._of[there]
+        self.starts, self.ends, self.anchors = times[:, there]
+        self.starts = np.maximum(self.starts, since)
+
+    @property
+    def _times(self) -> Array:
+        """Start, end and beginning of all motions, shape (3, n) [s]."""
+        if isinstance(self._rows, list):
+            times = np.array([(row.origin, row.start, row.end, row.t0) for row in self._rows]).reshape(-1, 4).T
+        else:
+            times = np.array([self._rows[name] for name in ("origin", "start", "end", "t0")])
+        found: Array = times[0] + times[1:]
+        return found
+
+    @cached_property
+    def rows(self) -> NDArray[Any]:
+        """Records of `Row`."""
+        return np.asarray(self._rows, _ROW)
 
     def __len__(self) -> int:
         """Return how many motions there are."""
-        return len(self.rows)
+        return len(self._rows)
 
     def __getitem__(self, index: Any) -> Any:
         """Return a motion, or some of them."""
@@ -113,7 +127,8 @@ class Motions(Sequence[Segment]):
     def integrated(self) -> NDArray[np.bool_]:
         """Which are steps of an integrator, or end as these do."""
         how = self.rows["how"]
-        return (how == DENSE) | ((how == ALONE) & np.isin(self.rows["kind"], _STEPS))
+        found: NDArray[np.bool_] = (how == DENSE) | ((how == ALONE) & np.isin(self.rows["kind"], _STEPS))
+        return found
 
     @property
     def has_program(self) -> bool:
@@ -159,13 +174,14 @@ class Motions(Sequence[Segment]):
 
     def _given(self, plan: Plan, places: NDArray[np.intp]) -> tuple[Any, float, Any]:
         """Return a servo and its rows as kernels take them."""
-        rows = self.rows if len(places) == len(self) else self.rows[places]
+        whole = len(places) == len(self)
         if kernels_of_one() is not None:
-            return plan.plant, plan.accuracy, rows
-        return [Plant(plan.numbers, plan.chip)], plan.accuracy, _Rows(rows)
+            return plan.plant, plan.accuracy, self.rows if whole else self.rows[places]
+        rows = self._rows if isinstance(self._rows, list) else _Rows(self._rows)
+        return [Plant(plan.numbers, plan.chip)], plan.accuracy, rows if whole else [rows[k] for k in places.tolist()]
 
     def _made(self, k: int) -> Segment:
-        row = named(Row, self.rows[k].item())
+        row = self._rows[k] if isinstance(self._rows, list) else named(Row, self._rows[k].item())
         plan = self._parts[self._of[k]].plan
         m = engine_at.motion_of(plan.numbers, row, self._shared, plan.accuracy)
         if row.how != ALONE:
@@ -226,7 +242,7 @@ class Trajectory:
         if not self.segments.has_program:
             return t
         starts = self.segments.starts
-        begun = starts[np.minimum(np.searchsorted(starts, t * (1.0 + _LATE)), len(starts) - 1)]
+        begun = starts[np.minimum(np.searchsorted(starts, t * (1.0 + _LATE)), len(starts)) - 1]
         return np.where(abs(begun - t) <= _LATE * t, np.maximum(begun, t), t)
 
     def since(self, start: float) -> Trajectory:

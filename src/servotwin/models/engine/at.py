@@ -153,9 +153,9 @@ def motion_of(numbers: Numbers, row: Row, shared: Floats, accuracy: float) -> Mo
                       m.next_step, -1, True, m.stages, m.dense,
                       two_mass_series.law(numbers, row.mode, row.u.value, row.tau.value))
     if m.kind == CREEP:
-        return Motion(m.kind, m.numbers, m.mode, m.u, m.tau, m.t0, m.start, m.length,
-                      (FINE * accuracy, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), m.against, m.end, m.next_step, -1, True,
-                      m.stages, m.dense, m.long_dense)
+        tolerance = (FINE * accuracy, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return Motion(m.kind, m.numbers, m.mode, m.u, m.tau, m.t0, m.start, m.length, tolerance, m.against, m.end,
+                      m.next_step, -1, True, m.stages, m.dense, m.long_dense)
     return m
 
 

@@ -33,7 +33,6 @@ from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.chip import present as pulsed_chip
 from servotwin.models.terms.numbers import Numbers
 
-
 PLAIN = True  # the compiler takes it for False
 
 
@@ -132,7 +131,8 @@ def _note(numbers: Numbers, chip: Chip, inputs: Inputs, before: Memory, trip: in
             write_event(log, start, kinds.DRIVE_ENDS + int(now.drive), angle)
         if heeds_silence(numbers.bridge) and now.silent != was.silent:
             write_event(log, start, kinds.SILENCE_ENDS + now.silent, angle)
-        if pulsed_chip(chip) and now.number > was.number and not frame.accepted(chip, pulse_width(inputs, before)):
+        if pulsed_chip(chip) and now.number > was.number and frame.may_refuse(chip) and not frame.accepted(
+                chip, pulse_width(inputs, before)):
             write_event(log, start, kinds.REFUSED, angle)
         if firmware.present(inputs.firmware[0]) and memory.firm[0].trip != trip:
             write_event(log, start, kinds.TRIP_ENDS + memory.firm[0].trip, angle)

@@ -63,6 +63,11 @@ def accepted(chip: Chip, t_in: float) -> bool:
     return chip.shortest <= t_in <= chip.longest
 
 
+def may_refuse(chip: Chip) -> bool:
+    """Tell whether there are pulses that are not taken."""
+    return chip.shortest > 0.0 or chip.longest < math.inf
+
+
 def edge(chip: Chip, frame: Frame, time: float, t_in: float, v_o: float, v_m: float, V_bus: float, seed: int) -> Frame:
     """Return the frame state after the rising edge of a pulse of the width t_in."""
     if not accepted(chip, t_in):
