@@ -68,14 +68,14 @@ ADVANCING = Template('''int ${name}_advance(
     ${name}_state *state, const ${name}_servo *servo, double until, double command, double torque,
     ${name}_events *events) {
     double piece[7];
-    int64_t count = 0;
+    int64_t counts[$counts] = {[$left] = INT64_MAX};
     const $memories all = memories_of(state);
     const $inputs told = inputs_of(state, servo, command, torque, piece);
     const $rows rows = {events != NULL ? events->rows : NULL, {events != NULL ? events->room : 0}};
-    const array_int64_t_1 used = {&count, {1}};
-$keeping    const int status = (int)$advance(&servo->numbers, &told, &all, until, command, rows, used);
+    const $log log = {{NULL, {0}}, rows, {NULL, {0}}, {counts, {$counts}}};
+$keeping    const int status = (int)$advance(&servo->numbers, &told, &all, until, command, &log);
     if (events != NULL)
-        events->count = count;
+        events->count = counts[$events];
 $restoring    return status;
 }
 ''')
@@ -89,21 +89,21 @@ IN_PARTS = Template('''int ${name}_advance(
     const double now = ${name}_time(state);
     double left;
     float piece[7];
-    int64_t count = 0;
+    int64_t counts[$counts] = {[$left] = INT64_MAX};
     int status;
     const $memories all = memories_of(state);
     const $inputs told = inputs_of(state, servo, command, torque, piece);
     const $rows rows = {events != NULL ? events->rows : NULL, {events != NULL ? events->room : 0}};
-    const array_int64_t_1 used = {&count, {1}};
+    const $log log = {{NULL, {0}}, rows, {NULL, {0}}, {counts, {$counts}}};
     if (!(until - until == 0.0))
         return ${guard}_NOT_FINITE;
     do {
         const float late = (float)(state->begun - now);
-        const int64_t kept = count;
+        const int64_t kept = counts[$events];
         left = until - state->begun;
         const float part = (float)(left > longest ? longest : left);
-        status = (int)$advance(&servo->numbers, &told, &all, part, command, rows, used);
-        for (int64_t n = kept; n < count && n < rows.n[0]; n++)
+        status = (int)$advance(&servo->numbers, &told, &all, part, command, &log);
+        for (int64_t n = kept; n < counts[$events] && n < rows.n[0]; n++)
             rows.p[n].time += late;
         const int64_t frames = state->memory.frames;
         const double passed = (double)frames * servo->beat;
@@ -111,7 +111,7 @@ IN_PARTS = Template('''int ${name}_advance(
         state->memory.frames = 0;
 $passing    } while (status == 0 && left > longest);
     if (events != NULL)
-        events->count = count;
+        events->count = counts[$events];
     if (status != 0)
         *state = before;
     return status;

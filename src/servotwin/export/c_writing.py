@@ -20,7 +20,8 @@ from servotwin.models import (
     BoundedServo,
     DigitalServo,
 )
-from servotwin.models.engine.alone import Alone, Happened, Seen
+from servotwin.models.engine.alone import Alone, Seen
+from servotwin.models.engine.log import COUNTS, EVENTS, LEFT, Happened, Log, Row
 from servotwin.models.engine.memory import BEAT, Inputs, Memories, Memory, Point
 from servotwin.models.outputs import SIGNALS
 from servotwin.models.state.modes import Mode, Vector
@@ -152,7 +153,9 @@ class Writing:
         return {
             "table": ",\n".join(table).replace(", (-", ", (-") + "\n",
             "memories": types.of(_MEMORIES), "inputs": types.of(_INPUTS), "seen": types.of(named(Seen)),
-            "rows": types.of(Array(_EVENT, 1)), "firms": "{&own->firm, {1}}" if self._digital else "{NULL, {0}}",
+            "rows": types.of(Array(_EVENT, 1)), "log": types.of(_LOG),
+            "counts": f"{COUNTS}", "left": f"{LEFT}", "events": f"{EVENTS}",
+            "firms": "{&own->firm, {1}}" if self._digital else "{NULL, {0}}",
             # the memory is written at the end of a call, but what a program remembers changes on the way
             "keeping": self._members((f"    const {name}_firm before = state->firm;\n", self._digital)),
             "restoring": self._members(("    if (status != 0)\n        state->firm = before;\n", self._digital)),
@@ -209,12 +212,16 @@ _INPUTS = _tuple(Inputs, command=_TABLE, torque=_TABLE, constant_torque=FLOAT64,
                  edges=Array(FLOAT64, 1), curve=_TABLE, seed=INT64, accuracy=FLOAT64, firmware=Array(_PROGRAM, 1))
 
 
+_LOG = _tuple(Log, motions=Array(Record(record_of(Row)), 1), events=Array(_EVENT, 1), numbers=Array(FLOAT64, 1),
+              counts=Array(INT64, 1))
+
+
 @cache
 def _signatures() -> dict[str, tuple[Kind, ...]]:
     """Return what the entries are called with."""
     alone = named(Alone)
     return {"start": (alone, _TABLE, _MEMORIES, FLOAT64),
-            "advance": (alone, _INPUTS, _MEMORIES, FLOAT64, FLOAT64, Array(_EVENT, 1), Array(INT64, 1)),
+            "advance": (alone, _INPUTS, _MEMORIES, FLOAT64, FLOAT64, _LOG),
             "answer": (alone, FLOAT64, FLOAT64), "observe": (alone, _INPUTS, _MEMORIES)}
 
 

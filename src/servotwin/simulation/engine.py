@@ -9,9 +9,10 @@ import math
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,7 +22,7 @@ from servotwin.errors import SimulationError
 from servotwin.models.base import Place
 from servotwin.models.engine import run as engine_run
 from servotwin.models.engine.events import kinds
-from servotwin.models.engine.log import COUNTS, EVENTS, LEFT, MOTIONS, PAUSED, Happened, Log, Row
+from servotwin.models.engine.log import ALL, COUNTS, EVENTS, KEEPS, LEFT, MOTIONS, PAUSED, Happened, Log, Row
 from servotwin.models.engine.memory import ACCURACY, Inputs, Memories, Memory, time_of
 from servotwin.models.engine.run import Plant
 from servotwin.models.engine.step import COMPLETED
@@ -138,13 +139,12 @@ class State:
         (name, value) of the numbers that are others than the simulator's.
     """
 
-    __slots__ = ("_bytes", "_memory", "changes", "numbers", "places", "time")
+    __slots__ = ("_held", "changes", "numbers", "places", "time")
 
     def __init__(self, time: float, places: tuple[Place, ...], memory: Memory | bytes, numbers: Numbers | None = None,
                  changes: tuple[tuple[str, object], ...] = ()) -> None:
         self.time, self.places, self.numbers, self.changes = time, places, numbers, changes
-        self._memory: Memory | None = None if isinstance(memory, bytes) else memory
-        self._bytes: bytes | None = memory if isinstance(memory, bytes) else None
+        self._held = memory
 
     def __repr__(self) -> str:
         values = (f"{name}={value:.6g}" for name, value in zip(self.names, self.values, strict=True))
@@ -165,16 +165,14 @@ class State:
     @property
     def memory(self) -> Memory:
         """What the engine remembers."""
-        if self._memory is None:
-            self._memory = _memory_in(self.records)
-        return self._memory
+        if isinstance(self._held, bytes):
+            self._held = _memory_in(self._held)
+        return self._held
 
     @property
     def records(self) -> bytes:
         """The same as records of `Memory` and `Firm`, one after the other."""
-        if self._bytes is None:
-            self._bytes = _bytes_of(self.memory)
-        return self._bytes
+        return self._held if isinstance(self._held, bytes) else _bytes_of(self._held)
 
     def with_memory(self, memory: Memory, *, places: tuple[Place, ...] | None = None,
                     changes: tuple[tuple[str, object], ...] | None = None) -> State:
@@ -243,12 +241,14 @@ class RunLog:
     @cached_property
     def room(self) -> Log:
         """Room for compiled code to write into."""
-        return Log(np.empty(ROOM, _ROW), np.empty(ROOM, _HAPPENED), np.zeros(0), np.zeros(COUNTS, np.int64))
+        return _log(np.empty(ROOM, _ROW), np.empty(ROOM, _HAPPENED))
 
     @cached_property
     def lists(self) -> Log:
         """Room for the same in plain Python."""
-        return Log([None] * ROOM, [None] * ROOM, [], [0] * COUNTS)
+        log = Log([None] * ROOM, [None] * ROOM, [], [0] * COUNTS)
+        log.counts[KEEPS] = ALL
+        return log
 
     def read(self, plan: Plan, log: Log) -> None:
         """Take over what a log has, and empty it."""
@@ -260,6 +260,12 @@ class RunLog:
             self.events += (Event(time, kinds.NAMES[kind], angle)
                             for time, angle, kind in (found if isinstance(found, list) else found.tolist()))
         log.counts[MOTIONS] = log.counts[EVENTS] = 0
+
+
+def _log(motions: NDArray[Any], events: NDArray[Any]) -> Log:
+    counts = np.zeros(COUNTS, np.int64)
+    counts[KEEPS] = ALL if len(motions) else 0
+    return Log(motions, events, np.zeros(0), counts)
 
 
 def run(plan: Plan, state: State, until: float, record: RunLog | None = None) -> State:
@@ -308,8 +314,7 @@ class Compiled:
         self._memories = Memories(whole[:_MEMORY.itemsize].view(_MEMORY), whole[_MEMORY.itemsize:].view(_FIRM))
         self._inputs = _inputs_of(plan)
         self._function = kernels(ONE).go_on.functions[0]
-        self._short = self._words(Log(np.empty(0, _ROW), np.empty(0, _HAPPENED), np.zeros(0),
-                                      np.zeros(COUNTS, np.int64)))
+        self._short = self._words(_log(np.empty(0, _ROW), np.empty(0, _HAPPENED)))
 
     def _words(self, log: Log) -> _Words:
         words = self._function.words((self._plan.plant, self._inputs, self._memories, 0.0, False, True, log))
@@ -366,23 +371,30 @@ def in_64_bits(seed: int) -> int:
 def kernels_of_one() -> Any:
     """Return the kernels of one servo; None where it runs in plain Python.
 
-    Where there are none yet they are made beside, and taken by whoever begins later.
+    Where there are none yet another process makes them, and they are taken by whoever begins later.
     """
     if is_plain():
         return None
-    if _found:
-        return _found[0]
-    if is_compiled(ONE):
-        _found.append(kernels(ONE))
-        return _found[0]
-    _make_beside()
-    return None
+    if not _ONE.found and time.monotonic() >= _ONE.look:
+        if is_compiled(ONE):
+            _ONE.found = kernels(ONE)
+        elif not _ONE.look:
+            _make_beside()
+        _ONE.look = time.monotonic() + _LOOKS
+    return _ONE.found
 
 
-_found: list[Any] = []
+@dataclass
+class _Kernels:
+    """The kernels of one servo, once there are any, and when to look for them next [s]."""
+
+    found: Any = None
+    look: float = 0.0
 
 
-@cache
+_ONE, _LOOKS = _Kernels(), 0.5
+
+
 def _make_beside() -> None:
     """Let another process make the kernels."""
     text = "from servotwin.simulation.compile import kernels; from servotwin.simulation.engine import ONE; kernels(ONE)"

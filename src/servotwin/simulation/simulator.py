@@ -266,10 +266,11 @@ class Simulator:
         self._check(state, "advance(state)")
         if not (is_finite(until) and until >= state.time):
             raise InputError("advance(until)", got=until, allowed=f"a finite time from {state.time:g} s on")
-        if not is_finite(external_torque):
+        if external_torque != 0.0 and not is_finite(external_torque):
             raise InputError("external_torque", got=external_torque, allowed="a finite number [N m]")
-        own = self._with(state.changes)
-        own.load.check_span(state.time, until)
+        own = self._with(state.changes) if state.changes else self
+        if own.load.recorded:
+            own.load.check_span(state.time, until)
         return engine.run(own.plan(own.framed(command, until), external_torque), state, float(until), record)
 
     def framed(self, command: Signal, until: float) -> Signal:

@@ -17,10 +17,12 @@ PAUSED = -1
 """As a status: the log is full, or the run has taken as many steps as it was to take."""
 ALONE, SERIES, DENSE = range(3)
 """How a motion is known: by its own law, or by numbers of a common one, a series or a step."""
-MOTIONS, EVENTS, NUMBERS, LEFT, IDLE, SHORT, BEGUN = range(7)
+MOTIONS, EVENTS, NUMBERS, LEFT, IDLE, SHORT, BEGUN, KEEPS = range(8)
 """What a log counts: rows and numbers written, steps left, steps in no time one after the other, short ones between
-two contacts, and whether any motion was written."""
-COUNTS = 7
+two contacts; whether any motion was written, and what it keeps."""
+COUNTS = 8
+ALL = 1
+"""As what a log keeps: motions and events, for both of which there is room; else events as far as there is."""
 _AT_ONCE = 6  # events of one step at most
 
 
@@ -75,11 +77,13 @@ put_row = record_writer("put_row", Row)
 
 
 def is_full(log: Log) -> bool:
-    """Count a step; tell whether it has to wait until the log has been read."""
+    """Count a step; tell whether it has to wait until the log has been read.
+
+    A log that does not keep all is never full.
+    """
     log.counts[LEFT] -= 1
-    return bool(log.counts[LEFT] < 0
-                or (len(log.motions) > 0 and log.counts[MOTIONS] >= len(log.motions))
-                or (len(log.events) > 0 and log.counts[EVENTS] + _AT_ONCE > len(log.events)))
+    return bool(log.counts[LEFT] < 0 or (log.counts[KEEPS] == ALL and (
+        log.counts[MOTIONS] >= len(log.motions) or log.counts[EVENTS] + _AT_ONCE > len(log.events))))
 
 
 def write_motion(log: Log, row: Row) -> None:

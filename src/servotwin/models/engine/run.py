@@ -8,13 +8,27 @@ from typing import Any, NamedTuple
 from servotwin.models.engine import controller
 from servotwin.models.engine.events import kinds
 from servotwin.models.engine.legs.legs import MOST_SHORT
-from servotwin.models.engine.log import BEGUN, IDLE, PAUSED, SHORT, Log, is_full, motion_row, write_event, write_motion
+from servotwin.models.engine.log import (
+    ALL,
+    BEGUN,
+    IDLE,
+    KEEPS,
+    PAUSED,
+    SHORT,
+    Log,
+    is_full,
+    motion_row,
+    write_event,
+    write_motion,
+)
 from servotwin.models.engine.memory import (
     Inputs,
     Memories,
     Memory,
+    Point,
     counted_anew,
     due,
+    edge_of,
     instant,
     memory_at,
     origin_of,
@@ -26,11 +40,14 @@ from servotwin.models.engine.motions import motion
 from servotwin.models.engine.motions.motion import Motion
 from servotwin.models.engine.runs import calmed, is_short
 from servotwin.models.engine.step import CHATTER, COMPLETED, DIVERGED, MOST_IDLE, pulse_width, step
+from servotwin.models.state.modes import RIGID, at_rest
 from servotwin.models.state.records import record_reader
-from servotwin.models.terms import control, duty, firmware, frame, play
+from servotwin.models.terms import control, duty, elastic, firmware, frame, play
 from servotwin.models.terms.bridge import heeds_silence
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.chip import present as pulsed_chip
+from servotwin.models.terms.heat import present as warms
+from servotwin.models.terms.motor import inductive
 from servotwin.models.terms.numbers import Numbers
 
 PLAIN = True  # the compiler takes it for False
@@ -73,6 +90,8 @@ def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, until: flo
             controller.resume(inputs, memory)
         log.counts[IDLE], log.counts[SHORT] = 0, 0
     end = instant(pulsed, inputs, memory, until - origin_of(memory))
+    if log.counts[KEEPS] != ALL and stands(numbers, chip, inputs, memory, end):
+        return memory_then(memory, end), COMPLETED
     m = motion.nothing(numbers, memory.u, memory.tau)
     trip = 0
     while memory.point.time < end:
@@ -98,7 +117,7 @@ def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, until: flo
             before, memory, event) else 0
         if log.counts[SHORT] >= MOST_SHORT:
             memory, held = calmed(numbers, chip, inputs, memory)
-            if held != 0 and len(log.events) > 0:
+            if held != 0:
                 write_event(log, time_of(memory), kinds.HELD, memory.point.y.q)
     if firmware.present(inputs.firmware[0]):
         controller.pause(inputs, memory)
@@ -126,17 +145,16 @@ def _note(numbers: Numbers, chip: Chip, inputs: Inputs, before: Memory, trip: in
           event: int, log: Log) -> None:
     """Write down what a step has brought: what chip or program did, the motion, and the event that ended it."""
     start, angle, was, now = origin_of(memory) + before.point.time, before.point.y.q, before.chip, memory.chip
-    if len(log.events) > 0:
-        if now.drive != was.drive:
-            write_event(log, start, kinds.DRIVE_ENDS + int(now.drive), angle)
-        if heeds_silence(numbers.bridge) and now.silent != was.silent:
-            write_event(log, start, kinds.SILENCE_ENDS + now.silent, angle)
-        if pulsed_chip(chip) and now.number > was.number and frame.may_refuse(chip) and not frame.accepted(
-                chip, pulse_width(inputs, before)):
-            write_event(log, start, kinds.REFUSED, angle)
-        if firmware.present(inputs.firmware[0]) and memory.firm[0].trip != trip:
-            write_event(log, start, kinds.TRIP_ENDS + memory.firm[0].trip, angle)
-    if len(log.motions) > 0 and (time_of(memory) > start or log.counts[BEGUN] == 0):
+    if now.drive != was.drive:
+        write_event(log, start, kinds.DRIVE_ENDS + int(now.drive), angle)
+    if heeds_silence(numbers.bridge) and now.silent != was.silent:
+        write_event(log, start, kinds.SILENCE_ENDS + now.silent, angle)
+    if pulsed_chip(chip) and now.number > was.number and frame.may_refuse(chip) and not frame.accepted(
+            chip, pulse_width(inputs, before)):
+        write_event(log, start, kinds.REFUSED, angle)
+    if firmware.present(inputs.firmware[0]) and memory.firm[0].trip != trip:
+        write_event(log, start, kinds.TRIP_ENDS + memory.firm[0].trip, angle)
+    if log.counts[KEEPS] == ALL and (time_of(memory) > start or log.counts[BEGUN] == 0):
         drive, told = now.drive, (0.0, 0.0, 0.0, 0)
         if firmware.present(inputs.firmware[0]):
             firm = memory.firm[0]
@@ -145,5 +163,27 @@ def _note(numbers: Numbers, chip: Chip, inputs: Inputs, before: Memory, trip: in
         write_motion(log, motion_row(0, origin_of(memory), before.point.time, memory.point.time, now.error,
                                      before.point.wiper, drive, now.silent, told, m))
     kind = kinds.kind_of(event, memory.point.mode)
-    if kind != kinds.NO_EVENT and len(log.events) > 0:
+    if kind != kinds.NO_EVENT:
         write_event(log, time_of(memory), kind, memory.point.y.q)
+
+
+def stands(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, end: float) -> bool:
+    """Tell whether a servo stands still until `end`, and nothing is decided before: then time alone goes on."""
+    point, now = memory.point, memory.chip
+    if not at_rest(point.mode.contact) or point.mode.mesh != RIGID or point.anchor_time == math.inf:
+        return False
+    if inductive(numbers.motor) or warms(numbers.heat) or elastic.present(numbers.elastic) or (
+            firmware.present(inputs.firmware[0])):
+        return False
+    if pulsed_chip(chip) and (frame.next_switch(now, heeds_silence(numbers.bridge)) < end
+                              or edge_of(inputs, memory, now.number) < end):
+        return False
+    return memory.u_end >= end and memory.tau_end >= end and not due(memory)
+
+
+def memory_then(memory: Memory, time: float) -> Memory:
+    """Return the memory of a servo that has stood still until a time [s]."""
+    p = memory.point
+    point = Point(time, p.y, p.mode, p.anchor_time, p.anchor, p.step, p.wiper)
+    return Memory(memory.frames, memory.beat, point, memory.chip, memory.u, memory.u_end, memory.tau, memory.tau_end,
+                  memory.firm)
