@@ -38,7 +38,7 @@ from servotwin.simulation.compile import Recipe, is_compiled, is_plain, kernels
 from servotwin.simulation.status import Status
 
 ONE = Recipe("one", ("servotwin.models.engine.run:go_on", "servotwin.models.engine.at:at",
-                     "servotwin.models.engine.at:resolution"))
+                     "servotwin.models.engine.at:resolution", "servotwin.models.engine.live.stretch:shown"))
 """One servo by the one loop, and its signals at any times; kernels take hardly longer for what a servo lacks."""
 ROOM, STEPS = 4096, 4096  # rows of a log, and steps between two looks at the log, at progress and at interrupts
 _MEMORY, _FIRM, _ROW, _HAPPENED = (record_of(kind) for kind in (Memory, Firm, Row, Happened))
@@ -312,12 +312,17 @@ class Compiled:
         self._view = memoryview(self._held)
         whole = np.frombuffer(self._held, np.uint8)
         self._memories = Memories(whole[:_MEMORY.itemsize].view(_MEMORY), whole[_MEMORY.itemsize:].view(_FIRM))
-        self._inputs = _inputs_of(plan)
+        self.inputs = _inputs_of(plan)
         self._function = kernels(ONE).go_on.functions[0]
         self._short = self._words(_log(np.empty(0, _ROW), np.empty(0, _HAPPENED)))
 
+    def stood(self, state: State) -> Memories:
+        """Return what a servo remembers as records."""
+        held = np.frombuffer(bytearray(state.records), np.uint8)
+        return Memories(held[:_MEMORY.itemsize].view(_MEMORY), held[_MEMORY.itemsize:].view(_FIRM))
+
     def _words(self, log: Log) -> _Words:
-        words = self._function.words((self._plan.plant, self._inputs, self._memories, 0.0, False, True, log))
+        words = self._function.words((self._plan.plant, self.inputs, self._memories, 0.0, False, True, log))
         place = self._function.size - _LOG_WORDS - 3
         return _Words(words, words.view(np.float64), place, words.ctypes.data, log)
 

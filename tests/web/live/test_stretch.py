@@ -9,6 +9,7 @@ from servotwin.models.engine.live.posts import NONE_BEFORE
 from servotwin.models.engine.live.screen import COLUMNS, USED, Looks, Screen
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.terms import control
+from servotwin.simulation.engine import RunLog
 from servotwin.web.live.lines import lines_of, names_of
 from servotwin.web.live.station import Endless
 
@@ -37,7 +38,7 @@ def rows_of(kind, servo, values, load, rate, switches):
     if plan.digital:
         memory = memory._replace(firm=(control.thawed(memory.firm[0]),))
     _, _, status = stretch.go_on(plan.numbers, plan.chip, plan.inputs, memory, True, NONE_BEFORE,
-                                 Looks(1, rate, 0.4, 1, switches), lines_of(model), screen)
+                                 Looks(1, rate, 0.4, 1, switches), lines_of(model), screen, RunLog().lists)
     assert status == COMPLETED
     return result, dict(zip(COLUMNS, np.array(screen.rows.rows).T, strict=True)), names_of(model, sim.load)
 

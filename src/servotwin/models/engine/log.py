@@ -97,7 +97,7 @@ def write_motion(log: Log, row: Row) -> None:
 
 
 def write_event(log: Log, time: float, kind: int, angle: float) -> None:
-    """Write an event down, if there is room; count it in any case."""
+    """Write an event down; where there is room for some, and no more, it is only counted."""
     n = log.counts[EVENTS]
     if n < len(log.events):
         if PLAIN:
@@ -105,7 +105,8 @@ def write_event(log: Log, time: float, kind: int, angle: float) -> None:
         else:
             row = log.events[n]
             row.time, row.angle, row.kind = time, angle, kind
-    log.counts[EVENTS] = n + 1
+    if len(log.events) > 0:
+        log.counts[EVENTS] = n + 1
 
 
 def motion_row(unit: int, origin: float, start: float, end: float, error: float, wiper: float, drive: float,

@@ -130,6 +130,7 @@ def _of_the_bench() -> Mapping[str, tuple[Kind, ...]]:
     from servotwin.models.engine.bus.event_log import Tape
     from servotwin.models.engine.live.making import Weights
     from servotwin.models.engine.live.posts import Circuit, Post, Told
+    from servotwin.models.engine.live.screen import Lines, Looks, Switch
     from servotwin.models.engine.live.sender import Sender
 
     posts, sender, programs = _records(record_of(Post)), _records(record_of(Sender)), _records(record_of(Firmware))
@@ -138,7 +139,9 @@ def _of_the_bench() -> Mapping[str, tuple[Kind, ...]]:
     bus = (_LANES, tables, _records(record_of(Shared)), _records(record_of(Seat)), _records(record_of(Mate)),
            _tuple(Tape, _FLOATS, motions=_LOG_ROWS, events=_TABLE, used=_INDICES))
     going = (FLOAT64, FLOAT64, INT64, _CUBE, _CUBE, _CUBE, _INDICES)
-    return {"bench:make": (posts, programs, INT64, INT64, _records(record_of(Given)), _records(record_of(Weights))),
+    return {"stretch:shown": (_PLANTS, _INPUTS, _MEMORIES, _LOG_ROWS, _FLOATS, named(Switch), named(Looks),
+                              named(Lines), _TABLE, _INDICES),
+            "bench:make": (posts, programs, INT64, INT64, _records(record_of(Given)), _records(record_of(Weights))),
             "bench:begin": (posts, INT64, told, _MEMORIES), "bench:change": (posts, INT64, _MEMORIES),
             "bench:heed": (posts, INT64, told, _records(record_of(Circuit)), FLOAT64, FLOAT64),
             "bench:begin_at": (posts, INT64, told, _MEMORIES, FLOAT64),
@@ -147,7 +150,7 @@ def _of_the_bench() -> Mapping[str, tuple[Kind, ...]]:
             "bench:draw": (INT64, INT64, FLOAT64, FLOAT64),
             "bench:look": (posts, INT64, told, programs, _MEMORIES, _CUBE, _INDICES),
             "bench:tune": (sender, FLOAT64), "bench:snapped": (sender, FLOAT64), "bench:next_edge": (sender,),
-            "bench:advance": (posts, told, programs, _MEMORIES, sender, *going),
+            "bench:advance": (posts, told, programs, _MEMORIES, sender, _LOG, *going),
             "bench:advance_together": (posts, told, programs, _MEMORIES, sender, *bus, *going)}
 
 
@@ -156,6 +159,7 @@ _OF_BENCH = ("make", "begin", "begin_at", "heed", "change", "take", "count", "dr
 _ELSEWHERE: Mapping[str, Callable[[], Mapping[str, tuple[Kind, ...]]]] = {  # where kinds take more than lanes have
     "digital_batch:go_on": _of_ticks, "leg_runs:go_on": _of_ticks, "leg_runs:go_on_nearly": _of_ticks,
     "coupled_runs:go_on": _of_ticks, **{f"bench:{name}": _of_the_bench for name in _OF_BENCH},
+    "stretch:shown": _of_the_bench,
     "bus_batch:go_on": _of_buses, "bus_batch:look": _of_buses, "bus_batch:voltages": _of_buses,
     "cosim_lanes:break_up": _of_buses}
 

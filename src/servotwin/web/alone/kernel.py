@@ -16,10 +16,11 @@ from servotwin.models.engine.batch.tiles import Lanes
 from servotwin.models.engine.bus import event_log
 from servotwin.models.engine.bus.bus_inputs import Tables
 from servotwin.models.engine.bus.bus_records import ROOM, Mate, Seat, Shared
+from servotwin.models.engine.live import stretch
 from servotwin.models.engine.live.making import Weights
 from servotwin.models.engine.live.posts import Circuit, Post
 from servotwin.models.engine.live.sender import Sender
-from servotwin.models.engine.log import Row
+from servotwin.models.engine.log import COUNTS, Happened, Row
 from servotwin.models.engine.memory import Memory
 from servotwin.models.state.records import record_of, rows_of
 from servotwin.models.terms.chip import Chip
@@ -103,7 +104,7 @@ def layout() -> dict[str, Any]:
     """Return where a page finds what it writes and reads: fields of records, and arguments of entries."""
     kinds = {"shared": Shared, "seat": Seat, "mate": Mate, "post": Post,
              "sender": Sender, "circuit": Circuit, "memory": Memory, "firm": Firm, "program": Firmware,
-             "given": Given, "weights": Weights, "row": Row}
+             "given": Given, "weights": Weights, "row": Row, "happened": Happened}
     records = {name: {"size": record_of(kind).itemsize, "at": _places(record_of(kind))} for name, kind in kinds.items()}
     known = dict(signatures(recipe()))
     entries = {one.name: {"kinds": [_told(kind) for kind in known[one.name]], "result": one.result}
@@ -111,7 +112,7 @@ def layout() -> dict[str, Any]:
     tiles = {"size": rows_of(Chip, np.float64).itemsize, "at": {}}
     return {"records": {**records, "chips": tiles}, "entries": entries, "words": _WORDS, "page": _PAGE,
             "lanes": Lanes._fields, "tables": Tables._fields, "event": event_log.EVENT,
-            "series": 2 * ROOM}
+            "series": 2 * ROOM, "log": {"motions": stretch.AT_ONCE, "events": 2 * stretch.AT_ONCE, "counts": COUNTS}}
 
 
 def _places(kind: np.dtype[Any]) -> dict[str, Any]:

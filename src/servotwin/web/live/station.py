@@ -8,17 +8,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from servotwin.errors import InputError
+from servotwin.models.engine import log
 from servotwin.models.engine.live import stretch
 from servotwin.models.engine.live.posts import NONE_BEFORE, NOTHING_SAID, Post, put_said
-from servotwin.models.engine.live.screen import COLUMNS, SHOWN, USED, Looks, Screen, first_look
-from servotwin.models.engine.memory import time_of
-from servotwin.models.engine.step import COMPLETED, DIVERGED
-from servotwin.models.state.records import object_of
-from servotwin.models.terms import control
+from servotwin.models.engine.live.screen import COLUMNS, SHOWN, USED, Looks, Screen, Switch, first_look, told_of
+from servotwin.models.state.records import object_of, record_of
 from servotwin.simulation import Simulator
-from servotwin.simulation.engine import Plan, State, failure
-from servotwin.simulation.status import Status
+from servotwin.simulation.engine import Part, Plan, RunLog, State, kernels_of_one, run
 from servotwin.web.live.lines import lines_of, names_of
 from servotwin.web.live.told import Taken, Told
 
@@ -27,6 +23,7 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 Row = tuple[float, ...]
+_SHOWN = frozenset(SHOWN.values())
 
 
 def post_of(model: Model) -> Any:
@@ -144,26 +141,36 @@ class Station:
         SimulationError
             If it cannot go on.
         """
-        plan, now = self.plan, self.state
-        screen = Screen(Endless(self.tell), Endless(), np.zeros(USED, np.int64))
-        memory = now.memory
-        if plan.digital:
-            memory = memory._replace(firm=(control.thawed(memory.firm[0]),))
-        looks = Looks(first_look(now.time, rate), rate, until, 1, int(switches))
-        try:
-            memory, self.post.was, status = stretch.go_on(
-                plan.numbers, plan.chip, plan.inputs, memory, plan.numbers != now.numbers, self.post.was, looks,
-                self.post.lines, screen)
-        except (ArithmeticError, ValueError) as error:  # numbers beyond what a float holds
-            if isinstance(error, InputError):
-                raise
-            status = DIVERGED
-        if status != COMPLETED:
-            raise failure(Status.of_code(status), time_of(memory))
-        if plan.digital:
-            memory = memory._replace(firm=(control.frozen(memory.firm[0]),))
-        self.state = State(until, now.places, memory, plan.numbers, now.changes)
-        return self.seen(screen.rows, screen.events)
+        plan, before, record = self.plan, self.state, RunLog(self.tell)
+        self.state = run(plan, before, until, record)
+        looks = Looks(first_look(before.time, rate), rate, until, 1, int(switches))
+        rows = self._rows(plan, before, record.parts, looks)
+        return Seen([tuple(row[k] for k in self._picks) for row in rows],
+                    [(event.time, event.kind) for event in record.events if event.kind in _SHOWN])
+
+    def _rows(self, plan: Plan, before: State, parts: list[Part], looks: Looks) -> list[list[float]]:
+        """Return what shows of motions, and note how the bridge drives at their end."""
+        post, own = self.post, kernels_of_one()
+        if not parts:
+            return []
+        if own is None:
+            seen, motions = Endless(), [row for part in parts for row in part.rows]
+            stood = stretch.Stood(before.memory, told_of(before.memory, plan.digital))
+            _, post.was = stretch.show(plan.numbers, plan.inputs, motions, len(motions), np.zeros(0), stood, looks.next,
+                                       post.was, looks, post.lines, Screen(seen, Endless(), np.zeros(USED, np.int64)),
+                                       True)
+            return seen.rows
+        rows = np.concatenate([np.asarray(part.rows, record_of(log.Row)) for part in parts])
+        room = int(looks.rate * (looks.until - before.time)) + 2 * len(rows) + 4
+        found, used = np.empty((room, len(COLUMNS))), np.zeros(USED, np.int64)
+        own.shown(plan.plant, plan.compiled.inputs, plan.compiled.stood(before), rows, np.zeros(0), post.was, looks,
+                  post.lines, found, used)
+        last = rows[rows["end"] > rows["start"]][-1:]
+        if last.size:
+            duty = float(last["duty"][0])
+            post.was = Switch(float(last["drive"][0]), duty if abs(duty) > 1.0 else 0.0, int(last["silent"][0]))
+        shown: list[list[float]] = found[:used[0]].tolist()
+        return shown
 
     def seen(self, rows: Endless, events: Endless) -> Seen:
         """Return what shows of rows and events that kernels have written."""

@@ -22,7 +22,12 @@ _FIRST = tuple(guards.EVENT_NAMES.index(name) for name in guards.EVENT_NAMES)
 STICK, REVERSAL, LIMITED, STOPS, STARTS, HELD = range(len(guards.EVENT_NAMES), len(guards.EVENT_NAMES) + 6)
 DRIVE_ENDS, SILENCE_ENDS, REFUSED, TRIP_ENDS = HELD + 2, HELD + 4, HELD + 6, HELD + 7
 """Beside `DRIVE_ENDS` stand both drives, behind `SILENCE_ENDS` that it begins, behind `TRIP_ENDS` the trips."""
-NO_EVENT = -1
+NO_EVENT, _ZONE = -1, guards.EVENT_NAMES.index("zone")
+
+
+def is_usual(kind: int) -> bool:
+    """Tell whether an event comes with every pulse: of a bridge's drive, or of the zone of its current."""
+    return kind == _ZONE or LIMITED <= kind <= STARTS or DRIVE_ENDS - 1 <= kind <= DRIVE_ENDS + 1
 
 
 def kind_of(ended_by: int, after: Mode) -> int:

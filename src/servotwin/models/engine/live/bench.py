@@ -16,6 +16,7 @@ from servotwin.models.engine.live import posts as those
 from servotwin.models.engine.live import sender as transmitter
 from servotwin.models.engine.live.posts import Told
 from servotwin.models.engine.live.screen import NEXT, USED, Looks, Screen, first_look
+from servotwin.models.engine.log import Log
 from servotwin.models.engine.memory import Memories, memory_at, put_memory, resumed
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.state.noise import drawn
@@ -95,10 +96,11 @@ def next_edge(sender: Any) -> float:
     return transmitter.next_edge(sender[0])
 
 
-def advance(posts: Any, told: Told, programs: Any, memories: Memories, sender: Any, until: float, rate: float,
+def advance(posts: Any, told: Told, programs: Any, memories: Memories, sender: Any, log: Log, until: float, rate: float,
             switches: int, rows: Any, events: Any, pulses: Any, used: Any) -> int:
     """Go on to a time [s], each servo on its own supply; return a status.
 
+    The log has room for `stretch.AT_ONCE` motions and a few events more.
     Each servo has tables `rows`, `events` and `pulses` for what shows; how much of these is `used` stands as in
     `Screen`. The sender's time is how far the bench has come.
     """
@@ -112,7 +114,7 @@ def advance(posts: Any, told: Told, programs: Any, memories: Memories, sender: A
         last = 1 if end == transmitter.snapped(now, until) else 0
         for n in range(len(posts)):
             looks = Looks(used[USED * n + NEXT], rate, end, last, switches)
-            how = _advance_one(posts[n], n, len(posts), told, programs, memories, looks,
+            how = _advance_one(posts[n], n, len(posts), told, programs, memories, looks, log,
                                Screen(rows[n], events[n], used[USED * n:USED * n + USED]))
             status = how if how != COMPLETED else status
         if status == COMPLETED:
@@ -200,11 +202,12 @@ def _take_seats(posts: Any, told: Told, memories: Memories, lanes: Lanes, on_bus
 
 
 def _advance_one(post: Any, k: int, servos: int, told: Told, programs: Any, memories: Memories, looks: Looks,
-                 screen: Screen) -> int:
+                 log: Log, screen: Screen) -> int:
     """Let one servo go on by itself; return a status."""
     memory, was, status = stretch.go_on(
         those.numbers_of(post.numbers), those.chip_of(post.chip), those.inputs_of(post, k, servos, told, programs),
-        memory_at(memories, k), post.changed == 1, those.was_of(post.was), looks, those.lines_of(post.lines), screen)
+        memory_at(memories, k), post.changed == 1, those.was_of(post.was), looks, those.lines_of(post.lines), screen,
+        log)
     if status == COMPLETED:
         put_memory(memories.rows[k], memory)
         those.put_was(post.was, was)

@@ -5,16 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.models.engine.events import guards
-from servotwin.models.engine.memory import Inputs, Memory, in_force, origin_of
-from servotwin.models.engine.motions import motion
-from servotwin.models.engine.motions.motion import Motion
+from servotwin.models.engine.events import kinds
+from servotwin.models.engine.memory import Inputs, Memory, in_force
 from servotwin.models.engine.observe import Observed, observed, told_by
-from servotwin.models.engine.step import at_pulses
-from servotwin.models.state.modes import CORE, Mode, Vector, at_rest
+from servotwin.models.state.modes import Mode, Vector
 from servotwin.models.terms import duty
-from servotwin.models.terms.numbers import Numbers, warm
-from servotwin.models.terms.sensor import wiper_at
+from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.pieces import piece_value
 
 if TYPE_CHECKING:
@@ -35,15 +31,8 @@ _ANGLE, _SPEED, _TORQUE = (COLUMNS.index(name) for name in ("motor_angle", "moto
 _OUTPUT = COLUMNS.index("output_angle")
 _LATE = 1e-12  # of an instant: so much before a tick it is the tick
 
-# Events besides those of guards
-STICK, REVERSAL, HELD, REFUSED, SILENCE, TRIPS = 100, 101, 102, 103, 104, 110
-SHOWN = {
-    STICK: "stick", REVERSAL: "reversal", HELD: "gear held", REFUSED: "pulse refused", SILENCE: "silence ends",
-    SILENCE + 1: "silence begins", TRIPS: "trip ends", TRIPS + 1: "trips by overload", TRIPS + 2: "trips by current",
-    TRIPS + 3: "trips by heat", TRIPS + 4: "trips by undervoltage",
-    **{code: name for code, name in enumerate(guards.EVENT_NAMES)
-       if code not in guards.KINKS and name != "zone"}}
-"""What events are called that do not come with every pulse, by their codes."""
+SHOWN = {code: name for code, name in enumerate(kinds.NAMES) if name != "zone" and not kinds.is_usual(code)}
+"""What events are called that do not come with every pulse, by their numbers."""
 
 
 class Lines(NamedTuple):
@@ -117,32 +106,6 @@ def switch_of(told: Said) -> Switch:
     return Switch(told.drive, told.duty if abs(told.duty) > 1.0 else 0.0, told.silent)
 
 
-def see(screen: Screen, lines: Lines, inputs: Inputs, memory: Memory, told: Said, m: Motion, wiper: float,
-        time: float) -> Motion:
-    """Write a row of a time [s] on a motion that began with a wiper there [rad]; return the motion, prepared for it."""
-    if screen.used[0] >= len(screen.rows):
-        return m
-    local = time - origin_of(memory)
-    age = local - m.t0
-    if motion.is_step(m) and 0.0 < age < m.length:
-        m = motion.prepared(m)
-    y = motion.state(m, age)
-    write(screen, lines, inputs, told, warm(m.numbers, y), m.mode, piece_value(m.u, local), piece_value(m.tau, local),
-          y, wiper_at(m.numbers.sensor, wiper, y.q), time)
-    return m
-
-
-def see_before(screen: Screen, lines: Lines, inputs: Inputs, numbers: Numbers, before: Memory, told: Said) -> None:
-    """Write a row of a servo as it stood at the end of a motion, before its bridge switches."""
-    if screen.used[0] >= len(screen.rows):
-        return
-    point = before.point
-    time = origin_of(before) + point.time
-    now = duty.at_duty(numbers, told.duty) if duty.present(numbers.bridge) else at_pulses(numbers, told.silent)
-    write(screen, lines, inputs, told, warm(now, point.y), point.mode, piece_value(before.u, time),
-          piece_value(before.tau, time), point.y, point.wiper, time)
-
-
 def write(screen: Screen, lines: Lines, inputs: Inputs, told: Said, numbers: Numbers, mode: Mode, u: float, tau: float,
           y: Vector, wiper: float, time: float) -> None:
     """Write a row of a servo that stands at y, whose numbers are those of this instant."""
@@ -176,23 +139,13 @@ def is_late(used: Indices, k: int) -> bool:
 
 
 def note(screen: Screen, time: float, code: int) -> None:
-    """Write an event down."""
+    """Write an event down, unless it comes with every pulse."""
     n = screen.used[1]
-    if n < len(screen.events):
+    if n < len(screen.events) and not kinds.is_usual(code):
         screen.events[n, 0], screen.events[n, 1] = time, 1.0 * code
         screen.used[1] = n + 1
 
 
-def code_of(event: int, after: Mode) -> int:
-    """Return the code of an event after which a mode holds."""
-    if event == guards.SPEED and at_rest(after.contact):
-        return STICK
-    if event == guards.SPEED and after.contact != CORE:
-        return REVERSAL
-    return event
-
-
-def reached(inputs: Inputs, memory: Memory, time: float, program: bool) -> bool:
-    """Tell whether a motion that has come as far as a memory says has gone beyond a time [s]."""
-    now = origin_of(memory) + memory.point.time
-    return time * (1.0 + _LATE) < now if program else time < now
+def is_before(time: float, end: float, program: bool) -> bool:
+    """Tell whether a time comes before the end of a motion [s]; that of a program's is the tick that is next to it."""
+    return time * (1.0 + _LATE) < end if program else time < end

@@ -1,113 +1,142 @@
-"""A servo on its own goes on for a stretch of time, and is looked at on the way."""
+"""A servo on its own goes on for a stretch of time, and is looked at on the way: what shows follows from its log."""
 
 from __future__ import annotations
 
-from servotwin.models.engine import controller
-from servotwin.models.engine.events import guards
-from servotwin.models.engine.legs.legs import MOST_SHORT
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from servotwin.models.engine.at import motion_of, row_at
+from servotwin.models.engine.live.screen import LEFT as STEPS_LEFT
 from servotwin.models.engine.live.screen import (
-    HELD,
     NEXT,
-    REFUSED,
-    SILENCE,
     TOO_LONG,
-    TRIPS,
     Lines,
     Looks,
     Said,
     Screen,
     Switch,
-    code_of,
-    is_late,
+    is_before,
     note,
-    reached,
-    see,
-    see_before,
     switch_of,
     told_of,
     write,
 )
-from servotwin.models.engine.memory import Inputs, Memory, counted_anew, due, instant, origin_of, resumed, time_of
+from servotwin.models.engine.log import ALL, BEGUN, EVENTS, KEEPS, LEFT, MOTIONS, PAUSED, Log, Row
+from servotwin.models.engine.memory import Inputs, Memories, Memory, memory_at, origin_of, time_of
 from servotwin.models.engine.motions import motion
-from servotwin.models.engine.runs import as_now, calmed, is_short, mode_under, told
-from servotwin.models.engine.step import CHATTER, COMPLETED, MOST_IDLE, pulse_width, step
-from servotwin.models.terms import firmware, frame, play
-from servotwin.models.terms.bridge import heeds_silence
+from servotwin.models.engine.motions.motion import Motion
+from servotwin.models.engine.run import plant_of, run
+from servotwin.models.engine.runs import as_now, mode_under, told
+from servotwin.models.engine.step import COMPLETED, at_pulses
+from servotwin.models.terms import duty, firmware
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.chip import present as pulsed_chip
 from servotwin.models.terms.numbers import Numbers, warm
+from servotwin.models.terms.sensor import wiper_at
 from servotwin.physics.pieces import piece_value
 
-PLAIN = True  # the compiler takes it for False
+if TYPE_CHECKING:
+    from servotwin.models.engine.live.screen import Floats, Indices
+
+AT_ONCE = 64  # steps between two looks at a log
+
+
+class Stood(NamedTuple):
+    """How a servo stood before a motion: its memory, and what showed of its chip or program."""
+
+    memory: Memory
+    said: Said
 
 
 def go_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, changed: bool, was: Switch, looks: Looks,
-          lines: Lines, screen: Screen) -> tuple[Memory, Switch, int]:
+          lines: Lines, screen: Screen, log: Log) -> tuple[Memory, Switch, int]:
     """Go on to `looks.until`; return the memory, how the bridge drives there, and a status.
 
     `changed` is whether the servo is another one than before, `was` how its bridge drove at the end of the stretch
     before. After a status that is not `COMPLETED` the memory is that of before what went wrong.
     """
-    program, pulsed = firmware.present(inputs.firmware[0]), pulsed_chip(chip)
-    memory = resumed(pulsed, inputs, memory, changed)
-    if program:
-        controller.resume(inputs, memory)
-    end = instant(pulsed, inputs, memory, looks.until - origin_of(memory))
-    m = motion.nothing(numbers, memory.u, memory.tau)
-    idle, short, k = 0, 0, looks.next
-    wiper = memory.point.wiper
-    shown = told_of(memory, program)
-    while memory.point.time < end:
-        if due(memory):
-            memory = counted_anew(memory)
-            end = instant(pulsed, inputs, memory, looks.until - origin_of(memory))
-        before, wiper, said = memory, memory.point.wiper, shown
-        memory, m, event, status = step(numbers, chip, inputs, before, m, end)
-        if status != COMPLETED:
-            return before, was, status
-        idle = idle + 1 if memory.point.time == before.point.time else 0
-        if idle > MOST_IDLE:
-            return before, was, CHATTER
-        if is_late(screen.used, 0):
-            return before, was, TOO_LONG
-        if PLAIN:
-            screen.rows.tell(time_of(memory))
-        shown = told_of(memory, program)
-        _note_doings(chip, inputs, numbers, before, said, memory, shown, screen)
-        if memory.point.time > before.point.time:
-            now = switch_of(shown)
+    program, begins, status, k = firmware.present(inputs.firmware[0]), True, PAUSED, looks.next
+    stood = Stood(memory, told_of(memory, program))
+    log.counts[KEEPS], log.counts[BEGUN] = ALL, 0
+    while status == PAUSED:
+        most = min(AT_ONCE, screen.used[STEPS_LEFT]) if screen.used[STEPS_LEFT] > 0 else AT_ONCE
+        log.counts[LEFT], log.counts[MOTIONS], log.counts[EVENTS] = most, 0, 0
+        memory, status = run(numbers, chip, inputs, memory, looks.until, changed, begins, log)
+        begins = False
+        if screen.used[STEPS_LEFT] > 0:
+            screen.used[STEPS_LEFT] -= most - max(log.counts[LEFT], 0)
+            if screen.used[STEPS_LEFT] == 0 and status == PAUSED:
+                status = TOO_LONG
+        k, was = show(numbers, inputs, log.motions, log.counts[MOTIONS], log.numbers, stood, k, was, looks, lines,
+                      screen, status == COMPLETED)
+        for n in range(log.counts[EVENTS]):
+            note(screen, log.events[n].time, log.events[n].kind)
+        stood = Stood(memory, told_of(memory, program))
+    screen.used[NEXT] = k
+    return memory, was, status
+
+
+def show(numbers: Numbers, inputs: Inputs, rows: Any, count: int, shared: Floats, stood: Stood, k: int, was: Switch,
+         looks: Looks, lines: Lines, screen: Screen, ends: bool) -> tuple[int, Switch]:
+    """Write what shows of motions; return the number of the next look, and how the bridge drives at their end.
+
+    Parameters
+    ----------
+    numbers, inputs
+        Of the servo.
+    rows, count, shared
+        Rows of a log, as many as there are, and its numbers.
+    stood : Stood
+        How it stood before them.
+    k : int
+        Number of the next look.
+    was : Switch
+        How its bridge drove before them.
+    looks, lines, screen
+    ends : bool
+        Whether the last of them ends at `looks.until`.
+    """
+    if count == 0:
+        return k, was
+    program = firmware.present(inputs.firmware[0])
+    row = row_at(rows, 0)
+    m = motion_of(numbers, row, shared, inputs.accuracy)
+    for n in range(count):
+        before, m_before = row, m
+        row = row_at(rows, n)
+        m = motion_of(numbers, row, shared, inputs.accuracy)
+        if row.end > row.start:
+            now, start = switch_of(_said(row)), row.origin + row.start
             if looks.switches == 1 and now != was and was.silent >= 0:
-                start = time_of(before)
-                see_before(screen, lines, inputs, numbers, before, said)
-                m = see(screen, lines, inputs, memory, shown, m, wiper, start)
+                if n == 0:
+                    _see_stood(screen, lines, inputs, numbers, stood)
+                else:
+                    m_before = _see(screen, lines, inputs, before, m_before, before.origin + before.end)
+                m = _see(screen, lines, inputs, row, m, start)
                 k = k + 1 if k / looks.rate == start else k
             was = now
             time = k / looks.rate
-            while time < looks.until and reached(inputs, memory, time, program):
-                m = see(screen, lines, inputs, memory, shown, m, wiper, time)
+            while time < looks.until and is_before(time, row.origin + row.end, program):
+                m = _see(screen, lines, inputs, row, m, time)
                 k += 1
                 time = k / looks.rate
-        if event >= 0 and event != guards.SHARE and event != guards.CREEPS:
-            note(screen, time_of(memory), code_of(event, memory.point.mode))
-        short = short + 1 if play.present(numbers.play) and is_short(before, memory, event) else 0
-        if short >= MOST_SHORT:
-            memory, held = calmed(numbers, chip, inputs, memory)
-            if held > 0:
-                note(screen, time_of(memory), HELD)
-    if m.kind == motion.IMPOSSIBLE:  # it had arrived before
-        screen.used[NEXT] = k
-        return memory, was, COMPLETED
-    time = k / looks.rate
-    while time < looks.until and (looks.at_end == 1 or not program):  # next to the end
-        m = see(screen, lines, inputs, memory, shown, m, wiper, time)
-        k += 1
+    if ends:
         time = k / looks.rate
-    if looks.at_end == 1:
-        see(screen, lines, inputs, memory, shown, m, wiper, looks.until)
-    screen.used[NEXT] = k
-    if program:
-        controller.pause(inputs, memory)
-    return memory, was, COMPLETED
+        while time < looks.until and (looks.at_end == 1 or not program):  # next to the end
+            m = _see(screen, lines, inputs, row, m, time)
+            k += 1
+            time = k / looks.rate
+        if looks.at_end == 1:
+            _see(screen, lines, inputs, row, m, looks.until)
+    return k, was
+
+
+def shown(plants: Any, inputs: Inputs, memories: Memories, rows: Any, shared: Floats, was: Switch, looks: Looks,
+          lines: Lines, found: Any, used: Indices) -> None:
+    """Write what shows of all motions of a servo since it stood as its memory says; `found` has room for rows."""
+    plant, memory = plant_of(plants[0]), memory_at(memories, 0)
+    stood = Stood(memory, told_of(memory, firmware.present(inputs.firmware[0])))
+    show(plant.numbers, inputs, rows, len(rows), shared, stood, looks.next, was, looks, lines,
+         Screen(found, found, used), True)
 
 
 def look(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, lines: Lines, screen: Screen) -> None:
@@ -119,14 +148,31 @@ def look(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, lines: Li
           piece_value(u, time), piece_value(tau, time), point.y, point.wiper, time)
 
 
-def _note_doings(chip: Chip, inputs: Inputs, numbers: Numbers, before: Memory, said: Said, memory: Memory, told: Said,
-                 screen: Screen) -> None:
-    """Note what a chip or a program has done in a step that people are told of."""
-    time = time_of(before)
-    if heeds_silence(numbers.bridge) and told.silent != said.silent:
-        note(screen, time, SILENCE + told.silent)
-    if memory.chip.number > before.chip.number and pulsed_chip(chip) and not frame.accepted(
-            chip, pulse_width(inputs, before)):
-        note(screen, time, REFUSED)
-    if told.trip != said.trip:
-        note(screen, time, TRIPS + told.trip)
+def _said(row: Row) -> Said:
+    return Said(row.drive, row.error, row.silent, row.duty, row.goal, row.reference, row.trip)
+
+
+def _see(screen: Screen, lines: Lines, inputs: Inputs, row: Row, m: Motion, time: float) -> Motion:
+    """Write a row of a time [s] on a motion; return the motion, prepared for it."""
+    if screen.used[0] >= len(screen.rows):
+        return m
+    local = time - row.origin
+    age = local - m.t0
+    if motion.is_step(m) and 0.0 < age < m.length:
+        m = motion.prepared(m)
+    y = motion.state(m, age)
+    write(screen, lines, inputs, _said(row), warm(m.numbers, y), m.mode, piece_value(m.u, local),
+          piece_value(m.tau, local), y, wiper_at(m.numbers.sensor, row.wiper, y.q), time)
+    return m
+
+
+def _see_stood(screen: Screen, lines: Lines, inputs: Inputs, numbers: Numbers, stood: Stood) -> None:
+    """Write a row of a servo as it stood before its bridge switches."""
+    if screen.used[0] >= len(screen.rows):
+        return
+    memory, said = stood.memory, stood.said
+    point = memory.point
+    time = origin_of(memory) + point.time
+    now = duty.at_duty(numbers, said.duty) if duty.present(numbers.bridge) else at_pulses(numbers, said.silent)
+    write(screen, lines, inputs, said, warm(now, point.y), point.mode, piece_value(memory.u, time),
+          piece_value(memory.tau, time), point.y, point.wiper, time)

@@ -8,18 +8,15 @@ from servotwin.models.engine.bus import bus_unit, event_log, event_queue
 from servotwin.models.engine.bus.bus_inputs import inputs_at
 from servotwin.models.engine.bus.bus_records import drive_of, mode_of, numbers_of, piece_of, vector_of
 from servotwin.models.engine.bus.event_log import Tape
+from servotwin.models.engine.events import kinds
 from servotwin.models.engine.live.posts import lines_of, put_said, said_of
 from servotwin.models.engine.live.screen import (
     NEXT,
-    REFUSED,
-    SILENCE,
     TOO_LONG,
-    TRIPS,
     USED,
     Looks,
     Said,
     Screen,
-    code_of,
     is_late,
     note,
     switch_of,
@@ -192,14 +189,14 @@ def _note_all(written: Tape, events: Any, rows: Any, used: Any) -> None:
     """Note what has happened that people are told of."""
     for n in range(written.used[1]):
         j, time, kind = int(written.events[n, 0]), written.events[n, 1], int(written.events[n, 2])
-        code = -1
+        code = kinds.NO_EVENT
         if kind >= 0:
-            code = code_of(kind, Mode(int(written.events[n, 3]), int(written.events[n, 4]), 0, 0, 0))
+            code = kinds.kind_of(kind, Mode(int(written.events[n, 3]), int(written.events[n, 4]), 0, 0, 0))
         elif event_log.SILENCE <= kind <= event_log.SILENCE + 1:
-            code = SILENCE + kind - event_log.SILENCE
+            code = kinds.SILENCE_ENDS + kind - event_log.SILENCE
         elif kind == event_log.REFUSED:
-            code = REFUSED
+            code = kinds.REFUSED
         elif event_log.TRIPS <= kind < event_log.TRIPS + 5:
-            code = TRIPS + kind - event_log.TRIPS
-        if code >= 0:
+            code = kinds.TRIP_ENDS + kind - event_log.TRIPS
+        if code != kinds.NO_EVENT:
             note(Screen(rows[j], events[j], used[USED * j:USED * j + USED]), time, code)

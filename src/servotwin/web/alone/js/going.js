@@ -47,6 +47,8 @@ export class Going {
       kernel.set("post", this.posts, k, "accuracy", world.limits.accuracy);
       this.make(k, servo);
     });
+    const room = kernel.layout.log;
+    this.log = [kernel.records("row", room.motions), kernel.records("happened", room.events), { ...this.none, lengths: [0] }, kernel.take(room.counts)];
     this.bus = Object.keys(scene.supply).length ? this.onBus(n) : null;
     kernel.set("sender", this.sender, 0, "rate", scene.frame_rate);
     kernel.set("sender", this.sender, 0, "seed", scene.seed);
@@ -206,7 +208,7 @@ export class Going {
   advance(until, rate, switches) {
     const { kernel, world } = this;
     const together = this.bus ? [kernel.layout.lanes.map((/** @type {string} */ name) => (
-      name === "pieces" ? this.commands : this.bus.lanes[name])), ...this.bus.rest] : [];
+      name === "pieces" ? this.commands : this.bus.lanes[name])), ...this.bus.rest] : [this.log];
     const left = kernel.wholes(this.used);
     for (let k = 0; k < this.columns.length; k += 1) left[k * world.limits.used + world.limits.left] = BigInt(world.limits.steps);
     const status = kernel.call(this.bus ? "advance_together" : "advance", this.posts, this.told, this.programs, this.memories,
