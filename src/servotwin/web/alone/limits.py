@@ -13,7 +13,7 @@ from servotwin.web.live.said import FRAME_RATE, RATES
 from servotwin.web.live.scene import FORMAT, LONGEST_TEXT, MOST_ACTIONS, MOST_SERVOS, MOST_VIEW
 from servotwin.web.server import pace, room, stint
 
-_AT_ONCE = 16  # rows of what each servo on a shared supply does at once
+_AT_ONCE = 64  # rows of what each servo on a shared supply does at once
 _STEPS = 150_000  # of a servo in a call, half a second of computing: a motion that takes more stands
 _ROWS, _EVENTS, _PULSES, _TRAIN, _GIVEN = 4096, 512, 1024, 64, 8  # room for what shows, and what is told
 

@@ -65,6 +65,7 @@ class Post(NamedTuple):
     mesh: int
     motor: int
     share: int
+    row: int  # of its present motion in the log, on a shared supply
 
 
 class Circuit(NamedTuple):

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.models.engine.events import kinds
+from servotwin.models.engine.log import Row
 from servotwin.models.engine.memory import Inputs, Memory, in_force
 from servotwin.models.engine.observe import Observed, observed, told_by
 from servotwin.models.state.modes import Mode, Vector
@@ -101,6 +102,11 @@ def told_of(memory: Memory, program: bool) -> Said:
     return Said(drive, chip.error, chip.silent, firm.duty, firm.goal, firm.r, firm.trip)
 
 
+def said_by(row: Row) -> Said:
+    """Return what showed of a chip or a program in a motion."""
+    return Said(row.drive, row.error, row.silent, row.duty, row.goal, row.reference, row.trip)
+
+
 def switch_of(told: Said) -> Switch:
     """Return how a bridge drives now."""
     return Switch(told.drive, told.duty if abs(told.duty) > 1.0 else 0.0, told.silent)
@@ -130,12 +136,6 @@ def put_row(rows: Any, n: int, time: float, shown: Observed, y: Vector, lines: L
     rows[n, _OUTPUT + 2] = lines.per_volt * command + lines.volts
     rows[n, _OUTPUT + 3] = lines.per_angle * command + lines.angle
     rows[n, _OUTPUT + 4] = lines.per_width * command + lines.width
-
-
-def is_late(used: Indices, k: int) -> bool:
-    """Count a step of a servo; tell whether it was the last one that is left."""
-    used[USED * k + LEFT] -= 1
-    return bool(used[USED * k + LEFT] == 0)
 
 
 def note(screen: Screen, time: float, code: int) -> None:

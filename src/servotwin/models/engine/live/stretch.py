@@ -16,6 +16,7 @@ from servotwin.models.engine.live.screen import (
     Switch,
     is_before,
     note,
+    said_by,
     switch_of,
     told_of,
     write,
@@ -105,7 +106,7 @@ def show(numbers: Numbers, inputs: Inputs, rows: Any, count: int, shared: Floats
         row = row_at(rows, n)
         m = motion_of(numbers, row, shared, inputs.accuracy)
         if row.end > row.start:
-            now, start = switch_of(_said(row)), row.origin + row.start
+            now, start = switch_of(said_by(row)), row.origin + row.start
             if looks.switches == 1 and now != was and was.silent >= 0:
                 if n == 0:
                     _see_stood(screen, lines, inputs, numbers, stood)
@@ -148,10 +149,6 @@ def look(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, lines: Li
           piece_value(u, time), piece_value(tau, time), point.y, point.wiper, time)
 
 
-def _said(row: Row) -> Said:
-    return Said(row.drive, row.error, row.silent, row.duty, row.goal, row.reference, row.trip)
-
-
 def _see(screen: Screen, lines: Lines, inputs: Inputs, row: Row, m: Motion, time: float) -> Motion:
     """Write a row of a time [s] on a motion; return the motion, prepared for it."""
     if screen.used[0] >= len(screen.rows):
@@ -161,7 +158,7 @@ def _see(screen: Screen, lines: Lines, inputs: Inputs, row: Row, m: Motion, time
     if motion.is_step(m) and 0.0 < age < m.length:
         m = motion.prepared(m)
     y = motion.state(m, age)
-    write(screen, lines, inputs, _said(row), warm(m.numbers, y), m.mode, piece_value(m.u, local),
+    write(screen, lines, inputs, said_by(row), warm(m.numbers, y), m.mode, piece_value(m.u, local),
           piece_value(m.tau, local), y, wiper_at(m.numbers.sensor, row.wiper, y.q), time)
     return m
 

@@ -1,37 +1,42 @@
-"""Servos on one supply go on for a stretch of time, and are looked at on the way."""
+"""Servos on one supply go on for a stretch of time, and are looked at on the way: what shows follows from their log."""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
-from servotwin.models.engine.bus import bus_unit, event_log, event_queue
+from servotwin.models.engine.at import motion_of, row_at, state_of
+from servotwin.models.engine.bus import event_log, event_queue, shared_source
 from servotwin.models.engine.bus.bus_inputs import inputs_at
-from servotwin.models.engine.bus.bus_records import drive_of, mode_of, numbers_of, piece_of, vector_of
+from servotwin.models.engine.bus.bus_records import numbers_of, put_numbers, put_vector, source_of
 from servotwin.models.engine.bus.event_log import Tape
 from servotwin.models.engine.events import kinds
 from servotwin.models.engine.live.posts import lines_of, put_said, said_of
 from servotwin.models.engine.live.screen import (
+    LEFT,
     NEXT,
     TOO_LONG,
     USED,
     Looks,
     Said,
     Screen,
-    is_late,
     note,
+    said_by,
     switch_of,
     write,
 )
-from servotwin.models.engine.memory import instant, since
+from servotwin.models.engine.log import Row
+from servotwin.models.engine.motions import motion
 from servotwin.models.engine.observe import on_bus
-from servotwin.models.engine.step import CHATTER, COMPLETED, MOST_IDLE, at_pulses, status_of
-from servotwin.models.state.modes import Mode
+from servotwin.models.engine.step import COMPLETED, at_pulses
+from servotwin.models.state.modes import Mode, Vector
 from servotwin.models.terms import duty
-from servotwin.models.terms.numbers import warm
+from servotwin.models.terms.numbers import Numbers, warm
+from servotwin.models.terms.sensor import wiper_at
 from servotwin.physics.pieces import piece_value
 
 PLAIN = True  # the compiler takes it for False
-_LATE = 1e-12  # of an instant: so much before a tick it is the tick
+_LATE = 1.0 + 1e-12  # of an instant: so much before a tick it is the tick
 
 
 def go_on(told: Any, posts: Any, firms: Any, shared: Any, seats: Any, mates: Any, looks: Looks, written: Tape,
@@ -41,148 +46,159 @@ def go_on(told: Any, posts: Any, firms: Any, shared: Any, seats: Any, mates: Any
     Servos have their seats and remember where they stand; what they are `told` is found by `inputs_at`. The tape has
     room for what servos do at once.
     """
-    count = len(posts)
-    for j in range(count):
-        seat = seats[j]
-        seat.until = instant(True, inputs_at(told, seat), bus_unit.memory_in(seat, firms), looks.until - seat.origin)
-    if seats[0].point.time >= seats[0].until:
-        return COMPLETED
-    for j in range(count):
-        event_queue.be_ready(inputs_at(told, seats[j]), seats[j], firms, shared, j == 0)
-    first = seats[0].point.time
-    for j in range(count):
-        bus_unit.begin(seats[j], first, seats[j].until)
-    status = _run(told, posts, firms, shared, seats, mates, looks, written, rows, events, used)
-    for j in range(count):
-        bus_unit.finish(seats[j])
-    return status
-
-
-def _run(told: Any, posts: Any, firms: Any, shared: Any, seats: Any, mates: Any, looks: Looks, written: Tape,
-         rows: Any, events: Any, used: Any) -> int:
-    """Go on to the end of the run, as `event_queue.run` does, and look on the way."""
-    count, idle, status = len(posts), 0, COMPLETED
-    time, until, origin = seats[0].clock, seats[0].end, seats[0].origin
-    event_queue.take_up(count, shared, seats, mates)
-    for j in range(count):
-        bus_unit.plan_ahead(seats[j], bus_unit.edge_of(seats[j], inputs_at(told, seats[j]), firms), until)
-    late = 1.0
-    for j in range(count):
-        late = 1.0 + _LATE if duty.present(seats[j].numbers.bridge) else late
-    k = used[NEXT]
-    while time < until:
-        busy = False
-        for j in range(count):
-            busy = busy or seats[j].due <= time
-        before = event_queue.bus_voltage(count, shared, seats, mates, time) if busy and looks.switches == 1 else 0.0
-        for j in range(count):
-            put_modes(posts[j], seats[j], mates)
-        written.used[:] = 0
-        status = event_queue.act(told, firms, count, shared, seats, mates, written, time, until)
-        if status == COMPLETED:
-            status = event_queue.carry_on(count, shared, seats, mates, written, time, until)
-        if status != COMPLETED:
-            return status
-        if looks.switches == 1 and _switched(posts, seats):
-            _see_all(told, posts, shared, seats, mates, time, origin + time, True, before, rows, events, used)
-            V_bus = event_queue.bus_voltage(count, shared, seats, mates, time)
-            _see_all(told, posts, shared, seats, mates, time, origin + time, False, V_bus, rows, events, used)
-            k = k + 1 if k / looks.rate == origin + time else k
-        for j in range(count):
-            put_said(posts[j].said, said_by(seats[j]))
-        following = event_queue.next_time(count, shared, seats, until)
-        idle = idle + 1 if following == time else 0
-        if idle > MOST_IDLE * count:
-            return CHATTER
-        if is_late(used, 0):
-            return TOO_LONG
-        at = k / looks.rate
-        while at * late < origin + following and at < looks.until:
-            _look(told, posts, shared, seats, mates, at - origin, at, rows, events, used)
-            k += 1
-            at = k / looks.rate
-        time = following
-        status = event_queue.come(count, shared, seats, mates, written, time, until)
-        if PLAIN:
-            rows[0].tell(origin + time)
+    k, status = looks.next, event_queue.PAUSED
+    for j in range(len(posts)):
+        seats[j].until = looks.until - seats[j].origin
+    while status == event_queue.PAUSED:
+        written.used[0], written.used[1], written.used[2] = 0, 0, 0
+        status, when = event_queue.through(told, firms, len(posts), shared, seats, mates, written)
+        if used[LEFT] > 0:
+            used[LEFT] = max(used[LEFT] - written.used[0], 0)
+            if used[LEFT] == 0 and status == event_queue.PAUSED:
+                status = TOO_LONG
+        if written.used[0] > 0:
+            k = _show(told, posts, shared, seats, mates, looks, written, k, status == COMPLETED, rows, events, used)
         _note_all(written, events, rows, used)
-        if status != COMPLETED:
-            return status
-    at = k / looks.rate
-    while at < looks.until and (looks.at_end == 1 or late == 1.0):  # next to the end
-        _look(told, posts, shared, seats, mates, until, at, rows, events, used)
-        k += 1
-        at = k / looks.rate
-    if looks.at_end == 1:
-        _look(told, posts, shared, seats, mates, until, looks.until, rows, events, used)
-    for j in range(count):
+        if PLAIN:
+            rows[0].tell(when)
+    for j in range(len(posts)):
         used[USED * j + NEXT] = k
-    written.used[:] = 0
-    for j in range(count):
-        bus_unit.bring(seats[j], j, shared, mates, time, written)
-        if status == COMPLETED:
-            status = status_of(vector_of(seats[j].point.y))
     return status
 
 
-def put_modes(post: Any, seat: Any, mates: Any) -> None:
-    """Keep the mode in which a servo moves, before its bridge may switch."""
-    mode = _mode_in(seat, mates)
-    post.zone, post.contact, post.mesh, post.motor, post.share = mode
-
-
-def _mode_in(seat: Any, mates: Any) -> Mode:
-    return mode_of(mates[seat.joined].mode) if seat.joined >= 0 else mode_of(seat.point.mode)
-
-
-def said_by(seat: Any) -> Said:
-    """Return what shows of a chip or a program now."""
-    now, shown = seat.decided, seat.shown
-    if not duty.present(seat.numbers.bridge):
-        return Said(now.drive, now.error, now.silent, 0.0, 0.0, 0.0, 0)
-    return Said(drive_of(seat), now.error, now.silent, shown.duty, shown.goal, shown.reference, shown.trip)
-
-
-def _switched(posts: Any, seats: Any) -> bool:
-    """Tell whether a bridge drives in another way than at the latest look."""
+def _show(told: Any, posts: Any, shared: Any, seats: Any, mates: Any, looks: Looks, written: Tape, k: int, ends: bool,
+          rows: Any, events: Any, used: Any) -> int:
+    """Write what shows of all motions of a tape; return the number of the next look."""
+    late = 1.0
     for j in range(len(posts)):
-        said = said_of(posts[j].said)
-        if said.silent >= 0 and switch_of(said) != switch_of(said_by(seats[j])):
-            return True
-    return False
+        posts[j].row = -1
+        late = _LATE if duty.present(seats[j].numbers.bridge) else late
+    last = row_at(written.motions, written.used[0] - 1)
+    end, going = last.origin + last.end, True
+    while going:
+        begins = _next_begin(written, posts)
+        time = k / looks.rate
+        if posts[0].row >= 0 and time * late < min(begins, end) and time < looks.until:
+            _see_all(told, posts, shared, seats, mates, written, time, time, False, rows, events, used)
+            k += 1
+        elif begins < math.inf:
+            switched = _enter(written, posts, begins)
+            if switched and looks.switches == 1:
+                _see_all(told, posts, shared, seats, mates, written, begins, begins, True, rows, events, used)
+            _take_over(written, posts)
+            if switched and looks.switches == 1:
+                _see_all(told, posts, shared, seats, mates, written, begins, begins, False, rows, events, used)
+                k = k + 1 if k / looks.rate == begins else k
+        else:
+            going = False
+    if ends:
+        time = k / looks.rate
+        while time < looks.until and (looks.at_end == 1 or late == 1.0):  # next to the end
+            _see_all(told, posts, shared, seats, mates, written, end, time, False, rows, events, used)
+            k += 1
+            time = k / looks.rate
+        if looks.at_end == 1:
+            _see_all(told, posts, shared, seats, mates, written, end, looks.until, False, rows, events, used)
+    return k
 
 
-def _look(told: Any, posts: Any, shared: Any, seats: Any, mates: Any, time: float, shown_at: float, rows: Any,
-          events: Any, used: Any) -> None:
-    """Look at all servos at a time of the bus [s], on their present motions."""
+def _following(written: Tape, j: int, n: int) -> int:
+    """Return which row of a servo comes next after a row; −1: none."""
+    for m in range(n + 1, written.used[0]):
+        if row_at(written.motions, m).unit == j:
+            return m
+    return -1
+
+
+def _next_begin(written: Tape, posts: Any) -> float:
+    """Return when the next motion of any servo begins [s]; inf after the last."""
+    found = math.inf
     for j in range(len(posts)):
-        seat = seats[j]
-        seat.before, seat.clock = seat.clock, min(time + seat.late, seat.end)
-    V_bus = event_queue.bus_voltage(len(posts), shared, seats, mates, time)
-    _see_all(told, posts, shared, seats, mates, time, shown_at, False, V_bus, rows, events, used)
+        n = _following(written, j, posts[j].row)
+        if n >= 0:
+            row = row_at(written.motions, n)
+            found = min(found, row.origin + row.start)
+    return found
+
+
+def _enter(written: Tape, posts: Any, time: float) -> bool:
+    """Let the motions be present that begin at a time [s]; tell whether a bridge drives in another way then."""
+    switched = False
     for j in range(len(posts)):
-        seats[j].clock = seats[j].before
+        post, n = posts[j], _following(written, j, posts[j].row)
+        if n >= 0:
+            row = row_at(written.motions, n)
+            if row.origin + row.start <= time * _LATE:
+                post.row = n
+                said = said_of(post.said)
+                switched = switched or (said.silent >= 0 and switch_of(said) != switch_of(said_by(row)))
+    return switched
 
 
-def _see_all(told: Any, posts: Any, shared: Any, seats: Any, mates: Any, time: float, shown_at: float, earlier: bool,
-             V_bus: float, rows: Any, events: Any, used: Any) -> None:
-    """Write a row of each servo where it stands, under a voltage of the bus [V]; `earlier`: before bridges switch."""
+def _take_over(written: Tape, posts: Any) -> None:
+    """Note what shows of the chips and programs of all servos in their present motions, and their modes."""
+    for j in range(len(posts)):
+        post = posts[j]
+        if post.row >= 0:
+            row = row_at(written.motions, post.row)
+            put_said(post.said, said_by(row))
+            post.zone, post.contact, post.mesh, post.motor, post.share = row.mode
+
+
+def _said_in(post: Any, row: Row, earlier: bool) -> Said:
+    """Return what shows of a servo in a motion; `earlier`: before its bridge switches, as was noted."""
+    return said_of(post.said) if earlier and post.said.silent >= 0 else said_by(row)
+
+
+def _state_in(numbers: Numbers, row: Row, shared: Any, accuracy: float, time: float) -> Vector:
+    """Return where a servo stands at a time [s] of its motion."""
+    m = motion_of(numbers, row, shared, accuracy)
+    age = time - row.origin - m.t0
+    if motion.is_step(m) and 0.0 < age < m.length:
+        m = motion.prepared(m)
+    return state_of(row, m, shared, age)
+
+
+def _now(numbers: Numbers, said: Said) -> Numbers:
+    """Return the numbers of a servo with its bridge as it shows."""
+    return duty.at_duty(numbers, said.duty) if duty.present(numbers.bridge) else at_pulses(numbers, said.silent)
+
+
+def _voltage(posts: Any, shared: Any, seats: Any, mates: Any, written: Tape, time: float, earlier: bool) -> float:
+    """Return the voltage of the supply at a time [s], from where all servos stand; mates beyond theirs are used."""
+    count, connected, source = len(posts), 0, source_of(shared.source)
+    for j in range(count):
+        row, numbers = row_at(written.motions, posts[j].row), numbers_of(seats[j].numbers)
+        said, y = _said_in(posts[j], row, earlier), _state_in(numbers, row, written.numbers, seats[j].accuracy, time)
+        numbers = _now(numbers, said)
+        if shared_source.is_connected(numbers, said.drive, y):
+            mate = mates[count + connected]
+            put_numbers(mate.numbers, shared_source.on_stiff_source(numbers, said.drive == 0.0))
+            put_vector(mate.y, y)
+            mate.sign = shared_source.part_on_bus(said.drive, numbers.bridge, said.duty, y)
+            mate.returns = 1 if said.drive == 0.0 else 0
+            connected += 1
+    return shared_source.put_in_zones(source, mates[count:], connected, source.V)[1]
+
+
+def _see_all(told: Any, posts: Any, shared: Any, seats: Any, mates: Any, written: Tape, time: float, shown_at: float,
+             earlier: bool, rows: Any, events: Any, used: Any) -> None:
+    """Write a row of each servo where it stands at a time [s]; `earlier`: before bridges switch."""
+    V_bus = _voltage(posts, shared, seats, mates, written, time, earlier)
     for j in range(len(posts)):
         seat, post = seats[j], posts[j]
         screen = Screen(rows[j], events[j], used[USED * j:USED * j + USED])
         if screen.used[0] >= len(screen.rows):
             continue
-        point = bus_unit.point_now(seat, shared, mates, time)
-        y, said, mode = point.y, said_by(seat), _mode_in(seat, mates)
+        row, plain = row_at(written.motions, post.row), numbers_of(seat.numbers)
+        said, mode = _said_in(post, row, earlier), row.mode
         if earlier and post.said.silent >= 0:
-            said, mode = said_of(post.said), Mode(post.zone, post.contact, post.mesh, post.motor, post.share)
-        plain = numbers_of(seat.numbers)
-        own = duty.at_duty(plain, said.duty) if duty.present(plain.bridge) else at_pulses(plain, said.silent)
-        own = warm(own, y)
+            mode = Mode(post.zone, post.contact, post.mesh, post.motor, post.share)
+        y = _state_in(plain, row, written.numbers, seat.accuracy, time)
+        own = warm(_now(plain, said), y)
         own = on_bus(own, V_bus * (duty.share_of(own.bridge, said.duty) if duty.present(plain.bridge) else 1.0))
-        tau = piece_value(since(piece_of(seat.tau), seat.origin), seat.clock)
-        write(screen, lines_of(post.lines), inputs_at(told, seat), said, own, mode, said.drive * own.source.V, tau, y,
-              point.wiper, shown_at)
+        write(screen, lines_of(post.lines), inputs_at(told, seat), said, own, mode, said.drive * own.source.V,
+              piece_value(row.tau, time - row.origin), y, wiper_at(plain.sensor, row.wiper, y.q), shown_at)
 
 
 def _note_all(written: Tape, events: Any, rows: Any, used: Any) -> None:
