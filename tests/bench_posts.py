@@ -38,7 +38,7 @@ def post_of(model: Model, load: Load, seed: int = 0) -> Post:
         angle=follow_of(model, "deg"), voltage=follow_of(model, "V"), was=NONE_BEFORE,
         lowest=min(ends), highest=max(ends), torque=load.torque, push=0.0, sent=0.0, accuracy=ACCURACY, seed=seed,
         pulsed=int(pulsed(model)), changed=1, command_first=0, command_count=0, curve_first=0, curve_count=0, heard=0,
-        said=NOTHING_SAID, zone=0, contact=0, mesh=0, motor=0, share=0)
+        said=NOTHING_SAID, zone=0, contact=0, mesh=0, motor=0, share=0, row=0)
 
 
 def follow_of(model: Model, unit: str) -> Follow:
