@@ -16,7 +16,7 @@ from servotwin.simulation.compile.building import printed
 from servotwin.simulation.compile.compilers import compilers
 from servotwin.simulation.compile.derive import derive
 from servotwin.simulation.compile.translate import header
-from servotwin.simulation.lanes.form_recipes import _BY_ARCS, ALL_RUNS, BY_LEGS, PLAIN_RUNS, parts_of
+from servotwin.simulation.lanes.form_recipes import _BY_FORMULA, ALL_RUNS, BY_LEGS, PLAIN_RUNS, parts_of
 
 SLIDE = Recipe("slide", ("servotwin.models.engine.batch.linear_segments:slide",), vector=True)
 NUMBERS = ArcNumbers(60.0, 60.0, 0.2, 1 / 60.0, 1 / 60.0, 5.0, 330.0, 20.0, 5.0, 6.0, 0.4, 0.1, 33.0, 40.0, 5.0, 1.0,
@@ -76,7 +76,7 @@ def reached(name, functions):
 @pytest.mark.long
 @pytest.mark.parametrize("ending", ["phases__phases", "windows__divide"])
 def test_float32_stays_float32(ending):
-    functions = functions_of(printed(_BY_ARCS["float32"]).text.removeprefix(header()))
+    functions = functions_of(printed(_BY_FORMULA["float32"]).text.removeprefix(header()))
     (name,) = (each for each in functions if each.endswith(ending))
     own = reached(name, functions)
     assert len(own) > 3

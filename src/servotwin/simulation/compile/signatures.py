@@ -40,7 +40,7 @@ from servotwin.simulation.compile.recipe import Recipe
 Signature = tuple[str, tuple[Kind, ...]]
 _FLOATS, _TABLE, _CUBE = (Array(FLOAT64, dimensions) for dimensions in (1, 2, 3))
 _INDICES, _SMALLS, _SMALL_TABLE = Array(INT64, 1), Array(INT8, 1), Array(INT8, 2)
-FORMS = ("ONE_FORMULA", "ARCS", "BANDS", "STRIDES", "COILS", "GAPS")
+FORMS = ("ONE_FORMULA", "BANDS", "STRIDES", "COILS", "GAPS")
 """Names of the ways in which tiles go through phases, in `models.engine.batch.tiles`."""
 
 
@@ -94,10 +94,9 @@ _SIGNATURES: Mapping[str, tuple[Kind, ...]] = {
 @cache
 def _of_ticks() -> Mapping[str, tuple[Kind, ...]]:
     """Return what entries are called with that let digital servos go from tick to tick together."""
-    from servotwin.models.engine.batch import digital_tiles
     from servotwin.models.engine.bus.coupled_units import Coupling, Unit
 
-    return {"digital_batch:go_on": (*_GOING, _records(digital_tiles.TILE_TYPE)), "leg_runs:go_on": _GOING,
+    return {"leg_runs:go_on": _GOING,
             "leg_runs:go_on_nearly": _GOING,
             "coupled_runs:go_on": (*_GOING, _records(record_of(Unit)), _records(record_of(Coupling)))}
 
@@ -157,7 +156,7 @@ def _of_the_bench() -> Mapping[str, tuple[Kind, ...]]:
 _OF_BENCH = ("make", "begin", "begin_at", "heed", "change", "take", "count", "draw", "look", "tune", "snapped",
              "next_edge", "advance", "advance_together")
 _ELSEWHERE: Mapping[str, Callable[[], Mapping[str, tuple[Kind, ...]]]] = {  # where kinds take more than lanes have
-    "digital_batch:go_on": _of_ticks, "leg_runs:go_on": _of_ticks, "leg_runs:go_on_nearly": _of_ticks,
+    "leg_runs:go_on": _of_ticks, "leg_runs:go_on_nearly": _of_ticks,
     "coupled_runs:go_on": _of_ticks, **{f"bench:{name}": _of_the_bench for name in _OF_BENCH},
     "stretch:shown": _of_the_bench,
     "bus_batch:go_on": _of_buses, "bus_batch:look": _of_buses, "bus_batch:voltages": _of_buses,
@@ -213,7 +212,7 @@ def _tiles_of(recipe: Recipe) -> list[tuple[str, int]]:
     forms = [getattr(tiles, name) for name in FORMS if name not in recipe.never]
     both = len(forms) == len(FORMS)  # a recipe that looks at the tiles of all others
     kinds = [(real, form) for real in (("float64", "float32") if both else ("float32" if recipe.single else "float64",))
-             for form in forms if real == "float64" or form in (tiles.ONE_FORMULA, tiles.ARCS)]
+             for form in forms if real == "float64" or form == tiles.ONE_FORMULA]
     return list({tiles.tile_type(*kind): kind for kind in kinds}.values())
 
 

@@ -112,7 +112,7 @@ class SideBySide(NamedTuple):
     @property
     def general(self) -> Recipe:
         """The kernels of those that cannot go on side by side."""
-        plain = self.form in (tiles.ONE_FORMULA, tiles.ARCS) and not self.slack
+        plain = self.form == tiles.ONE_FORMULA and not self.slack
         return recipes.PLAIN_RUNS if plain else recipes.ALL_RUNS
 
 
@@ -149,7 +149,7 @@ def _of_analog(terms: Terms, left: Mask, dtype: str) -> Iterator[SideBySide | On
     """Return how lanes run that are pulsed or follow a mean, of one body or with play; they are taken from `left`."""
     side = _stays(terms) if dtype == "float32" else True
     for form, knows, made_for in () if is_plain() else recipes.SIDES:
-        own_type = dtype if form in (tiles.ONE_FORMULA, tiles.ARCS) else "float64"
+        own_type = dtype if form == tiles.ONE_FORMULA else "float64"
         asked: Any = terms.ask(made_for) if made_for else True
         which = _take(terms, left, recipes.side_by_side(form, own_type, True, True),
                       terms.suit(knows) & asked & side)
@@ -165,7 +165,7 @@ def _alone(terms: Terms, left: Mask, nearly: bool) -> Iterator[OneByOne]:
     digital, sprung = np.any(terms.ask(PWM)), left & terms.ask(SPRING)
     left &= ~sprung
     yield from _at_last(terms, sprung, recipes.ALL_RUNS)
-    fast = (recipes.BY_TICKS, recipes.BY_LEGS, *((recipes.NEARLY_BY_LEGS,) if nearly else ()), recipes.BY_SERIES)
+    fast = (recipes.BY_LEGS, *((recipes.NEARLY_BY_LEGS,) if nearly else ()), recipes.BY_SERIES)
     for recipe in fast if digital and not is_plain() else ():
         yield OneByOne(_take(terms, left, recipe), recipe)
     yield from _at_last(terms, left, recipes.ALL_DIGITAL if digital else recipes.ALL_RUNS)

@@ -12,12 +12,11 @@ from servotwin.models.engine.batch import (
     backlash_batch,
     braked_batch,
     inductive_batch,
-    linear_batch,
     piecewise_batch,
     rk_batch,
     tiles,
 )
-from servotwin.models.engine.batch.tiles import ARCS, BANDS, COILS, GAPS, ONE_FORMULA, STRIDES, More
+from servotwin.models.engine.batch.tiles import BANDS, COILS, GAPS, ONE_FORMULA, STRIDES, More
 
 
 def phases(size: int, keep: bool, form: int, slack: bool, tile: Any, plan: Any) -> None:
@@ -122,8 +121,6 @@ def _alone(form: int, slack: bool, tile: Any, plan: Any, j: int) -> None:
     """Move one lane through one phase."""
     if form == ONE_FORMULA:
         braked_batch.alone(slack, tile, plan, j)
-    elif form == ARCS:
-        linear_batch.alone(tile, plan, j)
     elif form == BANDS:
         piecewise_batch.alone(slack, tile, plan, j)
     elif form == STRIDES:
@@ -158,8 +155,6 @@ def _before(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
     if moving > 0:
         if form == ONE_FORMULA:
             braked_batch.drive_or_rest(size, slack, tile, plan)
-        elif form == ARCS:
-            linear_batch.drive_or_rest(size, tile, plan)
         else:
             _by_law(size, form, slack, tile, plan)
     if both > 0:
@@ -184,8 +179,6 @@ def _drive(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
     if moving > 0:
         if form == ONE_FORMULA:
             braked_batch.drive(size, slack, tile, plan)
-        elif form == ARCS:
-            linear_batch.drive(size, tile, plan)
         else:
             _by_law(size, form, slack, tile, plan)
 
@@ -200,8 +193,6 @@ def _idle(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
     if moving > 0:
         if form == ONE_FORMULA:
             braked_batch.rest(size, slack, tile, plan)
-        elif form == ARCS:
-            linear_batch.rest(size, tile, plan)
         else:
             _by_law(size, form, slack, tile, plan)
 

@@ -1,11 +1,12 @@
-"""How lanes of any law made of bands go through a phase: band by band, all lanes together, as in `arc_rounds`."""
+"""How lanes of any law made of bands go through a phase: band by band, all lanes together."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from servotwin.models.engine.batch import linear_batch, linear_segments, piecewise_segments, tiles
+from servotwin.models.engine.batch import linear_segments, piecewise_segments, tiles
 from servotwin.models.engine.events.guards import SPEED
+from servotwin.models.engine.motions.elementary import decay, fma
 from servotwin.models.terms.numbers import Numbers
 
 _ROUNDS = 3  # that all lanes take together
@@ -56,7 +57,7 @@ def _round(size: int, slack: bool, tile: Any, plan: Any) -> int:
     for j in range(size):
         creeping += 1 if plan.creeps[j] > 0.0 else 0
     for j in range(size):
-        linear_batch.end_arc(tile, plan, j)
+        _end_arc(tile, plan, j)
     if creeping > 0:
         for j in range(size):
             if plan.creeps[j] > 0.0:
@@ -84,6 +85,23 @@ def _round(size: int, slack: bool, tile: Any, plan: Any) -> int:
     for j in range(size):
         going += 1 if plan.time[j] > 0.0 else 0
     return going
+
+
+def _end_arc(tile: Any, plan: Any, j: int) -> None:
+    """Move a lane to the end of its time if that lies in one arc; otherwise mark it."""
+    time, q, w, rate, per_rate, pull = (
+        plan.time[j], tile.servo.q[j], tile.servo.w[j], plan.rate[j], plan.per_rate[j], plan.pull[j])
+    arc = linear_segments.Arc(rate, per_rate, pull, plan.edge_speed[j], plan.pull_there[j])
+    once, twice = decay(rate, per_rate, time)
+    after = fma(pull, once, w)
+    to = fma(pull, twice, fma(w, time, q))
+    ends = time > 0.0 and linear_segments.reaches_edge(arc, after)
+    goes = time > 0.0 and not ends
+    inside = tile.arc.lower[j] < to < tile.arc.upper[j]
+    plan.ends[j] = 1.0 if ends else 0.0
+    tile.servo.q[j] = to if goes else q
+    tile.servo.w[j] = after if goes else w
+    plan.lost[j] = 1.0 if goes and not inside else plan.lost[j]
 
 
 def _find(numbers: Numbers, tile: Any, plan: Any, j: int) -> None:

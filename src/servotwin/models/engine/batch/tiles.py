@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 FEW = 2  # lanes that are not worth going together
 # How lanes go through a phase: as `braked_rounds`, `arc_rounds`, `band_rounds`, `stride_rounds`, `coil_rounds` and
 # `gap_rounds` have it
-ONE_FORMULA, ARCS, BANDS, STRIDES, COILS, GAPS = range(6)
+ONE_FORMULA, BANDS, STRIDES, COILS, GAPS = range(5)
 
 
 class Meter(NamedTuple):
@@ -370,25 +370,6 @@ def start(lanes: Lanes, form: int, first: int, size: int, first_output: float, t
         begin, count = lanes.piece_first[first + j], lanes.piece_count[first + j]
         put_count(tile.count, j, Count(0, 0, lanes.seeds[first + j], begin, begin + count - 1, 0,
                                        lanes.edge_first[first + j], own, 0, 0, 0, 0))
-
-
-def driven_numbers_at(rows: Any, j: int) -> ArcNumbers:
-    """Return a shaft for drives alone: the numbers between drives are replaced, so that choosing costs nothing."""
-    x = arc_numbers_at(rows, j)
-    return ArcNumbers(
-        x.rate_drive, x.rate_drive, x.rate_free, x.per_rate_drive, x.per_rate_drive, x.per_rate_free, x.push,
-        x.drag_drive, x.drag_drive, x.speed, x.gap_drive, x.gap_drive, x.friction_forward, x.friction_backward,
-        x.against, x.start_forward, x.start_backward, 0.0, x.lower, x.upper, x.inertia, x.pull, x.hold_forward,
-        x.hold_backward)
-
-
-def idle_numbers_at(rows: Any, j: int) -> ArcNumbers:
-    """Return a shaft for the time between drives alone."""
-    x = arc_numbers_at(rows, j)
-    return ArcNumbers(
-        x.rate_off, x.rate_off, x.rate_free, x.per_rate_off, x.per_rate_off, x.per_rate_free, 0.0, x.drag_off,
-        x.drag_off, 0.0, x.gap_off, x.gap_off, x.friction_forward, x.friction_backward, x.against, x.start_off,
-        x.start_off, x.start_off, x.lower, x.upper, x.inertia, x.pull, x.hold_forward, x.hold_backward)
 
 
 def plain_chip_at(rows: Any, j: int) -> Chip:
