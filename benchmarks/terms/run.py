@@ -1,6 +1,6 @@
 """What every term of the pulse servo costs, in a batch and in plain Python; what a bus costs; what is off does not; and
 what digital servos cost with what theirs have, alone and on shared supplies; what friction that fades with the speed
-costs, over its numbers.
+costs, over its numbers; what each form of running lanes is worth.
 
 `run.py` does all parts and draws the picture; `run.py batch bus` only those named. The picture needs `batch` and
 `single`.
@@ -11,7 +11,7 @@ from importlib import import_module
 
 import picture
 
-PARTS = ("batch", "kernels", "single", "bus", "off", "digital", "shared", "stribeck")
+PARTS = ("batch", "kernels", "single", "bus", "off", "digital", "shared", "stribeck", "forms")
 
 
 def main() -> None:

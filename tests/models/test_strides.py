@@ -230,17 +230,17 @@ HEAT = {"thermal.winding_capacity": 0.5, "thermal.housing_capacity": 5.0, "therm
         "thermal.housing_to_ambient": 10.0, "thermal.magnet_coefficient": -1.5e-3}
 STRIBECK = {"friction.stribeck_speed": 10.0, "friction.stribeck_exponent": 1.5}
 PUSHED = {"friction.load_friction_motor": 0.08, "friction.load_friction_external": 0.1}
-FLEETS = {  # what is changed, what hangs on it, and whether it has bands
-    "heat": (HEAT, None, False), "pendulum": ({}, "pendulum", False), "spring": ({}, "spring", False),
-    "heat, pendulum": (HEAT, "pendulum", False),
-    "open, pendulum": ({"electronics.off_state": "coast"}, "pendulum", False),
-    "play of the potentiometer, pendulum": ({"potentiometer.backlash": 0.01}, "pendulum", False),
-    "M3, pendulum": ({"friction.load_friction": 0.08}, "pendulum", True), "M5, pendulum": (PUSHED, "pendulum", True),
-    "Stribeck, pendulum": (STRIBECK, "pendulum", True),
+FLEETS = {  # what is changed, and what hangs on it
+    "heat": (HEAT, None), "pendulum": ({}, "pendulum"), "spring": ({}, "spring"),
+    "heat, pendulum": (HEAT, "pendulum"),
+    "open, pendulum": ({"electronics.off_state": "coast"}, "pendulum"),
+    "play of the potentiometer, pendulum": ({"potentiometer.backlash": 0.01}, "pendulum"),
+    "M3, pendulum": ({"friction.load_friction": 0.08}, "pendulum"), "M5, pendulum": (PUSHED, "pendulum"),
+    "Stribeck, pendulum": (STRIBECK, "pendulum"),
     "M6, pendulum": (STRIBECK | PUSHED | {
         "friction.load_friction_motor_stribeck": 0.04, "friction.load_friction_external_stribeck": 0.05,
-        "friction.load_friction_motor_quad": 0.1, "friction.load_friction_external_quad": 0.2}, "pendulum", True),
-    "regulator, heat": (HEAT | {"supply.current_limit": 1.2}, None, True)}
+        "friction.load_friction_motor_quad": 0.1, "friction.load_friction_external_quad": 0.2}, "pendulum"),
+    "regulator, heat": (HEAT | {"supply.current_limit": 1.2}, None)}
 COUNT, DURATION = 32, 0.3
 TIMES = np.sort(np.random.default_rng(1).uniform(0.0, DURATION, 25))
 SIGNALS = ("output_angle", "output_speed", "drive")
@@ -250,7 +250,7 @@ WARM = ("winding_temperature", "housing_temperature", "armature_current")
 @cache
 def fleet(name):
     """Return model, commands, loads, parameters and seeds of random servos."""
-    changes, hangs, _ = FLEETS[name]
+    changes, hangs = FLEETS[name]
     rng = np.random.default_rng(5)
     model = st.PulseServo(SERVO.replace(changes))
     spread = {of: model.servo.source(of).value * rng.uniform(0.8, 1.2, COUNT) for of in (
@@ -295,7 +295,7 @@ def test_fleets_go_by_strides(name):
     model, _, loads, _, _ = fleet(name)
     numbers, nobody = model.pack(loads[0]), np.zeros(3, np.bool_)
     (kind,) = forms.kinds_with(numbers, model.chip(), 3, "float32", nobody, nobody, False)
-    assert (kind.form, kind.dtype, kind.wider) == (tiles.STRIDES, "float64", FLEETS[name][2])
+    assert (kind.form, kind.dtype) == (tiles.STRIDES, "float64")
 
 
 @pytest.mark.long(but="spring-1e-09")

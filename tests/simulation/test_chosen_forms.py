@@ -46,22 +46,20 @@ OF_PULSES = ("coil", "silent", "coast")
 
 # Sets of features by the kernels that servos took; what is not here took the general ones, a spring those of its own
 OF_ANALOG = {
-    "side_by_side_float64": "plain slack coast coast+silent",
-    "by_gaps": "play play+limit play+share play+slack play+coast",
-    "by_gaps_and_heat": "play+heat",
-    "by_coils": "coil coil+slack coil+coast",
-    "by_coils_and_shares": "coil+share",
+    "side_by_side_float64": "plain slack",
+    "by_gaps": "play play+limit play+share play+slack play+coast play+heat",
+    "by_coils": "coil coil+slack coil+coast coil+share",
     "by_strides": (
         "heat hangs held heat+slack heat+coast heat+hangs heat+held slack+hangs slack+held coast+hangs coast+held "
-        "hangs+held"),
-    "by_bands": "limit share limit+share limit+slack limit+coast share+slack share+coast slack+coast",
-    "by_bands_and_creep": "creep limit+creep creep+share creep+slack creep+coast",
+        "hangs+held heat+limit heat+creep heat+share limit+hangs limit+held creep+hangs creep+held share+hangs "
+        "share+held"),
+    "by_bands": (
+        "coast coast+silent limit share limit+share limit+slack limit+coast share+slack share+coast slack+coast creep "
+        "limit+creep creep+share creep+slack creep+coast"),
     "plain_runs": (
         "steps bend silent told steps+bend steps+coast steps+silent steps+held steps+told bend+coast bend+silent "
         "bend+held bend+told coast+told silent+held silent+told held+told steps+hangs bend+hangs silent+hangs "
         "hangs+told"),
-    "by_strides_in_bands": (
-        "heat+limit heat+creep heat+share limit+hangs limit+held creep+hangs creep+held share+hangs share+held"),
 }
 OF_DIGITAL = {
     "by_legs": (  # the plain one has drops

@@ -87,12 +87,11 @@ HEATS = {"thermal.winding_capacity": 0.5, "thermal.housing_capacity": 5.0, "ther
          "thermal.housing_to_ambient": 20.0}
 PLAYS = {"gear.backlash": 0.02, "gear.output_inertia": 1e-3}
 FORMS = {  # of servos that resist between drives: what they have anyway, by the kernels that they take
-    "side_by_side_float64": ("pulse", {}), "by_bands": ("pulse", {"friction.load_friction": 0.05}),
-    "by_bands_and_creep": ("pulse", {"friction.breakaway_ratio": 1.4, "friction.stribeck_speed": 5.0}),
-    "by_strides_in_bands": ("pulse", HEATS | {"friction.load_friction": 0.05}),
-    "by_coils": ("inductive", {"motor.armature_inductance": 5e-4}), "by_strides": ("pulse", HEATS),
-    "by_coils_and_shares": ("inductive", {"motor.armature_inductance": 5e-4, "friction.load_friction": 0.05}),
-    "by_gaps": ("pulse", PLAYS), "by_gaps_and_heat": ("pulse", PLAYS | HEATS),
+    "side_by_side_float64": ("pulse", {}),
+    "by_bands": ("pulse", {"friction.breakaway_ratio": 1.4, "friction.stribeck_speed": 5.0}),
+    "by_strides": ("pulse", HEATS | {"friction.load_friction": 0.05}),
+    "by_coils": ("inductive", {"motor.armature_inductance": 5e-4, "friction.load_friction": 0.05}),
+    "by_gaps": ("pulse", PLAYS | HEATS),
     "plain_runs": ("pulse", {"potentiometer.quantisation": 1e-3}),
     "runs": ("inductive", HEATS | {"motor.armature_inductance": 5e-4})}
 # A number in each room, and of friction one of which `depends` says nothing

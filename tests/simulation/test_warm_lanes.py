@@ -12,8 +12,8 @@ from warm_cases import DURATION, Case, case
 ACCURACY = 1e-9  # rad
 TIMES = np.linspace(0.0, DURATION, 13)[1:] - 1e-5
 SEEDS = {  # by the kernels that they take
-    "by_strides": (9, 29, 49, 53), "by_strides_in_bands": (15, 22, 33), "by_gaps_and_heat": (3, 12, 31, 42),
-    "by_coils": (2, 17), "by_coils_and_shares": (19,), "runs": (13, 25)}
+    "by_strides": (9, 29, 49, 53, 15, 22, 33), "by_gaps": (3, 12, 31, 42),
+    "by_coils": (2, 17, 19), "runs": (13, 25)}
 BLOCK, BLOCKS = 25, 4
 WORK = 20.0  # s of this process for one by `simulate`: of small bodies that heat fast it may take minutes
 

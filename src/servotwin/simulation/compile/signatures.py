@@ -94,10 +94,10 @@ _SIGNATURES: Mapping[str, tuple[Kind, ...]] = {
 @cache
 def _of_ticks() -> Mapping[str, tuple[Kind, ...]]:
     """Return what entries are called with that let digital servos go from tick to tick together."""
+    from servotwin.models.engine.batch import digital_tiles
     from servotwin.models.engine.bus.coupled_units import Coupling, Unit
 
-    return {"leg_runs:go_on": _GOING,
-            "leg_runs:go_on_nearly": _GOING,
+    return {"digital_batch:go_on": (*_GOING, _records(digital_tiles.TILE_TYPE)), "leg_runs:go_on": _GOING,
             "coupled_runs:go_on": (*_GOING, _records(record_of(Unit)), _records(record_of(Coupling)))}
 
 
@@ -156,7 +156,7 @@ def _of_the_bench() -> Mapping[str, tuple[Kind, ...]]:
 _OF_BENCH = ("make", "begin", "begin_at", "heed", "change", "take", "count", "draw", "look", "tune", "snapped",
              "next_edge", "advance", "advance_together")
 _ELSEWHERE: Mapping[str, Callable[[], Mapping[str, tuple[Kind, ...]]]] = {  # where kinds take more than lanes have
-    "leg_runs:go_on": _of_ticks, "leg_runs:go_on_nearly": _of_ticks,
+    "digital_batch:go_on": _of_ticks, "leg_runs:go_on": _of_ticks,
     "coupled_runs:go_on": _of_ticks, **{f"bench:{name}": _of_the_bench for name in _OF_BENCH},
     "stretch:shown": _of_the_bench,
     "bus_batch:go_on": _of_buses, "bus_batch:look": _of_buses, "bus_batch:voltages": _of_buses,

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from servotwin.models.engine.batch import tiles
+from servotwin.models.engine.batch import digital_tiles, tiles
 from servotwin.models.engine.bus.coupled_units import Coupling, Unit
 from servotwin.models.state.records import record_of
 from servotwin.models.terms.dependence import (
@@ -60,34 +60,25 @@ BANDED = BY_SHARE | FADING | REGULATED
 STRIDING = ON_HEAT | CURVED_Q | ON_Q
 _BRAKED = STRAIGHT | DRY | PULSES | SLACK
 _ANY_BRIDGE = _BRAKED | DROPS
-_GAPS = REGULATED | BY_SHARE | PLAY | TWO_BODIES
-SIDES = (
-    (tiles.ONE_FORMULA, _BRAKED, 0), (tiles.BANDS, _ANY_BRIDGE | BANDED, BANDED | DROPS),
-    (tiles.STRIDES, _ANY_BRIDGE | STRIDING, STRIDING), (tiles.STRIDES, _ANY_BRIDGE | STRIDING | BANDED, STRIDING),
-    (tiles.COILS, _ANY_BRIDGE | ON_I, ON_I), (tiles.COILS, _ANY_BRIDGE | ON_I | BY_SHARE, ON_I),
-    (tiles.GAPS, _ANY_BRIDGE | _GAPS, PLAY), (tiles.GAPS, _ANY_BRIDGE | _GAPS | ON_HEAT, PLAY))
+SIDES = {
+    tiles.ONE_FORMULA: (_BRAKED, 0),
+    tiles.BANDS: (_ANY_BRIDGE | BANDED, BANDED | DROPS),
+    tiles.STRIDES: (_ANY_BRIDGE | STRIDING | BANDED, STRIDING),
+    tiles.COILS: (_ANY_BRIDGE | ON_I | BY_SHARE, ON_I),
+    tiles.GAPS: (_ANY_BRIDGE | REGULATED | BY_SHARE | PLAY | TWO_BODIES | ON_HEAT, PLAY)}
 """Forms of going side by side, the fastest first: what each follows, and what of this its lanes have to ask for."""
-WIDER = {tiles.STRIDES: BANDED, tiles.COILS: BY_SHARE, tiles.GAPS: ON_HEAT}
-"""What a form follows by other kernels, where some lanes ask for it."""
 _FORMS = ("ONE_FORMULA", "BANDS", "STRIDES", "COILS", "GAPS")
 
 
-def _side(name: str, forms: tuple[str, ...], knows: int, single: bool = False) -> Recipe:
-    """Return the recipe of lanes that go side by side in some forms."""
-    return Recipe(name, _SIDE, vector=True, single=single, knows=knows, leaves=AT_STOPS | SHOWN,
-                  never=tuple(form for form in _FORMS if form not in forms))
+def _side(name: str, form: str, single: bool = False) -> Recipe:
+    """Return the recipe of lanes that go side by side in a form."""
+    return Recipe(name, _SIDE, vector=True, single=single, knows=SIDES[getattr(tiles, form)][0],
+                  leaves=AT_STOPS | SHOWN, never=tuple(other for other in _FORMS if other != form))
 
 
-_BY_FORMULA = {dtype: _side(f"side_by_side_{dtype}", ("ONE_FORMULA",), _BRAKED, dtype == "float32")
+_BY_FORMULA = {dtype: _side(f"side_by_side_{dtype}", "ONE_FORMULA", dtype == "float32")
                for dtype in ("float64", "float32")}
-_BY_BANDS = {creeps: _side("by_bands" + "_and_creep" * creeps, ("BANDS",),
-                           _ANY_BRIDGE | (BANDED if creeps else BANDED & ~FADING)) for creeps in (False, True)}
-_BY_STRIDES = {banded: _side("by_strides" + "_in_bands" * banded, ("STRIDES",),
-                             _ANY_BRIDGE | STRIDING | BANDED * banded) for banded in (False, True)}
-_BY_COILS = {shared: _side("by_coils" + "_and_shares" * shared, ("COILS",), _ANY_BRIDGE | ON_I | BY_SHARE * shared)
-             for shared in (False, True)}
-_BY_GAPS = {warms: _side("by_gaps" + "_and_heat" * warms, ("GAPS",), _ANY_BRIDGE | _GAPS | ON_HEAT * warms)
-            for warms in (False, True)}
+_BY_FORM = {getattr(tiles, form): _side(f"by_{form.lower()}", form) for form in _FORMS[1:]}
 
 # --- Lanes one by one -------------------------------------------------------------------------------------------------
 
@@ -103,26 +94,33 @@ _CALMLY = (Recipe("calm", (_CALM,), knows=CALM, leaves=_LEFT_TO_EVENTS), ())
 _FIRST_TICKS = "servotwin.models.engine.runs:to_first_ticks"
 ALL_DIGITAL = Recipe("digital_runs", (*_ENTRIES, _FIRST_TICKS), knows=~(_NOT_DIGITAL | SPRING), always=PROGRAM | PWM)
 _TICKS = _PLAIN & ~ON_Q | _DIGITAL
-_LEGS = _TICKS | PLAY | TWO_BODIES | BY_SHARE
-BY_LEGS = Recipe("by_legs", ("servotwin.models.engine.legs.leg_runs:go_on",), vector=True, knows=_LEGS,
-                 always=PROGRAM | PWM)
-"""Digital servos from tick to tick, one after the other; what is left of a call is for `ALL_DIGITAL`."""
-NEARLY_BY_LEGS = Recipe("nearly_by_legs", ("servotwin.models.engine.legs.leg_runs:go_on_nearly",), vector=True,
-                        knows=_LEGS | ON_Q | CURVED_Q | FADING, always=PROGRAM | PWM)
-"""The same, and with a spring, a pendulum or friction that fades as if their torques stayed within a tick; only where
-that is asked for."""
+LEGS = _TICKS | PLAY | TWO_BODIES | BY_SHARE
+"""What legs follow exactly."""
+BY_LEGS = Recipe("by_legs", ("servotwin.models.engine.legs.leg_runs:go_on",), vector=True,
+                 knows=LEGS | ON_Q | CURVED_Q | FADING, always=PROGRAM | PWM)
+"""Digital servos from tick to tick, one after the other; what is left of a call is for `ALL_DIGITAL`. A spring, a
+pendulum and friction that fades count as if their torques stayed within a tick: only where that is asked for."""
 BY_SERIES = Recipe("by_series", ("servotwin.models.engine.bus.coupled_runs:go_on",),
-                   knows=_LEGS & ~TABLE | ON_HEAT | REGULATED, always=PROGRAM | PWM)
+                   knows=LEGS & ~TABLE | ON_HEAT | REGULATED, always=PROGRAM | PWM)
 """The same whose windings get warm, or whose supply has a limit; what is left of a call is for `ALL_DIGITAL`."""
+BY_TICKS = Recipe("by_ticks", ("servotwin.models.engine.batch.digital_batch:go_on",), vector=True,
+                  knows=_TICKS & ~DROPS,
+                  always=PROGRAM | PWM)
+"""Digital servos from tick to tick, side by side; what is left of a call is for `BY_LEGS`. Two to three times faster
+for four servos of the catalog."""
 # Not compiled for their own sake: what these call says which numbers are known where a program goes in one loop
 _LEFT_BY_LEGS = AT_STOPS | SHOWN | AT_COMMANDS
-_BY_LEGS = (replace(BY_LEGS, name="ticks_by_legs", knows=_LEGS & ~_LEFT_BY_LEGS, leaves=_LEFT_BY_LEGS),
+_BY_LEGS = (replace(BY_LEGS, name="ticks_by_legs", knows=BY_LEGS.knows & ~_LEFT_BY_LEGS, leaves=_LEFT_BY_LEGS),
             ("servotwin.models.engine.legs.tick_legs:go",))
-_NEARLY_BY_LEGS = (replace(NEARLY_BY_LEGS, name="ticks_nearly_by_legs", knows=NEARLY_BY_LEGS.knows & ~_LEFT_BY_LEGS,
-                           leaves=_LEFT_BY_LEGS), ("servotwin.models.engine.legs.tick_legs:go",))
 _BY_SERIES = (replace(BY_SERIES, name="ticks_by_series", knows=BY_SERIES.knows & ~_LEFT_BY_LEGS,
                       leaves=_LEFT_BY_LEGS),
               ("servotwin.models.engine.bus.coupled_ticks:serve", "servotwin.models.engine.bus.coupled_ticks:move"))
+_LEFT_BY_TICKS = _LEFT_BY_LEGS | BEYOND | ONE_WAY
+_BY_TICKS = (replace(BY_TICKS, name="ticks_by_loops", knows=BY_TICKS.knows & ~_LEFT_BY_TICKS, leaves=_LEFT_BY_TICKS),
+             tuple(f"servotwin.models.engine.{name}" for name in (
+                 "batch.digital_tiles:enter", "batch.digital_rounds:watch", "batch.digital_rounds:decide",
+                 "batch.digital_rounds:move",
+                 "batch.digital_rounds:move_on", "batch.digital_rounds:follow")))
 
 # --- Lanes between calls ----------------------------------------------------------------------------------------------
 
@@ -136,11 +134,9 @@ TICKS = Recipe("ticks", (
         "show_records", "read_clocks", "take_status", "note_lost_buses", "break_up"))))
 """Lanes of all forms between two calls: what is imposed on them, and the way from tiles to records and back."""
 ENDING = Recipe("ending", ("servotwin.models.engine.cosim.final_checks:look_at_lanes",), vector=True, knows=~_DIGITAL)
-_PARTS = {PLAIN_RUNS: ((PLAIN_RUNS, ()), _CALMLY), BY_LEGS: (_BY_LEGS,),
-          NEARLY_BY_LEGS: (_NEARLY_BY_LEGS,),
+_PARTS = {PLAIN_RUNS: ((PLAIN_RUNS, ()), _CALMLY), BY_TICKS: (_BY_TICKS, _BY_LEGS), BY_LEGS: (_BY_LEGS,),
           BY_SERIES: (_BY_SERIES,), ALL_DIGITAL: ((ALL_DIGITAL, ()), _BY_LEGS)}
-_CHAINS = {BY_LEGS: (BY_LEGS, ALL_DIGITAL),
-           NEARLY_BY_LEGS: (NEARLY_BY_LEGS, ALL_DIGITAL),
+_CHAINS = {BY_TICKS: (BY_TICKS, BY_LEGS, ALL_DIGITAL), BY_LEGS: (BY_LEGS, ALL_DIGITAL),
            BY_SERIES: (BY_SERIES, ALL_DIGITAL)}
 
 
@@ -166,7 +162,7 @@ def _room_of(recipe: Recipe) -> tuple[Any, ...]:
     """Return what kernels need beside the arguments of `runs.go_on`."""
     if recipe == BY_SERIES:
         return np.zeros(2, record_of(Unit)), np.zeros(2, record_of(Coupling))
-    return ()
+    return (digital_tiles.tile_room(),) if recipe == BY_TICKS else ()
 
 
 def parts_of(recipe: Recipe) -> tuple[tuple[Recipe, tuple[str, ...]], ...]:
@@ -177,10 +173,6 @@ def parts_of(recipe: Recipe) -> tuple[tuple[Recipe, tuple[str, ...]], ...]:
     return _PARTS.get(recipe, ((recipe, ()),))
 
 
-def side_by_side(form: int, dtype: str, creeps: bool, wider: bool) -> Recipe:
-    """Return the kernels of lanes that go side by side in a form; whether some creep, or ask for what is `WIDER`."""
-    if form == tiles.BANDS:
-        return _BY_BANDS[creeps]
-    if form == tiles.STRIDES:
-        return _BY_STRIDES[wider]
-    return _BY_COILS[wider] if form == tiles.COILS else _BY_GAPS[wider] if form == tiles.GAPS else _BY_FORMULA[dtype]
+def side_by_side(form: int, dtype: str) -> Recipe:
+    """Return the kernels of lanes that go side by side in a form."""
+    return _BY_FORMULA[dtype] if form == tiles.ONE_FORMULA else _BY_FORM[form]

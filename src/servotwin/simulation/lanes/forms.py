@@ -14,7 +14,7 @@ from servotwin.models.engine.demands import needed
 from servotwin.models.engine.motions.choice import may_depend
 from servotwin.models.state.records import numbers_in
 from servotwin.models.terms.chip import NO_CHIP, Chip
-from servotwin.models.terms.dependence import FADING, PLAY, PWM, RECORDED, SLACK, SPRING, STEEP_W, TABLE
+from servotwin.models.terms.dependence import PLAY, PWM, RECORDED, SLACK, SPRING, STEEP_W, TABLE
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.rooms import NOTHING, ROOMS
@@ -91,23 +91,17 @@ def _unknown(recipe: Recipe) -> tuple[str, ...]:
 
 
 class SideBySide(NamedTuple):
-    """Lanes that run side by side in one form.
-
-    Whether some have a potentiometer with play, whether some creep, and whether some ask for what the form follows by
-    wider kernels alone.
-    """
+    """Lanes that run side by side in one form; whether some have a potentiometer with play."""
 
     which: Indices
     form: int
     slack: bool
     dtype: str
-    creeps: bool = False
-    wider: bool = False
 
     @property
     def recipe(self) -> Recipe:
         """Their kernels."""
-        return recipes.side_by_side(self.form, self.dtype, self.creeps, self.wider)
+        return recipes.side_by_side(self.form, self.dtype)
 
     @property
     def general(self) -> Recipe:
@@ -148,11 +142,10 @@ def kinds_with(numbers: Numbers, chip: Chip, lanes: int, dtype: str, sweeps: Mas
 def _of_analog(terms: Terms, left: Mask, dtype: str) -> Iterator[SideBySide | OneByOne]:
     """Return how lanes run that are pulsed or follow a mean, of one body or with play; they are taken from `left`."""
     side = _stays(terms) if dtype == "float32" else True
-    for form, knows, made_for in () if is_plain() else recipes.SIDES:
+    for form, (knows, made_for) in () if is_plain() else recipes.SIDES.items():
         own_type = dtype if form == tiles.ONE_FORMULA else "float64"
         asked: Any = terms.ask(made_for) if made_for else True
-        which = _take(terms, left, recipes.side_by_side(form, own_type, True, True),
-                      terms.suit(knows) & asked & side)
+        which = _take(terms, left, recipes.side_by_side(form, own_type), terms.suit(knows) & asked & side)
         if len(which):
             yield _together(terms, form, own_type, which)
     for wanted, calm in () if is_plain() else ((terms.suit(recipes.CALM), True), (True, False)):
@@ -165,9 +158,10 @@ def _alone(terms: Terms, left: Mask, nearly: bool) -> Iterator[OneByOne]:
     digital, sprung = np.any(terms.ask(PWM)), left & terms.ask(SPRING)
     left &= ~sprung
     yield from _at_last(terms, sprung, recipes.ALL_RUNS)
-    fast = (recipes.BY_LEGS, *((recipes.NEARLY_BY_LEGS,) if nearly else ()), recipes.BY_SERIES)
-    for recipe in fast if digital and not is_plain() else ():
-        yield OneByOne(_take(terms, left, recipe), recipe)
+    if digital and not is_plain():
+        yield OneByOne(_take(terms, left, recipes.BY_TICKS), recipes.BY_TICKS)
+        yield OneByOne(_take(terms, left, recipes.BY_LEGS, nearly or terms.suit(recipes.LEGS)), recipes.BY_LEGS)
+        yield OneByOne(_take(terms, left, recipes.BY_SERIES), recipes.BY_SERIES)
     yield from _at_last(terms, left, recipes.ALL_DIGITAL if digital else recipes.ALL_RUNS)
 
 
@@ -199,12 +193,7 @@ def _stays(terms: Terms) -> Any:
 def _together(terms: Terms, form: int, dtype: str, which: Indices) -> SideBySide:
     """Return how some lanes run side by side, by what some of them have."""
     asked = terms.demands[which] if np.ndim(terms.demands) else terms.demands
-
-    def some(flags: int) -> bool:
-        return bool(np.any((asked & flags) != 0))
-
-    return SideBySide(which, form, some(SLACK), dtype, form == tiles.BANDS and some(FADING),
-                      some(recipes.WIDER.get(form, 0)))
+    return SideBySide(which, form, bool(np.any((asked & SLACK) != 0)), dtype)
 
 
 def goes_together(numbers: Numbers, pulsed: bool) -> bool:

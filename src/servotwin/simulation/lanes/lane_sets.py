@@ -37,7 +37,7 @@ Indices = NDArray[np.int64]
 SHAFT = {"output_angle": "q", "output_speed": "w"}  # where tiles and records have them
 _WORD = 8  # bytes
 _WORTH = 64  # tiles for a thread: fewer cost more in waking it
-_QUICK = (form_recipes.PLAIN_RUNS, form_recipes.BY_LEGS)
+_QUICK = (form_recipes.PLAIN_RUNS, form_recipes.BY_TICKS, form_recipes.BY_LEGS)
 _WORTH_QUICK, _WORTH_SLOW = 64, 4  # lanes for a thread that go on one by one, by kernels that take so long
 
 

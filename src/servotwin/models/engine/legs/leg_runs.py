@@ -32,30 +32,15 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
     """Let the lanes named in `which` go on as far as legs lead; `runs.go_on` finishes those that do not arrive.
 
     The arguments are those of `runs.go_on`. Durations [s] and outputs that are left to do, and the status of lanes that
-    have gone on, are noted for it.
+    have gone on, are noted for it. A spring or a pendulum counts with its torque in the middle of a tick.
     """
-    _go_on(lanes, curve, torques, torque_first, torque_count, which, durations, times, first_output, outputs, memories,
-           status, False)
-
-
-def go_on_nearly(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, torque_count: Indices,
-                 which: Indices, durations: Floats, times: Floats, first_output: Indices, outputs: Floats,
-                 memories: Memories, status: Indices) -> None:
-    """Do the same where a spring or a pendulum may count with its torque in the middle of a tick."""
-    _go_on(lanes, curve, torques, torque_first, torque_count, which, durations, times, first_output, outputs, memories,
-           status, True)
-
-
-def _go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, torque_count: Indices,
-           which: Indices, durations: Floats, times: Floats, first_output: Indices, outputs: Floats,
-           memories: Memories, status: Indices, nearly: bool) -> None:
     for k in range(which.size):
         if status[k] == ARRIVED:
             continue
         lane = which[k]
         numbers = numbers_of(lanes, lane)
         inputs = inputs_of(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
-        if tick_legs.way_of(numbers, inputs, durations[k], nearly) != LEGS:
+        if tick_legs.way_of(numbers, inputs, durations[k], True) != LEGS:
             continue
         memory = memory_at(memories, k)
         if status[k] != UNDERWAY:
