@@ -187,3 +187,17 @@ def test_many_lanes_are_asked_what_each_of_them_is(servo):
         for k in range(lanes):
             own = mapped(lambda value, k=k: value[k].item() if isinstance(value, np.ndarray) else value, numbers)
             assert np.broadcast_to(found, lanes)[k] == may_depend(own, Piece())
+
+
+def test_a_batch_and_a_simulator_say_by_which_kernels_each_lane_runs(servo):
+    """Of plain lanes and one with load friction, with and without a shared supply."""
+    parameters = {"friction.load_friction": [0.0, 0.05, 0.0], "load.inertia": 1e-4}
+    model, command = st.PulseServo(servo), st.signals.constant(30.0, unit="deg")
+    batch = st.simulate_many(model, command, duration=0.05, parameters=parameters)
+    plain = "side_by_side_float64"
+    assert batch.stats.kernel.tolist() == [plain, "by_bands", plain]
+    sims = st.VectorSimulator(model, lanes=3, parameters=parameters)
+    assert sims.kernels.tolist() == [plain, "by_bands", plain]
+    both = st.VectorSimulator(model, lanes=3, bus=[(st.Supply(open_circuit_voltage=6.0, internal_resistance=0.2),
+                                                    [0, 2])])
+    assert both.kernels.tolist() == ["buses", plain, "buses"]

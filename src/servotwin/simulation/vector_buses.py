@@ -46,6 +46,9 @@ class BusSet:
         What those on a bus remember together; `tables` and `rooms` are what its kernels need besides.
     """
 
+    kernel = BUSES.name
+    """Of its kernels."""
+
     def __init__(self, numbers: LaneNumbers, threads: int, pool: Any) -> None:
         supplies: Supplies = numbers.supplies
         self._pool = pool

@@ -12,6 +12,7 @@ import numpy as np
 from servotwin.errors import SimulationError, UnknownNameError
 from servotwin.models.outputs import SIGNALS
 from servotwin.simulation import files, frames
+from servotwin.simulation.lanes.form_recipes import KERNELS
 from servotwin.simulation.remarks import LaneRemark
 from servotwin.simulation.servo_run import simulated
 from servotwin.simulation.simulator import Simulator
@@ -34,6 +35,15 @@ class Failure(NamedTuple):
     lane: int
     time: float
     cause: str
+
+
+class BatchStats(NamedTuple):
+    """How lanes ran: the name of the kernels of each, shape (B,), as `docs/theory/engine.md` has them.
+
+    Where nothing is compiled the same text runs in plain Python, all lanes by the general kernels.
+    """
+
+    kernel: NDArray[np.str_]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -72,6 +82,7 @@ class Batch:
     duration: float
     signals: Mapping[str, NDArray[np.floating]]
     lanes: LaneInputs
+    run_by: NDArray[np.int8]
 
     def __repr__(self) -> str:
         return (f"Batch({self.lanes.model!r}, lanes={len(self)}, times={len(self.time)}, "
@@ -91,6 +102,20 @@ class Batch:
     def ok(self) -> bool:
         """Whether all lanes reached their end."""
         return not self.failures
+
+    @property
+    def stats(self) -> BatchStats:
+        """How the lanes ran.
+
+        Examples
+        --------
+        >>> import servotwin as st
+        >>> batch = st.simulate_many(st.DigitalServo(st.load_servo("feetech-sts3215-12v")),
+        ...                          st.signals.constant(20.0, unit="deg"), duration=0.1)
+        >>> batch.stats.kernel.tolist()
+        ['by_legs']
+        """
+        return BatchStats(np.array(KERNELS)[self.run_by])
 
     def __len__(self) -> int:
         """Return the number of lanes."""

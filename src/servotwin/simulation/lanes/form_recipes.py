@@ -176,3 +176,8 @@ def parts_of(recipe: Recipe) -> tuple[tuple[Recipe, tuple[str, ...]], ...]:
 def side_by_side(form: int, dtype: str) -> Recipe:
     """Return the kernels of lanes that go side by side in a form."""
     return _BY_FORMULA[dtype] if form == tiles.ONE_FORMULA else _BY_FORM[form]
+
+
+KERNELS = tuple(sorted(one.name for one in (ALL_RUNS, PLAIN_RUNS, ALL_DIGITAL, BY_LEGS, BY_SERIES, BY_TICKS,
+                                            *_BY_FORMULA.values(), *_BY_FORM.values())))
+"""Names of all kernels in which lanes run."""

@@ -70,7 +70,7 @@ class Tiles:
     """Lanes that run side by side, as they start."""
 
     def __init__(self, kind: SideBySide, columns: tiles.Lanes, threads: int) -> None:
-        self.which, self._kind = kind.which, kind
+        self.which, self._kind, self.kernel = kind.which, kind, kind.recipe.name
         self.rows = tiles_of(kind, columns, math.inf)
         self.rows["clock"]["piece_end"] = math.inf
         self._workers = min(threads, len(self.rows) // _WORTH)
@@ -159,7 +159,7 @@ class Records:
     """Lanes that run one by one, as they start."""
 
     def __init__(self, kind: OneByOne, columns: tiles.Lanes, threads: int) -> None:
-        self.which, self._recipe, self._calms = kind.which, kind.recipe, kind.calm
+        self.which, self._recipe, self._calms, self.kernel = kind.which, kind.recipe, kind.calm, kind.recipe.name
         self.memories = nothing_yet(len(self.which))
         self.rows = self.memories.rows
         kernels(form_recipes.last_of(kind.recipe)).start(columns, self.which, self.memories)

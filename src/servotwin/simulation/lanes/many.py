@@ -147,7 +147,7 @@ def simulate_lanes(
     signals = _space(lanes, asked)
     done = 0
     status, ended = np.zeros(lanes.count, dtype=np.int8), np.full(lanes.count, asked.duration)
-    refused, marks = np.empty(lanes.count), np.empty(lanes.count, dtype=np.int8)
+    refused, marks, kernel = np.empty(lanes.count), *np.empty((2, lanes.count), dtype=np.int8)
     with crew, shown(progress, lanes.count, "simulate_many") as show, closing(_run(packs, asked, crew)) as running:
         for which, raw, values in running:
             place: Any = which
@@ -157,7 +157,7 @@ def simulate_lanes(
                 for name, column in values.items():
                     signals[name][place] = column
             status[place], ended[place] = raw.status, raw.ended
-            refused[place], marks[place] = raw.refused, raw.marks
+            refused[place], marks[place], kernel[place] = raw.refused, raw.marks, raw.kernel
             done += len(which)
             show(done)
     arrays: list[NDArray[Any]] = [times, status, *signals.values()]
@@ -166,7 +166,7 @@ def simulate_lanes(
     failures = tuple(Failure(int(lane), float(ended[lane]), Status.of_code(int(status[lane])).message)
                      for lane in np.flatnonzero(status))
     return Batch(time=times, status=status, failures=failures, remarks=lane_remarks(refused, marks, asked.duration),
-                 duration=asked.duration, signals=signals, lanes=lanes)
+                 duration=asked.duration, signals=signals, lanes=lanes, run_by=kernel)
 
 
 def grid(values: Mapping[str, ArrayLike] | None = None, /, **more: ArrayLike) -> dict[str, NDArray[Any]]:

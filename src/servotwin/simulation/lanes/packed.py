@@ -192,6 +192,8 @@ class Raw:
         From when on all pulses are refused [s]; nan where the last one is not.
     marks : ndarray of int8, shape (B,)
         Sums of `engine.cosim.final_checks.ON_STOP` and `CANNOT_HOLD`.
+    kernel : ndarray of int8, shape (B,)
+        Place of the name of its kernels in `form_recipes.KERNELS`.
     """
 
     fields: dict[str, NDArray[np.generic]]
@@ -200,6 +202,7 @@ class Raw:
     final: Floats
     refused: Floats
     marks: NDArray[np.int8]
+    kernel: NDArray[np.int8]
 
 
 def empty_raw(work: Work) -> Raw:
@@ -209,4 +212,4 @@ def empty_raw(work: Work) -> Raw:
     return Raw({name: np.zeros((lanes, len(asked.times)), kind) for name, kind in kinds.items()},
                np.zeros(lanes, np.int8), np.full(lanes, asked.duration),
                np.ascontiguousarray(work.packed.lanes.start[[0, 1, 3, 4]].T), np.full(lanes, np.nan),
-               np.zeros(lanes, np.int8))
+               np.zeros(lanes, np.int8), np.zeros(lanes, np.int8))

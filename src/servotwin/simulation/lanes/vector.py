@@ -139,6 +139,14 @@ class VectorSimulator:
         return self._store.status.copy()
 
     @property
+    def kernels(self) -> NDArray[np.str_]:
+        """The name of the kernels by which each lane goes on, shape (lanes,), as `Batch.stats` has it."""
+        found = np.empty(len(self), "U24")
+        for some in self._store.sets:
+            found[some.which] = some.kernel
+        return found
+
+    @property
     def failures(self) -> tuple[Failure, ...]:
         """(lane, time [s], cause) of all lanes that have failed."""
         status, ended = self._store.status, self._store.ended

@@ -12,7 +12,7 @@ from servotwin.models.engine.batch.tiles import Lanes, Outputs
 from servotwin.models.engine.memory import Memories
 from servotwin.models.state.records import room
 from servotwin.simulation.compile import Recipe, kernels
-from servotwin.simulation.lanes.form_recipes import ALL_RUNS, ENDING, last_of, steps_of
+from servotwin.simulation.lanes.form_recipes import ALL_RUNS, ENDING, KERNELS, last_of, steps_of
 from servotwin.simulation.lanes.forms import OneByOne, SideBySide, kinds_of
 from servotwin.simulation.lanes.memories import flat, memories_of, nothing_yet, taken
 from servotwin.simulation.lanes.packed import (
@@ -37,6 +37,7 @@ def run(work: Work) -> Raw:
     raw, packed, asked = empty_raw(work), work.packed, work.asked
     lanes = packed.columns()
     for kind in kinds_of(packed, asked.dtype, asked.nearly):
+        raw.kernel[kind.which] = KERNELS.index(kind.recipe.name)
         if isinstance(kind, OneByOne):
             run_one_by_one(work, lanes, kind.which, raw, kind.recipe)
         else:
