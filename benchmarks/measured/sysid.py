@@ -1,12 +1,14 @@
 """Beside `mujoco.sysid`: the same logs, the same folds, errors on what was held out, seconds of CPU.
 
-    python benchmarks/measured/sysid.py [sts3250] [xl330] [miuzei]
+    python benchmarks/measured/sysid.py [sts3250] [xl330] [miuzei] [maccepa]
 
 `mujoco.sysid` (MuJoCo 4 with its extra `sysid`) fits five numbers of a hinge with a position actuator, which is what
 people fit of a hobby servo: gain, damping, friction loss, armature and the limit of the torque, 20 ms of delay before
 the command and 12 steps, from kp 20. Where logs say the servo's gain, its kp goes with it. `identify` runs by default
 arguments but for intervals, causes and simpler models, which the other one has not. Needs the measured logs beside the
-repository.
+repository. Of the MACCEPA joint the first 90 ms after a step, in which the reading jumps with the supply, are left out
+of both. Two recordings have no row: the motor of an MG90 at constant duty has no position loop, and Robonine's levers
+are pulled by forces that were not measured.
 """
 
 import contextlib
@@ -15,8 +17,10 @@ import math
 import sys
 import time as clock
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
+import maccepa
 import mujoco
 import numpy as np
 from report import folds
@@ -158,6 +162,13 @@ def of_bam(folder: Path) -> list[st.Log]:
     return [part for path in sorted(folder.glob("*.json")) for part in read_bam_log(path).without_torque_off()]
 
 
+def without_jump(log: st.Log) -> st.Log:
+    """Return a log of the MACCEPA joint without the readings while its motor starts."""
+    at, angle = maccepa.step_of(log), log.measured["output_angle"].copy()
+    angle[(log.time >= at) & (log.time < at + maccepa.DISTURBED)] = math.nan
+    return replace(log, measured={"output_angle": angle})
+
+
 def main(rows: Sequence[str]) -> None:
     if DATA is None:
         raise SystemExit("the measured logs are not beside the repository")
@@ -173,7 +184,11 @@ def main(rows: Sequence[str]) -> None:
     if "miuzei" in rows:
         logs = [log for log in read_logs(DATA / "miuzei_25kg") if log.motion != "drop"]
         beside("Miuzei", logs, st.load_servo("miuzei-25kg"), folds(logs, 4))
+    if "maccepa" in rows:
+        logs = [without_jump(maccepa.read(path)) for path in sorted((DATA / "maccepa_hitec").glob("servo1_*.csv"))]
+        servo = st.load_servo("hitec-hs-311").replace({"stops.lower_angle": None, "stops.upper_angle": None})
+        beside("MACCEPA", logs, servo, [[log.name] for log in logs])
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or ["sts3250", "xl330", "miuzei"])
+    main(sys.argv[1:] or ["sts3250", "xl330", "miuzei", "maccepa"])

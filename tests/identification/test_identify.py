@@ -88,6 +88,20 @@ def test_the_order_of_logs_changes_rounding_only(logs, fit):
         assert abs(turned.estimates[name] - fit.estimates[name]) < 0.01 * (upper - lower), name
 
 
+@pytest.mark.long(but="twice")
+@pytest.mark.parametrize("told", ["first half", "second half", "twice"])
+def test_halves_of_the_logs_and_all_of_them_twice_say_the_same(logs, fit, told):
+    """Within the intervals of the fit with fewer; the same logs twice over leave narrower ones."""
+    again = [replace(log, name=f"{log.name} again") for log in logs]
+    half = len(logs) // 2
+    other = fitted({"first half": logs[:half], "second half": logs[half:], "twice": [*logs, *again]}[told])
+    fewer, more = (fit, other) if told == "twice" else (other, fit)
+    for name in fit.names:
+        lower, upper, _ = fewer.intervals()[name]
+        assert lower <= more.estimates[name] <= upper, name
+        assert np.diff(more.intervals()[name][:2])[0] <= 1.02 * (upper - lower), name
+
+
 @pytest.mark.long(but="bounded")
 @pytest.mark.parametrize("kind", ["pulse", "bounded"])
 def test_half_the_output_step_moves_nothing(kind):
