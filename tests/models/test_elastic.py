@@ -64,7 +64,7 @@ def test_a_mixture_of_everything_moves_as_the_reference_says(seed):
     case = random_case(seed)
     result = st.simulate(st.PulseServo(servo(case.changes)), case.command, duration=0.3, load=case.load,
                          output_times=TIMES[:151], accuracy=1e-11).raise_if_failed()
-    assert np.abs(bodies(result) - referred(result).states[:, [0, 2]]).max() < 1e-8
+    assert np.abs(bodies(result) - referred(result).states[:, [0, 2]]).max() < 1e-10
     assert abs(result.energy.residual) < 1e-9
 
 

@@ -220,7 +220,7 @@ def solve(pair: Pair, schedule: Sequence[tuple[float, int]], start: Sequence[flo
 def _leg(run: _Run, ways: Ways, start: float, end: float, y: Array, times: Array, found: Array,
          events: list[tuple[float, str]]) -> tuple[float, Array, tuple[int, int]]:
     """Go on in these ways to their end; fill in the states at the times on the way."""
-    solver = DOP853(lambda _, x: run.rates(x, ways), start, y, end, rtol=1e-12, atol=1e-14, max_step=2e-3)
+    solver = DOP853(lambda _, x: run.rates(x, ways), start, y, end, rtol=1e-12, atol=1e-14, max_step=5e-4)
     conditions = run.conditions(ways)
     while solver.status == "running":
         solver.step()
