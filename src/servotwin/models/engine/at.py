@@ -11,7 +11,6 @@ from servotwin.models.engine.motions.motion import (
     CREEP,
     FINE,
     LONG_STEP,
-    NO_COEFFICIENTS,
     PAIR,
     STEP,
     WARMING,
@@ -138,24 +137,20 @@ def motion_of(numbers: Numbers, row: Row, shared: Floats, accuracy: float) -> Mo
         return _known(none, LONG_STEP, row, True)
     if row.how != ALONE:
         m = _known(none, LONG_STEP, row, True)
-        return Motion(m.kind, m.numbers, m.mode, m.u, m.tau, m.t0, m.start, m.length, m.coefficients, m.against, m.end,
-                      0.0, -1, True, m.stages, m.dense, _dense_at(shared, row.first))
+        return m._replace(next_step=0.0, long_dense=_dense_at(shared, row.first))
     m = _known(none, row.kind, row, False)
     if not motion.is_step(m):
         return choice.begin(numbers, row.mode, row.u, row.tau, row.t0, row.y, row.next_step, math.inf, accuracy)
     if m.kind == STEP:
         jac = motion.jacobian_at(numbers, row.mode, row.u, row.tau, row.t0, row.y)
         _, _, stages = rodas.step(numbers, row.mode, row.u, row.tau, jac, row.t0, row.y, row.length)
-        return Motion(m.kind, m.numbers, m.mode, m.u, m.tau, m.t0, m.start, m.length, m.coefficients, m.against, m.end,
-                      m.next_step, -1, False, stages, m.dense, m.long_dense)
+        return m._replace(stages=stages)
     if m.kind == PAIR:
-        return Motion(m.kind, m.numbers, m.mode, m.u, m.tau, m.t0, m.start, m.length, m.coefficients, m.against, m.end,
-                      m.next_step, -1, True, m.stages, m.dense,
-                      two_mass_series.law(numbers, row.mode, row.u.value, row.tau.value))
+        law = two_mass_series.law(numbers, row.mode, row.u.value, row.tau.value)
+        return m._replace(has_dense=True, long_dense=law)
     if m.kind == CREEP:
         tolerance = (FINE * accuracy, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        return Motion(m.kind, m.numbers, m.mode, m.u, m.tau, m.t0, m.start, m.length, tolerance, m.against, m.end,
-                      m.next_step, -1, True, m.stages, m.dense, m.long_dense)
+        return m._replace(has_dense=True, coefficients=tolerance)
     return m
 
 
@@ -175,8 +170,8 @@ def state_of(row: Row, m: Motion, shared: Floats, s: float) -> Vector:
 
 def _known(none: Motion, kind: int, row: Row, dense: bool) -> Motion:
     """Return a motion whose length and end are known, without what lies between."""
-    return Motion(kind, none.numbers, row.mode, row.u, row.tau, row.t0, row.y, row.length, NO_COEFFICIENTS, (0.0, 0.0),
-                  row.last, row.next_step, -1, dense, none.stages, none.dense, none.long_dense)
+    return none._replace(kind=kind, mode=row.mode, t0=row.t0, start=row.y, length=row.length, end=row.last,
+                         next_step=row.next_step, has_dense=dense)
 
 
 def _dense_at(shared: Floats, first: int) -> tuple[Vector, ...]:

@@ -189,10 +189,8 @@ def with_bodies(memory: Memory, half_play: float, sprung: bool) -> Memory:
         y = Vector(y.q, y.w, y.i, y.T_w, y.T_h, q_m, y.w_m)
     if half_play == 0.0 and not sprung:
         mesh, y = RIGID, one_body(y.q, y.w, y)
-    mode = Mode(p.mode.zone, p.mode.contact, mesh, p.mode.motor, p.mode.share)
-    point = Point(p.time, y, mode, p.anchor_time, p.anchor, p.step, p.wiper)
-    return forgotten(Memory(memory.frames, memory.beat, point, memory.chip, memory.u, memory.u_end, memory.tau,
-                            memory.tau_end, memory.firm))
+    mode = p.mode
+    return forgotten(memory._replace(point=p._replace(y=y, mode=mode._replace(mesh=mesh))))
 
 
 def due(memory: Memory) -> bool:
@@ -208,11 +206,11 @@ def counted_anew(memory: Memory) -> Memory:
 def shifted(memory: Memory, frames: int, beat: float, shift: float) -> Memory:
     """Return a memory whose times count from an instant that is later by `shift` [s]."""
     p, c = memory.point, memory.chip
-    point = Point(p.time - shift, p.y, p.mode, p.anchor_time - shift, p.anchor, p.step, p.wiper)
+    point = p._replace(time=p.time - shift, anchor_time=p.anchor_time - shift)
     chip = Frame(c.number, c.draws, c.drive, c.drive_end - shift, c.clock - shift, c.silent, c.error,
                  _later(c.pending, shift), _later(c.later, shift))
-    return Memory(frames, beat, point, chip, memory.u, memory.u_end - shift, memory.tau, memory.tau_end - shift,
-                  memory.firm)
+    return memory._replace(frames=frames, beat=beat, point=point, chip=chip, u_end=memory.u_end - shift,
+                           tau_end=memory.tau_end - shift)
 
 
 def _later(decision: Decision, shift: float) -> Decision:
@@ -221,10 +219,8 @@ def _later(decision: Decision, shift: float) -> Decision:
 
 def forgotten(memory: Memory) -> Memory:
     """Return a memory in which no motion has begun."""
-    p = memory.point
-    point = Point(p.time, p.y, p.mode, math.inf, p.anchor, p.step, p.wiper)
-    return Memory(memory.frames, memory.beat, point, memory.chip, memory.u, memory.u_end, memory.tau, memory.tau_end,
-                  memory.firm)
+    point = memory.point
+    return memory._replace(point=point._replace(anchor_time=math.inf))
 
 
 def next_frame(inputs: Inputs, memory: Memory, time: float) -> int:

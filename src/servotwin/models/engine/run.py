@@ -25,7 +25,6 @@ from servotwin.models.engine.memory import (
     Inputs,
     Memories,
     Memory,
-    Point,
     counted_anew,
     due,
     edge_of,
@@ -183,7 +182,5 @@ def stands(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, end: fl
 
 def memory_then(memory: Memory, time: float) -> Memory:
     """Return the memory of a servo that has stood still until a time [s]."""
-    p = memory.point
-    point = Point(time, p.y, p.mode, p.anchor_time, p.anchor, p.step, p.wiper)
-    return Memory(memory.frames, memory.beat, point, memory.chip, memory.u, memory.u_end, memory.tau, memory.tau_end,
-                  memory.firm)
+    point = memory.point
+    return memory._replace(point=point._replace(time=time))

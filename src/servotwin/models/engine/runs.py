@@ -15,7 +15,6 @@ from servotwin.models.engine.memory import (
     SAME,
     Inputs,
     Memory,
-    Point,
     counted_anew,
     due,
     in_force,
@@ -185,9 +184,7 @@ def calmed(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory) -> tupl
                                   piece_value(since(tau, origin), point.time), point.y)
     if held == 0:
         return memory, 0
-    point = Point(point.time, y, mode, point.time, y, point.step, point.wiper)
-    return Memory(memory.frames, memory.beat, point, memory.chip, memory.u, memory.u_end, memory.tau, memory.tau_end,
-                  memory.firm), 1
+    return memory._replace(point=point._replace(y=y, mode=mode, anchor_time=point.time, anchor=y)), 1
 
 
 def is_short(before: Memory, memory: Memory, event: int) -> bool:

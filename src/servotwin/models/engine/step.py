@@ -175,9 +175,7 @@ def at_pulses(numbers: Numbers, silent: int) -> Numbers:
     """Return the numbers with the bridge as it is now: while no pulses come (1) it may be off in another way."""
     if silent == 0:
         return numbers
-    return Numbers(
-        numbers.motor, bridge.off_now(numbers.bridge, silent), numbers.source, numbers.follower, numbers.shaft,
-        numbers.friction, numbers.load, numbers.stops, numbers.play, numbers.sensor, numbers.heat, numbers.elastic)
+    return numbers._replace(bridge=bridge.off_now(numbers.bridge, silent))
 
 
 def source(numbers: Numbers, now: Frame) -> Piece:

@@ -22,6 +22,8 @@ class CallExpressions(Expressions):
     def _call(self, node: Any) -> str:
         if node in self._own.calls:
             return self._own_call(node, self._own.calls[node])
+        if isinstance(node.func, ast.Attribute) and node.func.attr == "_replace":
+            return self._replaced(node, node.func.value)
         self.in_order(node.args, node)
         if isinstance(node.func, ast.Attribute):
             return self._of_math(node, node.func.attr)
@@ -60,6 +62,17 @@ class CallExpressions(Expressions):
         return self._types.made(kind, [
             self.of(values[name]) if name in values else self._types.literal(class_._field_defaults[name])
             for name in class_._fields])
+
+    def _replaced(self, node: ast.Call, owner: ast.expr) -> str:
+        """Return a named tuple with some fields of its own; of what it replaces all others are taken one by one."""
+        if not isinstance(owner, ast.Name):
+            raise self._own.refused(node, "what is replaced has a name")
+        values = {k.arg: k.value for k in node.keywords}
+        self.in_order([owner, *values.values()], node)
+        before, text = self.kind(owner), self.of(owner)
+        return self._types.made(self.kind(node), [
+            self.of(values[name]) if name in values else self._types.part(text, before, k)
+            for k, name in enumerate(before.fields)])
 
     def _primitive(self, node: ast.Call, primitive: c_functions.Primitive) -> str:
         kind = self.kind(node)

@@ -276,7 +276,9 @@ class Values:
         if isinstance(node.func, ast.Attribute):
             if isinstance(node.func.value, ast.Name) and node.func.value.id == "math":
                 return self._of_math(node, node.func.attr)
-            raise self.refused(node, "there are no methods in a kernel")
+            if node.func.attr == "_replace":
+                return self._replaced(node, node.func.value)
+            raise self.refused(node, "there are no methods in a kernel but `_replace`")
         if not isinstance(node.func, ast.Name):
             raise self.refused(node, "a function is called by its name")
         name = node.func.id
@@ -317,6 +319,16 @@ class Values:
         found = [self.of(values[name]) if name in values else of_value(kind._field_defaults[name])
                  for name in kind._fields]
         return self._tuple_of(found, kind.__name__, kind._fields)
+
+    def _replaced(self, node: ast.Call, owner: ast.expr) -> Kind | None:
+        """Return the kind of a named tuple some of whose fields are others."""
+        kind, values = self.of(owner), {k.arg: self.of(k.value) for k in node.keywords}
+        if kind is None or None in values.values():
+            return None
+        if not isinstance(kind, Tuple) or not kind.fields or node.args or not values.keys() <= {*kind.fields}:
+            raise self.refused(node, f"{told(kind)} has no such fields")
+        found = [values.get(name, element) for name, element in zip(kind.fields, kind.elements, strict=True)]
+        return self._tuple_of(found, kind.name, kind.fields)
 
     def _primitive(self, node: ast.Call, name: str, kinds: Sequence[Kind | None]) -> Kind | None:
         function = c_functions.PRIMITIVES[name]

@@ -40,19 +40,13 @@ def on_stiff_source(numbers: Numbers, returning: bool) -> Numbers:
 def driven(numbers: Numbers, D: float, R: float) -> Numbers:
     """Return a servo whose bus voltage is given and drives it with so much drop [V] and resistance [Ω]."""
     path = numbers.bridge
-    return Numbers(
-        numbers.motor, Bridge(D, R, path.off, path.silence, path.V_br, path.pwm, path.one_way),
-        Source(numbers.source.V, 0.0, math.inf), numbers.follower, numbers.shaft, numbers.friction, numbers.load,
-        numbers.stops, numbers.play, numbers.sensor, numbers.heat, numbers.elastic)
+    return numbers._replace(bridge=path._replace(D_drive=D, R_drive=R), source=Source(numbers.source.V, 0.0, math.inf))
 
 
 def blocked(numbers: Numbers) -> Numbers:
     """Return a servo whose diodes block: no voltage of the bus drives a current in it, whatever its speed jumps to."""
     path = numbers.bridge
-    return Numbers(
-        numbers.motor, Bridge(_BLOCKS, path.R_drive, path.off, path.silence, path.V_br, path.pwm, path.one_way),
-        numbers.source, numbers.follower, numbers.shaft, numbers.friction, numbers.load, numbers.stops, numbers.play,
-        numbers.sensor, numbers.heat, numbers.elastic)
+    return numbers._replace(bridge=path._replace(D_drive=_BLOCKS))
 
 
 def is_connected(numbers: Numbers, drive: float, y: Vector) -> bool:

@@ -7,7 +7,6 @@ import math
 from servotwin.models.engine.memory import Point
 from servotwin.models.engine.observe import on_bus
 from servotwin.models.state.modes import INSIDE, RIGID, Mode, Vector
-from servotwin.models.terms.follower import Follower
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.shaft import Shaft
 from servotwin.models.terms.source import Source, regulated
@@ -32,10 +31,7 @@ def on_known_bus(given: Numbers, V: float, V_oc: float, pulsed: bool) -> Numbers
     if pulsed:
         return on_bus(given, V)
     own = given.follower
-    follower = Follower(own.gain, own.half_deadband, max(own.V_max + V - V_oc, 0.0))
-    return Numbers(
-        given.motor, given.bridge, given.source, follower, given.shaft, given.friction, given.load, given.stops,
-        given.play, given.sensor, given.heat, given.elastic)
+    return given._replace(follower=own._replace(V_max=max(own.V_max + V - V_oc, 0.0)))
 
 
 def runs_otherwise(before: Source, V: float, drop: float, pulsed: bool) -> bool:

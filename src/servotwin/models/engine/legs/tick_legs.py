@@ -156,15 +156,12 @@ def as_gone(memory: Memory, gone: Gone) -> Memory:
     if not gone.anew:
         return memory
     point = Point(gone.time, gone.y, Mode(0, 0, gone.mesh, 0, 0), math.inf, gone.y, memory.point.step, gone.y.q)
-    return Memory(memory.frames, memory.beat, point, memory.chip, memory.u, memory.u_end, memory.tau, memory.tau_end,
-                  memory.firm)
+    return memory._replace(point=point)
 
 
 def level(numbers: Numbers) -> Numbers:
     """Return the numbers of a servo without what bends its load."""
-    plain = load.Load(numbers.load.coulomb, 0.0, 0.0, 0.0, 0.0)
-    return Numbers(numbers.motor, numbers.bridge, numbers.source, numbers.follower, numbers.shaft, numbers.friction,
-                   plain, numbers.stops, numbers.play, numbers.sensor, numbers.heat, numbers.elastic)
+    return numbers._replace(load=load.Load(numbers.load.coulomb, 0.0, 0.0, 0.0, 0.0))
 
 
 def frozen(numbers: Numbers, now: float, tau: float, y: Vector) -> Numbers:
@@ -173,8 +170,7 @@ def frozen(numbers: Numbers, now: float, tau: float, y: Vector) -> Numbers:
     u = duty.voltage(at.source, now)
     torque = currents.drive_torque(at, currents.zone_of(at, u, 0.0, y.q, y.w_m, 0.0), u, y)
     own = friction.frozen(numbers.friction, y.w_m, torque, torque_on_gear(tau, y.w, numbers.shaft.b_out))
-    return Numbers(numbers.motor, numbers.bridge, numbers.source, numbers.follower, numbers.shaft, own,
-                   numbers.load, numbers.stops, numbers.play, numbers.sensor, numbers.heat, numbers.elastic)
+    return numbers._replace(friction=own)
 
 
 def at_duty(numbers: Numbers, now: float, tau: float, y: Vector, before: Way) -> Way:
