@@ -30,9 +30,9 @@ def simulate(model: Model, command: Signal, **asked: object) -> Result:
         return result
 
 
-def is_the_same(compiled: Result, plain: Result) -> None:
+def is_the_same(compiled: Result, plain: Result, within: float = 1e-12) -> None:
     """Assert that two results are of one run: its motions, its events, and samples but for rounding."""
     assert [event.kind for event in compiled.events] == [event.kind for event in plain.events]
     assert (compiled.status, compiled.stats) == (plain.status, plain.stats)
     for name in plain.names:
-        np.testing.assert_allclose(compiled[name], plain[name], rtol=1e-12, atol=1e-12, err_msg=name)
+        np.testing.assert_allclose(compiled[name], plain[name], rtol=within, atol=within, err_msg=name)

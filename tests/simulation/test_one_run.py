@@ -28,7 +28,7 @@ def test_plain_text_is_the_compiled_run(name):
     one = CASES[name]
     plain_run.is_the_same(run(one), plain_run.simulate(
         one.model, one.command, duration=one.duration, load=one.load, initial=one.initial, seed=one.seed,
-        output_times=np.linspace(0.0, one.duration, 30)))
+        output_times=np.linspace(0.0, one.duration, 30)), 1e-9)
 
 
 @pytest.mark.parametrize("plainly", [False, True])

@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from servotwin.models.engine.batch import tiles
 from servotwin.models.terms.rooms import ACTS
 from servotwin.simulation.compile import reading, unread
 from servotwin.simulation.lanes.form_recipes import ALL_RUNS, side_by_side
@@ -11,7 +12,7 @@ from servotwin.simulation.lanes.form_recipes import ALL_RUNS, side_by_side
 pytestmark = pytest.mark.long
 
 SILENT = ("shaft.b_out", "stops.restitution")
-BY_GAPS = side_by_side(5, "float64", False, False)
+BY_GAPS = side_by_side(tiles.GAPS, "float64")
 find = unread.unread.__wrapped__  # without its own memory
 
 

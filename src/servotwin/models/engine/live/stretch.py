@@ -113,7 +113,7 @@ def show(numbers: Numbers, inputs: Inputs, rows: Any, count: int, shared: Floats
                 else:
                     m_before = _see(screen, lines, inputs, before, m_before, before.origin + before.end)
                 m = _see(screen, lines, inputs, row, m, start)
-                k = k + 1 if k / looks.rate == start else k
+                k = k if is_before(start, k / looks.rate, program) else k + 1
             was = now
             time = k / looks.rate
             while time < looks.until and is_before(time, row.origin + row.end, program):

@@ -88,7 +88,7 @@ def _show(told: Any, posts: Any, shared: Any, seats: Any, mates: Any, looks: Loo
             _take_over(written, posts)
             if switched and looks.switches == 1:
                 _see_all(told, posts, shared, seats, mates, written, begins, begins, False, rows, events, used)
-                k = k + 1 if k / looks.rate == begins else k
+                k = k + 1 if k / looks.rate <= begins * late else k
         else:
             going = False
     if ends:
