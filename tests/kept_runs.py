@@ -14,6 +14,7 @@ import sys
 import warnings
 from collections.abc import Iterator
 from dataclasses import astuple
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,12 @@ from servotwin.models import DigitalServo, PulseServo, PulseServoInductive, defa
 DRAW, GENERATED, DIGITAL, BUSES = 901, 240, 60, 16
 TIMES, PIECES = 60, (0.13, 0.31, 0.55, 0.83)
 Kept = dict[str, np.ndarray]
+
+
+@cache
+def every() -> dict[str, Case]:
+    """Return all runs by name."""
+    return dict(cases())
 
 
 def cases() -> Iterator[tuple[str, Case]]:

@@ -140,7 +140,9 @@ def without_compiler():
 
 
 def called_laws(run):
-    """Return what `run` returns, and the names of the functions of `physics` that it has called."""
+    """Return what `run` returns in plain Python, and the names of the functions of `physics` that it has called."""
+    from servotwin.simulation.compile import backend
+
     names = set()
 
     def look(frame, event, _):
@@ -150,11 +152,13 @@ def called_laws(run):
         elif event == "call" and "/physics/" in code.co_filename.replace("\\", "/"):
             names.add(code.co_name)
 
+    backend._without_compiler.append(True)
     sys.setprofile(look)
     try:
         return run(), names
     finally:
         sys.setprofile(None)
+        backend._without_compiler.pop()
 
 
 def laws_compiled(names):

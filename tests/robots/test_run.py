@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import servotwin as st
+from falling_supplies import BIG, SITUATIONS, model_of
 from robots.robots_cases import hinge, links, servo
 from servotwin.datasheet import thermal_masses
 from servotwin.errors import InputError, UnknownNameError
@@ -110,6 +111,29 @@ def test_servos_on_one_supply_make_it_sag():
     drawn = sum(found.record[joint]["supply_current"] for joint in found.mounts)
     np.testing.assert_allclose(found.record["shoulder"]["bus_voltage"], 6.0 - 0.5 * drawn, atol=1e-9)
     assert found.tracking["elbow"].lowest_voltage < 5.5
+
+
+@pytest.mark.parametrize(("name", "supply"), [case[:2] for case in SITUATIONS])
+def test_the_least_voltage_of_joints_that_hardly_turn_is_that_of_servos_alone(name, supply):
+    """Behind an inertia of 1000 kg m²: two joints that have a supply each, and two on one."""
+    own, source, goals = model_of(name, supply), st.Supply.of(supply), ((0.3, 1.1) if name == BIG else (-0.4, 0.4))
+    body = """<body><joint name="{}" axis="0 1 0"/><inertial pos="0 0 0" mass="1" diaginertia="1e3 1e3 1e3"/></body>"""
+    plant = model(f"""<mujoco><option timestep="2e-3"/><worldbody>{body.format("elbow")}{body.format("wrist")}
+      </worldbody></mujoco>""")
+    motion = Motion(time=np.array([0.0, 0.05, 0.1]), angles=dict.fromkeys(
+        ("elbow", "wrist"), np.array([goals[0], goals[1], goals[1]])), source="a jump")
+    load = st.loads.Inertia(1e3)
+    command = st.signals.step(*goals, at=0.1501, unit="rad")  # a goal is heard at the tick after it
+    run = {"duration": 0.3, "output_step": 0.1}
+    alone = st.simulate(own, command, load=load, **run)
+    both = st.simulate_bus({joint: (own, command, load) for joint in ("elbow", "wrist")}, supply=source, **run)
+    for bus, sag in ((None, alone.sag), (source, both.sag)):
+        found = run_motion(plant, dict.fromkeys(("elbow", "wrist"), own), motion, bus=bus, settle=0.1, hold="previous",
+                           assume_heat=False)
+        assert len(found.sags) == (0 if sag is None else 1 if bus else 2)
+        for _, _, other in found.sags:
+            assert other.voltage == pytest.approx(sag.voltage, abs=1e-6)
+            assert other.time == pytest.approx(sag.time - 0.1, abs=1e-3)
 
 
 # ------------------------------------------------------------------------------------------------------ heat

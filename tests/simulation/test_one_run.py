@@ -12,7 +12,7 @@ import plain_run
 import servotwin as st
 from servotwin.simulation import engine, trajectory
 
-CASES = dict(kept_runs.cases())
+CASES = kept_runs.every()
 NAMES = [name for name in CASES if name.startswith(("generated", "digital"))]
 FEW = NAMES[::12]
 

@@ -5,27 +5,19 @@ import math
 import numpy as np
 import pytest
 
+import kept_runs
 import servotwin as st
+from falling_supplies import BIG, SG90, SITUATIONS, STS, XL, model_of
 from servotwin.datasheet.choice import candidate
+from servotwin.errors import InputError
+from servotwin.models.switched import SwitchedServo
 from servotwin.parameters import catalog_names, operating_voltages, printed_points
 from servotwin.simulation.remarks import BELOW_CHIP, BELOW_REGISTER, HELD_BACK
 from servotwin.simulation.sag import floor_of
 
 STEP = 2e-5  # s
-SG90, BIG, STS, XL = "towerpro-sg90", "hitec-hs-755hb", "feetech-sts3215-12v", "dynamixel-xl330-m288"
-SITUATIONS = [  # servo, supply, torque against the shaft [N m]
-    (SG90, "usb", 0.0), (SG90, "4.5V:0.6ohm", 0.0), (SG90, "5V:0.2A", 0.0), (SG90, "5V:3ohm", 0.0),
-    (SG90, "5V:3ohm:0.35A", 0.02), (BIG, "6V:0.5ohm", 0.0), (BIG, "7.4V:0.1ohm", 0.3), (BIG, "6V:1A", 0.1),
-    (STS, "12V:0.3ohm", 0.0), (STS, "12V:0.3ohm:2A", 0.5), (STS, "12V:5A", 0.0), (XL, "usb", 0.05)]
-
-
-def model_of(name, supply):
-    from servotwin.datasheet.conditions import on_supply
-
-    servo = on_supply(st.load_servo(name), st.Supply.of(supply))
-    plain = dict.fromkeys(("gear.backlash", "gear.output_inertia", "friction.load_friction",
-                           "friction.load_friction_motor", "friction.load_friction_external"))
-    return (st.DigitalServo if servo.kind == "bus" else st.PulseServo)(servo.replace(plain))
+FALLING = {name: one for name, one in kept_runs.every().items() if isinstance(one.model, SwitchedServo) and (
+    one.model.servo.supply.internal_resistance or one.model.servo.supply.current_limit)}
 
 
 def small_steps(result, torque):
@@ -97,13 +89,73 @@ def test_the_least_voltage_is_that_of_small_steps(name, supply, torque):
     result = st.simulate(model, command, load=load, duration=0.3, output_step=0.1)
     least, when = small_steps(result, torque)
     bus = st.simulate_bus({"one": (model, command, load)}, supply=st.Supply.of(supply), duration=0.3, output_step=0.1)
+    lanes = st.simulate_many(model, command, load=load, duration=0.3, output_step=0.1, watch_supply=True)
     if (name, supply) == (STS, "12V:5A"):  # it gives all that is asked
         assert (least, result.sag, bus.sag) == (12.0, None, None)
+        assert lanes.lowest_voltage[0, 0] == pytest.approx(12.0)
         return
-    for sag in (result.sag, bus.sag):
-        assert sag.voltage == pytest.approx(least, abs=1e-6)
-        assert sag.time == pytest.approx(when, abs=1e-3)
+    for voltage, time in (result.sag[:2], bus.sag[:2], lanes.lowest_voltage[:, 0]):
+        assert voltage == pytest.approx(least, abs=1e-6)
+        assert time == pytest.approx(when, abs=1e-3)
     assert result.least("bus_voltage") == (result.sag.voltage, result.sag.time)
+
+
+@pytest.mark.parametrize(("name", "supply", "torque"), SITUATIONS)
+def test_the_least_voltage_between_two_ticks_is_that_of_the_run(name, supply, torque):
+    """One servo alone, and two on one supply that turn at once."""
+    model, load = model_of(name, supply), st.loads.Constant(torque)
+    low, high = (0.3, 1.1) if name == BIG else (-0.4, 0.4)
+    command = st.signals.step(low, high, at=0.05, unit="rad")
+    other = st.signals.step(high, low, at=0.05, unit="rad")
+    source = st.Supply.of(supply)
+    alone = st.simulate(model, command, load=load, duration=0.2, output_step=0.1)
+    both = st.simulate_bus({"one": (model, command, load), "other": (model, other, load)}, supply=source, duration=0.2,
+                           output_step=0.1)
+    for sag, bus, goals in ((alone.sag, None, (low, high)), (both.sag, source, ([low, high], [high, low]))):
+        sims = st.VectorSimulator(model, 2, load=load, bus=bus, watch_supply=True)
+        sims.reset(command_angle=goals[0])
+        for k in range(100):
+            sims.advance(2e-3, command_angle=goals[0] if k < 25 else goals[1])
+        expected = (source.open_circuit_voltage, 0.0) if sag is None else sag[:2]
+        np.testing.assert_allclose(sims.lowest_voltage.T, [expected, expected], atol=1e-7)
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=() if k % 9 == 0 else pytest.mark.long)
+                                  for k, name in enumerate(FALLING)])
+def test_lanes_find_the_least_voltage_that_their_motions_have(name):
+    """Of servos with any terms, on a supply that falls: between all samples of the continuous solution."""
+    one = FALLING[name]
+    run = {"duration": one.duration, "load": one.load, "output_times": [one.duration]}
+    sag = st.simulate(one.model, one.command, initial=one.initial, seed=one.seed, **run).sag
+    batch = st.simulate_many(one.model, one.command, initial=one.initial, seeds=[one.seed], watch_supply=True, **run)
+    voltage, time = batch.lowest_voltage[:, 0]
+    if sag is None:
+        assert voltage == pytest.approx(one.model.servo.supply.open_circuit_voltage, rel=2e-6)
+    else:
+        assert voltage == pytest.approx(sag.voltage, abs=1e-7)
+        assert time == pytest.approx(sag.time, abs=1e-4)
+
+
+def test_what_was_least_is_remembered():
+    model = model_of(SG90, "5V:3ohm")
+    for bus in (None, st.Supply.of("5V:3ohm")):
+        sims = st.VectorSimulator(model, 2, bus=bus, watch_supply=True)
+        assert np.isnan(sims.lowest_voltage).all()
+        sims.reset(command_angle=0.3)
+        sims.advance(0.02, command_angle=-0.3)
+        sims.advance(0.02)
+        least, memory = sims.lowest_voltage, sims.save()
+        assert (least[0] < 4.0).all()
+        sims.set(parameters={"load.inertia": 1e-5})
+        sims.watch([1])
+        assert sims.lowest_voltage[0, 0] == (math.nan if bus else least[0, 0]) or bus
+        assert math.isnan(sims.lowest_voltage[0, 1])
+        sims.restore(memory)
+        np.testing.assert_array_equal(sims.lowest_voltage, least)
+        sims.reset(lanes=[0])
+        assert math.isnan(sims.lowest_voltage[0, 0])
+    with pytest.raises(InputError, match="watch_supply=True"):
+        st.VectorSimulator(model, 1).watch()
 
 
 def said(name, supply, load=0.0):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -39,21 +39,24 @@ class Crew:
     parameters : mapping
         What differs among them.
     bus : list of tuple (Supply, lanes)
+    watched : bool
+        Whether the least voltages of supplies are kept.
     """
 
     model: Model
     which: Indices
     parameters: Mapping[str, Any] = field(default_factory=dict)
     bus: Sequence[tuple[Supply, list[int]]] = ()
+    watched: bool = False
 
     def simulator(self) -> VectorSimulator:
         """Return a simulator of them."""
         return VectorSimulator(self.model, len(self.which), parameters=self.parameters, bus=list(self.bus) or None,
-                               threads=1)
+                               threads=1, watch_supply=self.watched)
 
 
-def crews_of(joints: Sequence[Joint], bus: Any) -> list[Crew]:
-    """Return all servos as crews.
+def crews_of(joints: Sequence[Joint], bus: Any, watched: bool) -> list[Crew]:
+    """Return all servos as crews, whose supplies may be watched.
 
     Raises
     ------
@@ -69,7 +72,7 @@ def crews_of(joints: Sequence[Joint], bus: Any) -> list[Crew]:
         own = [k for k in alone if _alike(joints[k].mount.model, first)]
         crews.append(Crew(first, np.array(own)))
         alone = [k for k in alone if k not in own]
-    return crews
+    return [replace(crew, watched=watched) for crew in crews]
 
 
 def _alike(a: Model, b: Model) -> bool:

@@ -69,12 +69,16 @@ class ServoDrive:
     assume_heat : bool
         Whether servos whose files have no thermal numbers get warm by ones that their mass lets assume; `check` and the
         notes of a record say so. Without, they stay cold, and their temperatures are nan.
+    watch_supply : bool
+        Whether `lowest_voltage` is kept: servos go from event to event then, which takes a little longer.
 
     Attributes
     ----------
     model : MjModel
     joints : tuple of str
         Names of the joints, in the order of all arrays.
+    watches : bool
+        Whether least voltages of supplies are kept.
     maps : dict of str to CommandMap
         What controls of actuators ask of the servos, by joint; `print` shows one.
 
@@ -102,7 +106,7 @@ class ServoDrive:
 
     def __init__(self, model: Any, servos: Mapping[str, Model | Mount], *, bus: Any = None,
                  controls: Mapping[str, CommandMap] | None = None, joint_friction: str = "refuse",
-                 solver: str = "raised", assume_heat: bool = True) -> None:
+                 solver: str = "raised", assume_heat: bool = True, watch_supply: bool = False) -> None:
         mujoco, self._places = load_mujoco(), places()
         if not isinstance(servos, Mapping) or not servos:
             raise InputError("servos of a ServoDrive", got=servos, allowed="a mapping of joints to models")
@@ -123,8 +127,9 @@ class ServoDrive:
         check_options(mujoco, self.model, self._joints)
         maps = maps_of(self.model, self._joints, controls)
         self.maps = {one.joint: one for one, joint in zip(maps, self._joints, strict=True) if joint.actuator >= 0}
-        crews = crews_of(self._joints, bus)
+        crews = crews_of(self._joints, bus, bool(watch_supply))
         treat_friction(self.model, self._joints, joint_friction)
+        self.watches = bool(watch_supply)
         self._harbour = Harbour(self._joints, crews, int(self.model.nv))
         self._kept_at, first = -1, self._harbour.first
         if spec is not None:  # with room for what the servos remember, so that MuJoCo's states hold it
@@ -331,6 +336,24 @@ class ServoDrive:
             if name in (*berth.sims.signals, "time"):
                 found[berth.crew.which] = berth.sims[name]
         return found
+
+    def lowest_voltage(self, data: Any) -> Array:
+        """Return the least voltage of each servo's supply since `watch`, or since they began [V], and when [s].
+
+        Shape (2, n), in the order of `joints`, the time by MuJoCo's clock. It is that of all instants within ticks;
+        nan without `watch_supply`.
+        """
+        found = np.full((2, len(self._joints)), math.nan)
+        for berth in self._of(data).berths:
+            voltage, when = berth.sims.lowest_voltage
+            found[:, berth.crew.which] = voltage, when + (float(data.time) - berth.sims.time)
+        return found
+
+    def watch(self, data: Any) -> None:
+        """Look for the least voltages of supplies from now on; raise InputError without `watch_supply`."""
+        for berth in self._of(data).berths:
+            berth.sims.watch()
+        self.changed(data)
 
     def simulators(self, data: Any) -> tuple[VectorSimulator, ...]:
         """Return the simulators of the servos in some data, one for each crew: their lanes are in `crew_joints`.

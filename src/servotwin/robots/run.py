@@ -6,7 +6,7 @@ import contextlib
 import copy
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,7 +31,7 @@ from servotwin.robots.registers import as_motion_says
 from servotwin.robots.sizing import supplied
 from servotwin.robots.tracking import Tracking, tracking_of
 from servotwin.simulation.progress import Progress, shown
-from servotwin.simulation.sag import Sag, sag_in
+from servotwin.simulation.sag import Sag, may_fall, sag_in
 from servotwin.units import is_finite
 
 Array = NDArray[np.float64]
@@ -74,6 +74,9 @@ class RobotRun:
     unjudged : str
         Why nothing can be said about its servos, such as links that lie in each other where the motion begins, or a
         robot that nothing carries; empty if it can.
+    lowest : mapping of str to tuple (float, float)
+        By joint: the least voltage [V] of the servo's supply from the beginning of the motion on, of all instants, and
+        when it came [s].
     """
 
     model: Any
@@ -86,6 +89,7 @@ class RobotRun:
     tracking: Mapping[str, Tracking]
     said: tuple[str, ...] = ()
     unjudged: str = ""
+    lowest: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def time(self) -> Array:
@@ -119,7 +123,10 @@ class RobotRun:
 
     @property
     def sags(self) -> tuple[tuple[tuple[str, ...], Supply, Sag], ...]:
-        """How far supplies fell from the beginning of the motion on, among the ends of ticks: joints, supply, sag."""
+        """How far supplies fell from the beginning of the motion on: joints, supply, sag.
+
+        For how long they were low is counted among the ends of ticks.
+        """
         found: dict[int, list[str]] = {}
         for k, joint in enumerate(self.mounts):
             shared = self.supply_of(joint)
@@ -129,7 +136,8 @@ class RobotRun:
             record, model = self.record[joints[0]], self.mounts[joints[0]].model
             supply = self.supply_of(joints[0]) or model.servo.supply
             if "bus_voltage" in record:
-                sag = sag_in(self.time[self.time >= 0.0], record["bus_voltage"][self.time >= 0.0], supply)
+                sag = sag_in(self.time[self.time >= 0.0], record["bus_voltage"][self.time >= 0.0], supply,
+                             self.lowest.get(joints[0]))
                 made += [(tuple(joints), supply, sag)] if sag is not None else []
         return tuple(made)
 
@@ -221,9 +229,10 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
 
     def follow(plant: Any, until: float, tell: Callable[[int], object]) -> tuple[ServoDrive, Any, Array]:
         drive = ServoDrive(plant, mounts, bus=bus, joint_friction=joint_friction, controls=controls,
-                           assume_heat=False)  # it is in the mounts
+                           assume_heat=False, watch_supply=falls)  # heat is in the mounts
         return (drive, *_followed(drive, motion, mounts, settle=settle, hold=hold, until=until, tell=tell))
 
+    falls = any(may_fall(supply_of(bus, joint) or mount.model.servo.supply) for joint, mount in mounts.items())
     first = copy.copy(own)
     ticks = len(_times(own.opt.timestep, motion.duration, settle))
     with shown(progress, 2 * ticks, "following the motion") as tell:
@@ -276,7 +285,10 @@ def _followed(drive: ServoDrive, motion: Motion, mounts: Mapping[str, Mount], *,
     time = time[:int(np.searchsorted(time, until))]
     poses = np.zeros((len(time), drive.model.nq))
     begin(drive, data, motion, mounts, -settle)
+    first = int(np.searchsorted(time, 0.5 * step))  # tick of the motion
     for k, goals in enumerate(_goals(motion, time - step, hold, 0.5 * step)):
+        if drive.watches and k == first:
+            drive.watch(data)
         if goals:
             drive.command(data, goals)
         drive.step(data)
@@ -327,12 +339,14 @@ def finished(drive: ServoDrive, data: Any, motion: Motion, mounts: Mapping[str, 
     tell : callable, optional
         Is told how many times are done.
     """
-    record = drive.result(data)
+    record, lowest = drive.result(data), drive.lowest_voltage(data)
+    known = {joint: tuple(lowest[:, k].tolist()) for k, joint in enumerate(drive.joints) if np.isfinite(lowest[0, k])}
     ideal = ideal_run(drive.model, drive.joints, motion, record.time, progress=tell,
                       window=blend_window(motion) if window is None else window)
     return RobotRun(model=drive.model, motion=motion, mounts=mounts, bus=bus, record=record, poses=poses, ideal=ideal,
                     tracking={joint: tracking_of(record[joint], goal_of(motion, joint, record.time, ideal),
-                                                 motion.duration) for joint in drive.joints})
+                                                 motion.duration, known.get(joint)) for joint in drive.joints},
+                    lowest=known)
 
 
 def _check(motion: Motion, settle: float, hold: str, timestep: float | None, overlap: str) -> None:

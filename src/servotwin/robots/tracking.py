@@ -59,7 +59,8 @@ class Tracking:
     remarks: tuple[Remark, ...]
 
 
-def tracking_of(record: ServoRecord, goal: Array, duration: float) -> Tracking:
+def tracking_of(record: ServoRecord, goal: Array, duration: float,
+                lowest: tuple[float, float] | None = None) -> Tracking:
     """Return how a servo has followed goals, at the times of its record.
 
     Parameters
@@ -69,6 +70,8 @@ def tracking_of(record: ServoRecord, goal: Array, duration: float) -> Tracking:
         Of the joint: of a hinge [rad], of a slide [m]
     duration : float
         Of the motion, which begins at time 0 [s]
+    lowest : tuple (float, float), optional
+        Least voltage of its supply from then on, within ticks too [V], and when [s]
     """
     time, angle = record.time, record["joint_angle"]
     error = goal - angle
@@ -82,9 +85,13 @@ def tracking_of(record: ServoRecord, goal: Array, duration: float) -> Tracking:
         droop_after=_mean(error[time > time[-1] - _REST]),
         peak_current=_highest(record, "armature_current", from_start),
         mean_current=float(record[drawn][from_start].mean()),
-        lowest_voltage=float(record["bus_voltage"][from_start].min()) if "bus_voltage" in record else math.nan,
+        lowest_voltage=_lowest(record, from_start) if lowest is None else lowest[0],
         winding=_highest(record, "winding_temperature", from_start),
         housing=_highest(record, "housing_temperature", from_start), remarks=record.remarks)
+
+
+def _lowest(record: ServoRecord, some: NDArray[np.bool_]) -> float:
+    return float(record["bus_voltage"][some].min()) if "bus_voltage" in record else math.nan
 
 
 def best_delay(time: Array, goal: Array, angle: Array, moving: NDArray[np.bool_]) -> tuple[float, float]:

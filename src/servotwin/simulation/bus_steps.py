@@ -81,6 +81,8 @@ class BusSteps:
             raise  # of whoever is told the time
         except (ArithmeticError, ValueError):  # numbers beyond what a float holds
             status = DIVERGED
+        for j, own in enumerate(rows):
+            own.cut(int(used[USED * j]))
         way.risen(firms)
         if status != COMPLETED:
             raise failure(Status.of_code(status), max(seat.origin + seat.clock for seat in way.seats))

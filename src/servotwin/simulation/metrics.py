@@ -11,6 +11,7 @@ import numpy as np
 
 from servotwin.errors import InputError
 from servotwin.look import number, table
+from servotwin.models.engine.memory import FLAT
 from servotwin.simulation.arrival import arrival_band, resolution, tolerance
 
 if TYPE_CHECKING:
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from servotwin.simulation.trajectory import Trajectory
 
 _LOOK = 0.1  # s, five usual frames
-FLAT = 1e-6  # V of a voltage, within which it lies flat
-
 
 _UNITS = {"rise_time": "s", "settling_time": "s", "arrival_time": "s", "overshoot": "", "slew_rate": "rad/s",
           "peak_current": "A"}

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models import DigitalServo
+from servotwin.models.engine.memory import FLAT
 from servotwin.parameters.registers.held import registers_of
-from servotwin.simulation.metrics import FLAT, least
+from servotwin.simulation.metrics import least
 
 if TYPE_CHECKING:
     from servotwin.models import Model
@@ -67,7 +68,7 @@ def sag_of(trajectories: Sequence[Trajectory], voltage: Callable[[Samples], Arra
     """
     V = supply.open_circuit_voltage or math.nan
     limit = math.inf if supply.current_limit is None else supply.current_limit
-    if not supply.internal_resistance and math.isinf(limit):
+    if not may_fall(supply):
         return None
     different = {one.segments.starts.tobytes(): one for one in reversed(trajectories)}
     found = [least(one, voltage) for one in different.values() if one.segments]
@@ -86,16 +87,25 @@ def sag_of(trajectories: Sequence[Trajectory], voltage: Callable[[Samples], Arra
     return Sag(lowest, first, low, limited, limit)
 
 
-def sag_in(time: Array, voltage: Array, supply: Supply) -> Sag | None:
-    """Return how far a supply fell, among samples that are evenly spaced: time [s] and voltage [V], shape (n,)."""
+def may_fall(supply: Supply) -> bool:
+    """Tell whether the voltage of a supply may fall."""
+    return bool(supply.internal_resistance) or supply.current_limit is not None
+
+
+def sag_in(time: Array, voltage: Array, supply: Supply, lowest: tuple[float, float] | None = None) -> Sag | None:
+    """Return how far a supply fell, among samples that are evenly spaced: time [s] and voltage [V], shape (n,).
+
+    `lowest` is its least voltage [V] and when it came first [s] where these are known between samples too.
+    """
     V, limit = supply.open_circuit_voltage or math.nan, supply.current_limit or math.inf
-    if not len(time) or not voltage.min() < V * (1.0 - _SAME):
+    least = lowest[0] if lowest is not None else float(voltage.min()) if len(time) else math.nan
+    if not len(time) or not least < V * (1.0 - _SAME):
         return None
     step = float(time[1] - time[0]) if len(time) > 1 else 0.0
     at_limit = V * (1.0 - _SAME) - (supply.internal_resistance or 0.0) * limit
     low, limited = (step * float(np.count_nonzero(voltage < end)) for end in (LOW * V, at_limit))
-    first = int(np.argmax(voltage <= voltage.min() + FLAT))
-    return Sag(float(voltage.min()), float(time[first]), low, limited, limit)
+    when = lowest[1] if lowest is not None else float(time[np.argmax(voltage <= least + FLAT)])
+    return Sag(least, when, low, limited, limit)
 
 
 class Floor(NamedTuple):

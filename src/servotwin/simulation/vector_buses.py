@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from servotwin.models.engine.batch.tiles import Lanes
 from servotwin.models.engine.bus.bus_batch import Buses
 from servotwin.models.engine.bus.bus_inputs import Tables
 from servotwin.models.engine.bus.coupled_motion import APART
-from servotwin.models.engine.memory import Memories
+from servotwin.models.engine.memory import NONE_YET, Memories
 from servotwin.models.engine.step import COMPLETED
 from servotwin.simulation.bus_run import BUSES, room_of, shared_of, units_of
 from servotwin.simulation.bus_supply import Supplies, source_of
@@ -125,6 +126,20 @@ class BusSet:
     def pieces(self) -> list[Piece]:
         """Return where the lanes stand, and what those on a bus remember together."""
         return [piece_of(array) for array in (*self.memories, self.buses.joined, self.buses.shared)]
+
+    def watch(self, places: Indices) -> None:
+        """Look for the least voltages of the supplies that lanes are on from now on."""
+        self.buses.shared["lowest"][self._bus_at[places]] = NONE_YET
+
+    @property
+    def lowest(self) -> NDArray[Any]:
+        """The least voltage of each lane's supply."""
+        return np.asarray(self.buses.shared["lowest"][self._bus_at])
+
+    def set_lowest(self, shared: Mapping[int, Any]) -> None:
+        """Take the least voltages of supplies so far from what lanes on them remember together."""
+        for k, record in shared.items():
+            self.buses.shared["lowest"][k] = record["lowest"]
 
     def common(self, joined: Indices, shared: dict[int, Any]) -> None:
         """Put into `joined` (lanes,) and `shared` what the lanes of each bus remember together."""

@@ -63,11 +63,13 @@ def run_chunk(job: Job, parameters: Mapping[str, NDArray[Any]], seeds: NDArray[n
     """
     batch = simulate_lanes(
         lanes_of(job.model, job.command, job.load, parameters, None, seeds), duration=job.duration,
-        output_times=job.times, outputs=signals_of(job.metrics), executor=HERE, chunk=job.block)
+        output_times=job.times, outputs=signals_of(job.metrics), executor=HERE, chunk=job.block,
+        watched="lowest_voltage" in job.metrics)
     ended = np.full(len(batch), job.duration)
     for failure in batch.failures:
         ended[failure.lane] = failure.time
-    found = lane_metrics(job.metrics, job.times, job.start, batch.signals, Judged(
+    signals = {**batch.signals, "lowest_voltage": batch.lowest_voltage[0]}
+    found = lane_metrics(job.metrics, job.times, job.start, signals, Judged(
         finest=_finest(job.model, parameters), still=still_since(job.command, job.load, job.duration),
         look=look_period(job.model)))
     return {**{name: np.where(batch.status == 0, column, np.nan) for name, column in found.items()},

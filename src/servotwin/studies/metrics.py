@@ -170,7 +170,7 @@ def lane_metrics(metrics: Sequence[str], times: Array, start: float, signals: Ma
         elif name == "steady_error":
             found[name] = signals["command_angle"][:, -1] - signals["output_angle"][:, -1]
         elif name == "lowest_voltage":
-            found[name] = signals["bus_voltage"].min(axis=1)
+            found[name] = signals[name]  # of all instants
         elif name in ("slew_rate", "peak_current"):
             values = signals[METRICS[name].signals[0]]
             found[name] = np.maximum(values.max(axis=1), -values.min(axis=1))

@@ -102,7 +102,8 @@ def test_a_buzz_is_told_in_words_and_the_current_is_its_mean(page):
     last = table["time_s"] > table["time_s"][-1] - 1.0
     mean = float(table["supply_current_A"][last].mean())
     reading = page.locator(".lcd-panel dd:visible").last.inner_text().split()
-    assert float(reading[0]) * (1e-3 if reading[1] == "mA" else 1.0) == pytest.approx(mean, rel=0.03)
+    assert float(reading[0]) * (1e-3 if reading[1] == "mA" else 1.0) == pytest.approx(
+        mean, rel=0.05)  # of samples each millisecond, of drives that last three
 
 
 def test_one_set_of_units_with_the_mystery_too(page):

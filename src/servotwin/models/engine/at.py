@@ -13,7 +13,6 @@ from servotwin.models.engine.motions.motion import (
     LONG_STEP,
     PAIR,
     STEP,
-    WARMING,
     Motion,
 )
 from servotwin.models.engine.run import plant_of
@@ -30,8 +29,6 @@ PLAIN = True  # the compiler takes it for False
 SHOWN = 20
 """Numbers at a time: state (7), wiper, mode (5), drive, error, silence, duty, goal, reference, trip."""
 _DENSE = 7  # vectors of a dense output
-_SETTLING, _FADING = 4.0, 3.0  # times in which a creep settles, or friction fades, that an interval may last
-_NOTHING, _TIMES = 1e-15, 3.0  # A, what is left of a current; of 1/rate: an interval in which it fades
 _SHORTEST = 1e-307  # s: what is over in less has no time of its own
 
 
@@ -84,30 +81,11 @@ def resolution(plants: Any, accuracy: float, rows: Any, shared: Floats, found: F
         row = row_at(rows, k)
         if row.how == ALONE:
             m = motion_of(numbers, row, shared, accuracy)
-            fine, settled = _scales(m)
+            fine, settled = motion.fine_scales(m)
         else:
             fine, settled = row.length, math.inf
         found[0, k], found[1, k] = max(fine, _SHORTEST), settled
         found[2, k] = motion.period(row.u, row.tau, row.start, row.end) / 4.0
-
-
-def _scales(m: Motion) -> tuple[float, float]:
-    """Return `motion.scales`; of a creep, which may be long, the time in which its speed would change at most.
-
-    Of a step of a servo that warms up, those of the current that fades, as long as anything is left of it.
-    """
-    fine, settled = motion.scales(m)
-    if m.kind == WARMING:
-        m = motion.prepared(m)
-        fast, left = m.long_dense[5].w, abs(m.long_dense[6].q_m) / _NOTHING
-        return (_TIMES / fast, math.log(left) / fast) if fast > 0.0 and left > 1.0 else (fine, settled)
-    if m.kind != CREEP:
-        return fine, settled
-    most = max(abs(motion.rates(m, 0.0, m.start).w), abs(motion.rates(m, m.length, m.end).w))
-    change = abs(m.end.w - m.start.w)
-    change = min(_SETTLING * change, _FADING * m.numbers.friction.w_s)
-    fine = min(fine, change / most) if change > 0.0 else fine
-    return fine, 10.0 * fine
 
 
 def numbers_at(plants: Any) -> Numbers:

@@ -29,6 +29,7 @@ ACCURACY = 1e-9  # rad, unless another is asked for
 FIRST_STEP = 1e-4  # s, the first that the integrator tries
 BEAT = 0.0625  # s, by which the clock counts where no pulses come regularly
 FRAMES = 256  # after so many times count anew: not after each, for that would round all of them anew
+FLAT = 1e-6  # V: a voltage counts as the least so near to it
 SAME = 1e-9  # of a frame: so near to an edge it is the edge
 IN_FLOATS = {"SAME": 1e-4, "FRAMES": 1}
 _USUAL = 0.02  # s, a frame where edges are listed
@@ -46,6 +47,14 @@ class Point(NamedTuple):
     wiper: float  # angle of the potentiometer, which may lag behind the shaft
 
 
+class Lowest(NamedTuple):
+    """The least voltage of a supply so far [V], and when it came within `FLAT` of that first [s since the start]."""
+
+    voltage: float  # −inf: nobody asks
+    level: float  # at that time
+    time: float
+
+
 class Memory(NamedTuple):
     """Everything that a servo remembers."""
 
@@ -57,6 +66,7 @@ class Memory(NamedTuple):
     u_end: float
     tau: Piece  # torque of the load that depends on time alone
     tau_end: float
+    lowest: Lowest  # voltage of its own supply
     firm: Programs  # one: what the program of a digital servo remembers; while it runs it is changed in place
 
 
@@ -82,6 +92,8 @@ class Inputs(NamedTuple):
 
 
 NOTHING = Piece()
+NOT_ASKED = Lowest(-math.inf, -math.inf, 0.0)
+NONE_YET = Lowest(math.inf, math.inf, 0.0)
 memory_of = record_reader("memory_of", Memory)
 put_memory = record_writer("put_memory", Memory)
 put_firm = record_writer("put_firm", Firm)
@@ -92,7 +104,7 @@ put_point = record_writer("put_point", Point)
 def started(y: Vector, mesh: int, firm: Programs) -> Memory:
     """Return the memory of a servo at t = 0, in no mode yet; `firm` is what its program remembers."""
     point = Point(0.0, y, Mode(0, 0, mesh, 0, 0), math.inf, y, FIRST_STEP, y.q)
-    return Memory(0, BEAT, point, frame.AT_START, NOTHING, math.inf, NOTHING, math.inf, firm)
+    return Memory(0, BEAT, point, frame.AT_START, NOTHING, math.inf, NOTHING, math.inf, NOT_ASKED, firm)
 
 
 def memory_at(memories: Memories, k: int) -> Memory:
@@ -168,8 +180,8 @@ def resumed(pulsed: bool, inputs: Inputs, memory: Memory, changed: bool) -> Memo
     tau, tau_end = in_force(inputs.torque, origin, time, inputs.constant_torque)
     if changed or u != memory.u or tau != memory.tau:
         memory = forgotten(memory)
-    return Memory(memory.frames, beat, memory.point, frame.numbered(memory.chip, number, silent_now(memory)), u, u_end,
-                  tau, tau_end, memory.firm)
+    return memory._replace(beat=beat, chip=frame.numbered(memory.chip, number, silent_now(memory)), u=u, u_end=u_end,
+                           tau=tau, tau_end=tau_end)
 
 
 def silent_now(memory: Memory) -> int:

@@ -106,6 +106,16 @@ def electrical(numbers: Numbers, u: float, q: float, w: float, i: float) -> Elec
     return Electrical(v, i, V_bus, drawn, V_bus * drawn, bridge_loss(i, V_ce0, r_c), at_brushes)
 
 
+def bus_voltage(numbers: Numbers, u: float, q: float, w: float, i: float) -> float:
+    """Return the voltage of the bus [V] alone; inf where the servo has none."""
+    if not source.present(numbers.source):
+        return math.inf
+    i = _within_limit(numbers.source, i)
+    zone = currents.zone_of(numbers, u, 0.0, q, w, i)
+    i = currents.flowing(numbers, zone, u, q, w, i)
+    return bridge.bus_voltage(numbers.bridge, numbers.source, numbers.motor, zone, u, w, i)
+
+
 def armature_current(numbers: Numbers, u: float, q: float, w: float, i: float) -> float:
     """Return the armature current [A] alone."""
     i = _within_limit(numbers.source, i)

@@ -37,6 +37,7 @@ from servotwin.models.engine.memory import (
 )
 from servotwin.models.engine.motions import motion
 from servotwin.models.engine.motions.motion import Motion
+from servotwin.models.engine.motions.rodas import not_constant
 from servotwin.models.engine.runs import calmed, is_short
 from servotwin.models.engine.step import CHATTER, COMPLETED, DIVERGED, MOST_IDLE, pulse_width, step
 from servotwin.models.state.modes import RIGID, at_rest
@@ -176,6 +177,8 @@ def stands(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, end: fl
         return False
     if pulsed_chip(chip) and (frame.next_switch(now, heeds_silence(numbers.bridge)) < end
                               or edge_of(inputs, memory, now.number) < end):
+        return False
+    if not_constant(memory.u) or not_constant(memory.tau):
         return False
     return memory.u_end >= end and memory.tau_end >= end and not due(memory)
 

@@ -11,6 +11,7 @@ from servotwin.models.engine.bus.bus_records import put_vector
 from servotwin.models.engine.legs import legs, tick_legs
 from servotwin.models.engine.legs.legs import MOST_SHORT, SHORT
 from servotwin.models.engine.legs.tick_legs import LEGS
+from servotwin.models.engine.lowest import asked, followed
 from servotwin.models.engine.memory import (
     SAME,
     Inputs,
@@ -152,6 +153,11 @@ def as_now(numbers: Numbers, inputs: Inputs, memory: Memory) -> Numbers:
     return at_pulses(numbers, silent_now(memory))
 
 
+def share_of(numbers: Numbers, inputs: Inputs, memory: Memory) -> float:
+    """Return how much of the supply's voltage there is at the bridge of a servo as it is now."""
+    return duty.share_of(numbers.bridge, memory.firm[0].duty) if firmware.present(inputs.firmware[0]) else 1.0
+
+
 def told(numbers: Numbers, pulsed: bool, inputs: Inputs, memory: Memory) -> tuple[Piece, Piece]:
     """Return what a servo follows as it stands, and the torque of its load that depends on time alone."""
     origin, time = origin_of(memory), memory.point.time
@@ -207,7 +213,7 @@ def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: 
     if firmware.present(inputs.firmware[0]) and not underway:
         controller.resume(inputs, memory)
     until = instant(pulsed, inputs, memory, memory.point.time + duration)
-    if firmware.present(inputs.firmware[0]) and tick_legs.way_of(
+    if firmware.present(inputs.firmware[0]) and not asked(memory.lowest) and tick_legs.way_of(
             numbers, inputs, until - memory.point.time, False) == LEGS:
         gone = tick_legs.go(numbers, inputs, memory, until, times, done, outputs)
         memory, done = tick_legs.as_gone(memory, gone), gone.done
@@ -228,7 +234,7 @@ def _run_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, until:
             memory = counted_anew(memory)
             until = instant(pulsed, inputs, memory, until - (origin_of(memory) - origin))
             origin = origin_of(memory)
-        if firmware.present(inputs.firmware[0]) and tick_legs.way_of(
+        if firmware.present(inputs.firmware[0]) and not asked(memory.lowest) and tick_legs.way_of(
                 numbers, inputs, until - memory.point.time, False) == LEGS:
             gone = tick_legs.go(numbers, inputs, memory, until, times, done, outputs)
             memory, done = tick_legs.as_gone(memory, gone), gone.done
@@ -240,6 +246,9 @@ def _run_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, until:
             return memory, status
         short = short + 1 if play.present(numbers.play) and is_short(memory, after, event) else 0
         memory = after
+        if asked(memory.lowest) and memory.point.time > t:
+            memory = memory._replace(lowest=followed(memory.lowest, m, share_of(numbers, inputs, memory), origin, t,
+                                                     memory.point.time))
         if short >= MOST_SHORT:
             memory, _ = calmed(numbers, chip, inputs, memory)
         idle = idle + 1 if memory.point.time == t else 0

@@ -43,7 +43,7 @@ def step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, m: Motion
     `m` is the motion of the step before, or `motion.nothing`. Return the memory, the motion on which it went, the
     event that ended it (−1: none), and a status.
     """
-    frames, beat, point, now, u, u_end, tau, tau_end, firm = memory
+    frames, beat, point, now, u, u_end, tau, tau_end, _, firm = memory
     origin, t = frames * beat, point.time
     new = point.anchor_time == math.inf
     if t >= tau_end:
@@ -83,7 +83,7 @@ def step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, m: Motion
         point = anchored(numbers, local_u, local_tau, t, point)
     point, m, event, status = onward(numbers, point, local_u, local_tau, m, new, min(u_end, tau_end), until,
                                        inputs.accuracy)
-    return Memory(frames, beat, point, now, u, u_end, tau, tau_end, firm), m, event, status
+    return memory._replace(point=point, chip=now, u=u, u_end=u_end, tau=tau, tau_end=tau_end), m, event, status
 
 
 def onward(numbers: Numbers, point: Point, u: Piece, tau: Piece, m: Motion, new: bool, limit: float,

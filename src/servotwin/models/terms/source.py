@@ -36,6 +36,11 @@ def regulated(source: Source) -> bool:
     return source.I_max < math.inf
 
 
+def falls(source: Source) -> bool:
+    """Tell whether the source's voltage may fall."""
+    return present(source) and (source.R_b > 0.0 or regulated(source))
+
+
 def needs(source: Source) -> int:
     """Return what there is to be followed of the source, or of what stands in its place."""
     return (0 if source.V > 0.0 else FOLLOWS) | (REGULATED if source.I_max < math.inf else 0)

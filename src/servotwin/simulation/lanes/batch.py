@@ -83,6 +83,7 @@ class Batch:
     signals: Mapping[str, NDArray[np.floating]]
     lanes: LaneInputs
     run_by: NDArray[np.int8]
+    lowest: NDArray[np.float64]
 
     def __repr__(self) -> str:
         return (f"Batch({self.lanes.model!r}, lanes={len(self)}, times={len(self.time)}, "
@@ -116,6 +117,15 @@ class Batch:
         ['by_legs']
         """
         return BatchStats(np.array(KERNELS)[self.run_by])
+
+    @property
+    def lowest_voltage(self) -> NDArray[np.float64]:
+        """The least voltage of each lane's supply [V], and when it came [s], shape (2, B).
+
+        It is that of all instants, between outputs too; where it lies flat, to 1e-6 V, the time is that of its
+        beginning. nan without `watch_supply`.
+        """
+        return self.lowest.T
 
     def __len__(self) -> int:
         """Return the number of lanes."""

@@ -46,6 +46,7 @@ from servotwin.models.terms.dependence import (
     TWO_BODIES,
 )
 from servotwin.simulation.compile import Recipe
+from servotwin.simulation.compile.unread import in_general
 
 _SIDE = tuple(f"servotwin.models.engine.batch.side_by_side:{name}" for name in ("start", "go_on", "advance", "refit"))
 _ENTRIES = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "ready", "go_on", "note_failures"))
@@ -179,5 +180,6 @@ def side_by_side(form: int, dtype: str) -> Recipe:
 
 
 KERNELS = tuple(sorted(one.name for one in (ALL_RUNS, PLAIN_RUNS, ALL_DIGITAL, BY_LEGS, BY_SERIES, BY_TICKS,
+                                            in_general(ALL_RUNS), in_general(ALL_DIGITAL),
                                             *_BY_FORMULA.values(), *_BY_FORM.values())))
 """Names of all kernels in which lanes run."""

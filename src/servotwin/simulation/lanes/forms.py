@@ -118,24 +118,28 @@ class OneByOne(NamedTuple):
     calm: bool = False
 
 
-def kinds_of(packed: Packed, dtype: str, nearly: bool = False) -> list[SideBySide | OneByOne]:
-    """Return how lanes run; `dtype` is that of those that may be of either, `nearly` as of `kinds_with`."""
+def kinds_of(packed: Packed, dtype: str, nearly: bool = False, watched: bool = False) -> list[SideBySide | OneByOne]:
+    """Return how lanes run; `dtype` is that of those that may be of either, all else as of `kinds_with`."""
     own, recorded = packed.lanes, packed.torque.count > 0
     return kinds_with(own.numbers, own.chips, packed.size, dtype, swept(own), recorded, packed.curve.size > 0,
-                      own.firmware or NO_FIRMWARE, nearly)
+                      own.firmware or NO_FIRMWARE, nearly, watched)
 
 
 def kinds_with(numbers: Numbers, chip: Chip, lanes: int, dtype: str, sweeps: Mask, recorded: Mask,
-               curved: bool, firmware: Firmware = NO_FIRMWARE, nearly: bool = False) -> list[SideBySide | OneByOne]:
+               curved: bool, firmware: Firmware = NO_FIRMWARE, nearly: bool = False,
+               watched: bool = False) -> list[SideBySide | OneByOne]:
     """Return how lanes run, whose numbers are numbers or arrays (lanes,).
 
     `sweeps` is whose command has a chirp, `recorded` whose load is recorded over time, `curved` whether the
-    potentiometers have a table. With `nearly`, what bends the motion within a tick may count by its mean.
+    potentiometers have a table. With `nearly`, what bends the motion within a tick may count by its mean. Supplies of
+    lanes that are `watched` are followed from event to event.
     """
     inputs = recorded * RECORDED if recorded.any() else 0
     terms = Terms(numbers, chip, firmware, sweeps.any() and sweeps, inputs | TABLE * curved)
     left = np.ones(lanes, np.bool_)
-    found = list(_alone(terms, left, nearly) if np.any(terms.ask(SPRING | PWM)) else _of_analog(terms, left, dtype))
+    found: Iterator[SideBySide | OneByOne] = (
+        _at_last(terms, left, recipes.ALL_DIGITAL if np.any(terms.ask(PWM)) else recipes.ALL_RUNS) if watched
+        else _alone(terms, left, nearly) if np.any(terms.ask(SPRING | PWM)) else _of_analog(terms, left, dtype))
     return [kind for kind in found if len(kind.which)]
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine.batch import tiles
-from servotwin.models.engine.memory import Memories
+from servotwin.models.engine.memory import NONE_YET, Memories
 from servotwin.models.state.records import TILE
 from servotwin.simulation.compile import Recipe, kernels
 from servotwin.simulation.compile.calls import Call, Now, Some, call_of
@@ -198,6 +198,15 @@ class Records:
     def copied(self, places: Indices) -> Memories:
         """Return what lanes remember that stand at some places."""
         return taken(self.memories, places)
+
+    def watch(self, places: Indices) -> None:
+        """Look for the least voltages of lanes' supplies from now on."""
+        self.rows["lowest"][places] = NONE_YET
+
+    @property
+    def lowest(self) -> NDArray[Any]:
+        """The least voltage of each lane's supply."""
+        return np.asarray(self.rows["lowest"])
 
     def pieces(self) -> list[Piece]:
         """Return where the lanes stand."""

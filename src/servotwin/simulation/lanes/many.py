@@ -52,7 +52,7 @@ def simulate_many(
     output_step: float | None = None, output_times: ArrayLike | None = None,
     outputs: Sequence[str] = ("output_angle",), initial: Mapping[str, ArrayLike] | None = None,
     dtype: DTypeLike = "float64", seeds: ArrayLike | None = None, executor: Any = None, chunk: int | None = None,
-    progress: Progress = False, accuracy: float = ACCURACY,
+    progress: Progress = False, accuracy: float = ACCURACY, watch_supply: bool = False,
 ) -> Batch:
     """Simulate many servos (lanes) from t = 0 to `duration`.
 
@@ -90,6 +90,8 @@ def simulate_many(
         True shows a bar on stderr; a callable is called with the lanes that are done and all of them.
     accuracy : float
         As in `simulate` [rad].
+    watch_supply : bool
+        Whether `Batch.lowest_voltage` is kept, for which lanes go from event to event: it takes a few times as long.
 
     Returns
     -------
@@ -121,17 +123,19 @@ def simulate_many(
                 voltages=lanes.numbers.get("supply.open_circuit_voltage"), known=lanes.headers)
     return simulate_lanes(lanes, duration=duration, output_step=output_step, output_times=output_times,
                           outputs=outputs, dtype=dtype, executor=executor, chunk=chunk, progress=progress,
-                          accuracy=accuracy)
+                          accuracy=accuracy, watched=bool(watch_supply))
 
 
 def simulate_lanes(
     lanes: LaneInputs, *, duration: float, output_step: float | None = None, output_times: ArrayLike | None = None,
     outputs: Sequence[str] = ("output_angle",), dtype: DTypeLike = "float64", executor: Any = None,
     chunk: int | None = None, progress: Progress = False, accuracy: float = ACCURACY, nearly: bool = False,
+    watched: bool = False,
 ) -> Batch:
     """Return what `simulate_many` does of lanes that were zipped before, without warnings.
 
-    With `nearly`, a spring or a pendulum of a digital servo counts with its torque in the middle of each tick.
+    With `nearly`, a spring or a pendulum of a digital servo counts with its torque in the middle of each tick. Least
+    voltages of supplies that are `watched` are kept.
     """
     if not (is_finite(duration) and duration > 0.0):
         raise InputError("duration", got=duration, allowed="a positive number of seconds")
@@ -140,7 +144,7 @@ def simulate_lanes(
         raise InputError("progress", got=progress, allowed="True, False or a function of the lanes done and of all")
     times = np.array(times_asked(duration, output_step, output_times))  # a copy: it becomes read-only
     names = _outputs(lanes.model, lanes.loads, outputs)
-    asked = Asked(float(duration), times, names, real_type(dtype), accuracy_of(accuracy), nearly)
+    asked = Asked(float(duration), times, names, real_type(dtype), accuracy_of(accuracy), nearly, watched)
     lanes = framed(lanes, asked.duration)
     commands = Commands(lanes)
     packs = _packs(lanes, commands, asked, chunk, crew.workers)
@@ -148,6 +152,7 @@ def simulate_lanes(
     done = 0
     status, ended = np.zeros(lanes.count, dtype=np.int8), np.full(lanes.count, asked.duration)
     refused, marks, kernel = np.empty(lanes.count), *np.empty((2, lanes.count), dtype=np.int8)
+    lowest = np.empty((lanes.count, 2))
     with crew, shown(progress, lanes.count, "simulate_many") as show, closing(_run(packs, asked, crew)) as running:
         for which, raw, values in running:
             place: Any = which
@@ -158,6 +163,7 @@ def simulate_lanes(
                     signals[name][place] = column
             status[place], ended[place] = raw.status, raw.ended
             refused[place], marks[place], kernel[place] = raw.refused, raw.marks, raw.kernel
+            lowest[place] = raw.lowest
             done += len(which)
             show(done)
     arrays: list[NDArray[Any]] = [times, status, *signals.values()]
@@ -166,7 +172,7 @@ def simulate_lanes(
     failures = tuple(Failure(int(lane), float(ended[lane]), Status.of_code(int(status[lane])).message)
                      for lane in np.flatnonzero(status))
     return Batch(time=times, status=status, failures=failures, remarks=lane_remarks(refused, marks, asked.duration),
-                 duration=asked.duration, signals=signals, lanes=lanes, run_by=kernel)
+                 duration=asked.duration, signals=signals, lanes=lanes, run_by=kernel, lowest=lowest)
 
 
 def grid(values: Mapping[str, ArrayLike] | None = None, /, **more: ArrayLike) -> dict[str, NDArray[Any]]:

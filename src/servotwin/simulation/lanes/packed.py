@@ -141,6 +141,8 @@ class Asked:
         Of what is integrated [rad].
     nearly : bool
         Whether a spring or a pendulum of a digital servo may count with its torque in the middle of each tick.
+    watched : bool
+        Whether the least voltage of each supply is kept.
     """
 
     duration: float
@@ -149,6 +151,7 @@ class Asked:
     dtype: str
     accuracy: float
     nearly: bool = False
+    watched: bool = False
 
 
 @dataclass(frozen=True)
@@ -194,6 +197,8 @@ class Raw:
         Sums of `engine.cosim.final_checks.ON_STOP` and `CANNOT_HOLD`.
     kernel : ndarray of int8, shape (B,)
         Place of the name of its kernels in `form_recipes.KERNELS`.
+    lowest : ndarray, shape (B, 2)
+        Least voltage of its supply [V] and when it came [s]; nan where nobody watched it.
     """
 
     fields: dict[str, NDArray[np.generic]]
@@ -203,6 +208,7 @@ class Raw:
     refused: Floats
     marks: NDArray[np.int8]
     kernel: NDArray[np.int8]
+    lowest: Floats
 
 
 def empty_raw(work: Work) -> Raw:
@@ -212,4 +218,4 @@ def empty_raw(work: Work) -> Raw:
     return Raw({name: np.zeros((lanes, len(asked.times)), kind) for name, kind in kinds.items()},
                np.zeros(lanes, np.int8), np.full(lanes, asked.duration),
                np.ascontiguousarray(work.packed.lanes.start[[0, 1, 3, 4]].T), np.full(lanes, np.nan),
-               np.zeros(lanes, np.int8), np.zeros(lanes, np.int8))
+               np.zeros(lanes, np.int8), np.zeros(lanes, np.int8), np.full((lanes, 2), np.nan))

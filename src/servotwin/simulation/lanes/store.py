@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine.cosim.cosim_calls import ANGLE, SPEED
-from servotwin.models.engine.memory import Memories
+from servotwin.models.engine.memory import NOT_ASKED, Lowest, Memories
 from servotwin.models.state.modes import INSIDE, ON_BACKWARD, RIGID
-from servotwin.models.state.records import TILE
+from servotwin.models.state.records import TILE, record_of
 from servotwin.models.terms.elastic import Elastic
 from servotwin.models.terms.play import Play
 from servotwin.simulation.compile.calls import Call, call_of
@@ -42,10 +42,12 @@ class Store:
         Of lanes that run side by side.
     threads : int
     pool : Executor
+    watched : bool
+        Whether the least voltage of each lane's supply is kept.
     """
 
-    def __init__(self, numbers: LaneNumbers, dtype: str, threads: int, pool: Any) -> None:
-        self._dtype, self._threads, self._pool = dtype, threads, pool
+    def __init__(self, numbers: LaneNumbers, dtype: str, threads: int, pool: Any, watched: bool = False) -> None:
+        self._dtype, self._threads, self._pool, self.watched = dtype, threads, pool, watched
         count = numbers.count
         self.status, self.ended = np.zeros(count, np.int8), np.zeros(count)
         self.work = np.zeros(count)
@@ -57,6 +59,7 @@ class Store:
         self._build(numbers)
         for some in self._buses:
             some.put(np.arange(len(some.which)), numbers.start(some.which, self.command, None), numbers)
+        self.watch(np.arange(count))
 
     def _build(self, numbers: LaneNumbers) -> None:
         self.numbers = numbers
@@ -78,7 +81,7 @@ class Store:
 
     def _kinds_now(self) -> list[SideBySide | OneByOne]:
         numbers = self.numbers
-        kinds = kinds_of(numbers.packed(), self._dtype)
+        kinds = kinds_of(numbers.packed(), self._dtype, watched=self.watched)
         if numbers.supplies.lanes:
             bus_of = numbers.supplies.bus_of
             kinds = [kind._replace(which=kind.which[bus_of[kind.which] < 0]) for kind in kinds]
@@ -155,6 +158,8 @@ class Store:
             point["anchor_time"][common.joined >= 0] = math.inf  # unless their bus is the same as then
         self._put(np.arange(len(self.status)), memories)
         if common is not None and np.array_equal(common.bus_of, self.numbers.supplies.bus_of):
+            for some in self._buses:
+                some.set_lowest(common.shared)
             touched = common.bus_of[others]
             shared = {k: record for k, record in common.shared.items() if k not in touched}
             for some in self._buses:
@@ -166,6 +171,23 @@ class Store:
         memories.rows["chip"]["draws"], memories.firms["draws"] = before.rows["chip"]["draws"], before.firms["draws"]
         self.status[which], self.ended[which], self.work[which] = 0, 0.0, 0.0
         self._put(which, memories)
+        self.watch(which)
+
+    def watch(self, which: Indices) -> None:
+        """Look for the least voltages of lanes' supplies from now on, where they are watched."""
+        for some, places, _ in self._parts(which):
+            if self.watched and not isinstance(some, Tiles):
+                some.watch(places)
+
+    @property
+    def lowest(self) -> NDArray[Any]:
+        """The least voltage of each lane's supply, a record of `models.engine.memory.Lowest` for each."""
+        found = np.zeros(len(self.status), record_of(Lowest))
+        found[:] = NOT_ASKED
+        for some in self.sets:
+            if not isinstance(some, Tiles):
+                found[some.which] = some.lowest
+        return found
 
     def enable(self, which: Indices, torque: Array) -> None:
         """Let torque of some lanes be on (1) or off (0)."""

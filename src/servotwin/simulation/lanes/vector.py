@@ -27,6 +27,7 @@ from servotwin.simulation.lanes.lane_sets import SHAFT
 from servotwin.simulation.lanes.many import real_type
 from servotwin.simulation.lanes.saved import VectorMemory
 from servotwin.simulation.lanes.store import Store
+from servotwin.simulation.lanes.whole_runs import known_lowest
 from servotwin.simulation.start import accuracy_of
 from servotwin.simulation.status import Status
 from servotwin.simulation.workers import memory_limit, own_threads, workers_of
@@ -75,6 +76,8 @@ class VectorSimulator:
         Of all noise; the k-th lane has the seed `seed` + k.
     accuracy : float
         Of what is integrated, as in `Simulator` [rad].
+    watch_supply : bool
+        Whether `lowest_voltage` is kept, for which lanes go from event to event: it takes a few times as long.
 
     Raises
     ------
@@ -95,7 +98,7 @@ class VectorSimulator:
     def __init__(
         self, model: Model, lanes: int, *, load: loads.Load | loads.Part | list[Any] | None = None,
         parameters: Mapping[str, Any] | None = None, bus: Any = None, dtype: DTypeLike = "float64",
-        threads: int | None = None, seed: int = 0, accuracy: float = ACCURACY,
+        threads: int | None = None, seed: int = 0, accuracy: float = ACCURACY, watch_supply: bool = False,
     ) -> None:
         if LAWS.get(type(model), "voltage") == "voltage":
             raise InputError("model of a VectorSimulator", got=model,
@@ -112,7 +115,7 @@ class VectorSimulator:
                              allowed="arrays of one number for each lane")
         self._store = Store(LaneNumbers(inputs, accuracy_of(accuracy), supplies), real_type(dtype),
                             _whole("threads", threads, 1) if threads is not None else workers_of(None),
-                            own_threads(os.getpid()))
+                            own_threads(os.getpid()), bool(watch_supply))
         self._entry: CEntry | None = None
 
     @property
@@ -145,6 +148,27 @@ class VectorSimulator:
         for some in self._store.sets:
             found[some.which] = some.kernel
         return found
+
+    @property
+    def lowest_voltage(self) -> Array:
+        """The least voltage of each lane's supply since its reset, or since `watch` [V], and when it came [s].
+
+        Shape (2, lanes). It is that of all instants, between two calls too; where it lies flat, to 1e-6 V, the time is
+        that of its beginning. nan where nothing is known: of lanes whose supply nobody watches, or that have not moved.
+        """
+        return known_lowest(self._store.lowest).T
+
+    def watch(self, lanes: ArrayLike | None = None) -> None:
+        """Look for the least voltages of some lanes' supplies, or of all, from now on.
+
+        Raises
+        ------
+        InputError
+            If it is not a simulator that watches them.
+        """
+        if not self._store.watched:
+            raise InputError("watch()", got="a simulator without it", allowed="VectorSimulator(..., watch_supply=True)")
+        self._store.watch(pick(lanes, len(self)))
 
     @property
     def failures(self) -> tuple[Failure, ...]:

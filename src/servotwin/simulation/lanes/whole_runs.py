@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from servotwin.models.engine.batch import tiles
 from servotwin.models.engine.batch.tiles import Lanes, Outputs
-from servotwin.models.engine.memory import Memories
+from servotwin.models.engine.memory import NONE_YET, Memories
 from servotwin.models.state.records import room
 from servotwin.simulation.compile import Recipe, kernels
 from servotwin.simulation.lanes.form_recipes import ALL_RUNS, ENDING, KERNELS, last_of, steps_of
@@ -36,7 +36,7 @@ def run(work: Work) -> Raw:
     """Run all lanes of a chunk: side by side where that is possible, one after the other where not."""
     raw, packed, asked = empty_raw(work), work.packed, work.asked
     lanes = packed.columns()
-    for kind in kinds_of(packed, asked.dtype, asked.nearly):
+    for kind in kinds_of(packed, asked.dtype, asked.nearly, asked.watched):
         raw.kernel[kind.which] = KERNELS.index(kind.recipe.name)
         if isinstance(kind, OneByOne):
             run_one_by_one(work, lanes, kind.which, raw, kind.recipe)
@@ -103,6 +103,8 @@ def run_one_by_one(work: Work, lanes: Lanes, which: Indices, raw: Raw, recipe: R
     """Run some lanes one after the other, in float64."""
     memories = nothing_yet(len(which))
     kernels(last_of(recipe)).start(lanes, which, memories)
+    if work.asked.watched:
+        memories.rows["lowest"] = NONE_YET
     durations = np.full(len(which), float(work.asked.duration))
     _finish(work, lanes, which, durations, np.zeros(len(which), np.int64), memories, raw, recipe)
 
@@ -121,6 +123,7 @@ def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: 
             getattr(kernels(one), entry)(lanes, *inputs, *going, *more)
         bad, found = going.status != 0, going.outputs
         raw.status[part], raw.ended[part] = going.status, np.where(bad, ended, work.asked.duration)
+        raw.lowest[part] = known_lowest(memories.rows[some]["lowest"])
         y = memories.rows[some]["point"]["y"]
         raw.final[part] = np.column_stack([y["q"], y["w"], y["T_w"], y["T_h"]])
         failed = bad[:, None] & (times >= ended[:, None])
@@ -130,6 +133,12 @@ def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: 
                 with np.errstate(over="ignore"):
                     own_part = np.where(failed, 0 if name in SMALL_FIELDS else np.nan, found[:, k])
                     raw.fields[name][part] = np.where(ahead, own_part, raw.fields[name][part])
+
+
+def known_lowest(lowest: NDArray[Any]) -> Floats:
+    """Return least voltages [V] and when they came [s], shape (n, 2), from records; nan where nothing is known."""
+    known = np.isfinite(lowest["voltage"])[:, None]
+    return np.where(known, np.column_stack([lowest["voltage"], lowest["time"]]), np.nan)
 
 
 def outputs_of(work: Work, raw: Raw, dtype: str) -> Outputs:

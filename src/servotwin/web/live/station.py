@@ -11,7 +11,7 @@ import numpy as np
 from servotwin.models.engine import log
 from servotwin.models.engine.live import stretch
 from servotwin.models.engine.live.posts import NONE_BEFORE, NOTHING_SAID, Post, put_said
-from servotwin.models.engine.live.screen import COLUMNS, SHOWN, USED, Looks, Screen, Switch, first_look, told_of
+from servotwin.models.engine.live.screen import COLUMNS, NO_LOW, SHOWN, USED, Looks, Screen, Switch, first_look, told_of
 from servotwin.models.state.records import object_of, record_of
 from servotwin.simulation import Simulator
 from servotwin.simulation.engine import Part, Plan, RunLog, State, kernels_of_one, run
@@ -44,6 +44,10 @@ class Endless:
     def __len__(self) -> int:
         """Return more than there ever are."""
         return sys.maxsize
+
+    def cut(self, count: int) -> None:
+        """Leave out rows behind so many: they were written, and then not taken up."""
+        del self.rows[count:]
 
     def __getitem__(self, place: tuple[int, int]) -> float:
         """Return a number."""
@@ -156,12 +160,13 @@ class Station:
         if own is None:
             seen, motions = Endless(), [row for part in parts for row in part.rows]
             stood = stretch.Stood(before.memory, told_of(before.memory, plan.digital))
-            _, post.was = stretch.show(plan.numbers, plan.inputs, motions, len(motions), np.zeros(0), stood, looks.next,
-                                       post.was, looks, post.lines, Screen(seen, Endless(), np.zeros(USED, np.int64)),
-                                       True)
-            return seen.rows
+            used = np.zeros(USED, np.int64)
+            _, post.was, _ = stretch.show(plan.numbers, plan.inputs, motions, len(motions), np.zeros(0), stood,
+                                          looks.next, post.was, NO_LOW, looks, post.lines,
+                                          Screen(seen, Endless(), used), True)
+            return seen.rows[:used[0]]
         rows = np.concatenate([np.asarray(part.rows, record_of(log.Row)) for part in parts])
-        room = int(looks.rate * (looks.until - before.time)) + 2 * len(rows) + 4
+        room = 2 * int(looks.rate * (looks.until - before.time)) + 3 * len(rows) + 4
         found, used = np.empty((room, len(COLUMNS))), np.zeros(USED, np.int64)
         own.shown(plan.plant, plan.compiled.inputs, plan.compiled.stood(before), rows, np.zeros(0), post.was, looks,
                   post.lines, found, used)

@@ -11,7 +11,6 @@ from servotwin.models.engine.dynamics import contacts
 from servotwin.models.engine.memory import (
     SAME,
     Inputs,
-    Memory,
     Point,
     instant,
     memory_at,
@@ -288,8 +287,7 @@ def leave(lanes: Lanes, durations: Floats, first_output: Indices, memories: Memo
         t = tile.clock.tick[j] * firmware.T_c + firmware.t_phi
         gone = (frames * memory.beat + t) - (origin_of(memory) + memory.point.time)
         point = Point(t, here, Mode(0, 0, RIGID, 0, 0), math.inf, here, memory.point.step, q)
-        put_memory(memories.rows[k], Memory(frames, memory.beat, point, memory.chip, memory.u, memory.u_end,
-                                            memory.tau, memory.tau_end, memory.firm))
+        put_memory(memories.rows[k], memory._replace(frames=frames, point=point))
         durations[k] = 0.0 if tile.clock.last[j] > 0.0 else max(durations[k] - gone, 0.0)
         first_output[k] = tile.place.output[j]
         status[k] = UNDERWAY

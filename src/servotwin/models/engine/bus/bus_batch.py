@@ -10,11 +10,20 @@ from servotwin.models.engine.batch.tiles import chip_of
 from servotwin.models.engine.batch.tiles import numbers_of as numbers_at
 from servotwin.models.engine.bus import bus_unit, coupled_ticks, event_queue, shared_source
 from servotwin.models.engine.bus.bus_inputs import Tables, Told, inputs_at
-from servotwin.models.engine.bus.bus_records import drive_of, numbers_of, put_numbers, put_point, put_vector, source_of
+from servotwin.models.engine.bus.bus_records import (
+    drive_of,
+    lowest_of,
+    numbers_of,
+    put_numbers,
+    put_point,
+    put_vector,
+    source_of,
+)
 from servotwin.models.engine.bus.coupled_motion import APART
 from servotwin.models.engine.bus.coupled_units import put_unit_numbers, unit_state
 from servotwin.models.engine.bus.event_log import Tape, runs
 from servotwin.models.engine.cosim.observe_batch import put
+from servotwin.models.engine.lowest import asked
 from servotwin.models.engine.memory import (
     FRAMES,
     Memories,
@@ -83,7 +92,7 @@ def _go_on(told: Told, buses: Buses, k: int, count: int, duration: float, until:
         if paused:
             controller.resume(inputs_at(told, seat), bus_unit.memory_in(seat, firms))
         seat.until = seat.point.time + duration if until == math.inf else until - seat.origin
-    if not runs(written):
+    if not runs(written) and not asked(lowest_of(buses.shared[k].lowest)):
         _from_tick_to_tick(told, firms, count, buses.shared[k], seats, units, common)
     status, when = event_queue.through(told, firms, count, buses.shared[k], seats, mates, written)
     for n in range(count):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.models.engine.memory import Point
+from servotwin.models.engine.memory import Lowest, Point
 from servotwin.models.engine.motions.dormand_prince import NUMBERS
 from servotwin.models.state.modes import Mode, Vector
 from servotwin.models.state.records import record_reader, record_writer
@@ -141,6 +141,7 @@ class Shared(NamedTuple):
     length: float
     end: float
     source: Source
+    lowest: Lowest  # voltage of the source, by the time since the start
 
 
 numbers_of = record_reader("numbers_of", Numbers)
@@ -161,6 +162,8 @@ put_law = record_writer("put_law", Linear)
 put_track = record_writer("put_track", Track)
 put_shared = record_writer("put_shared", Shared)
 source_of = record_reader("source_of", Source)
+lowest_of = record_reader("lowest_of", Lowest)
+put_lowest = record_writer("put_lowest", Lowest)
 
 
 def drive_of(seat: Any) -> float:

@@ -30,8 +30,9 @@ from servotwin.models.engine.bus.bus_records import (
     put_vector,
     vector_of,
 )
-from servotwin.models.engine.memory import Inputs, Memory, Point, since
+from servotwin.models.engine.memory import NOT_ASKED, Inputs, Memory, Point, since
 from servotwin.models.engine.motions import choice, motion
+from servotwin.models.engine.motions.motion import Motion
 from servotwin.models.state.modes import Mode
 from servotwin.models.terms import duty, firmware, frame
 from servotwin.models.terms.chip import Chip
@@ -69,7 +70,7 @@ def remember(seat: Any, memory: Memory) -> None:
 def memory_in(seat: Any, firms: Any) -> Memory:
     """Return what a servo remembers, with what its program does, of those of all, by reference."""
     return Memory(seat.frames, seat.beat, point_of(seat.point), decided_of(seat.decided), piece_of(seat.u), seat.u_end,
-                  piece_of(seat.tau), seat.tau_end, firms[seat.place:seat.place + 1])
+                  piece_of(seat.tau), seat.tau_end, NOT_ASKED, firms[seat.place:seat.place + 1])
 
 
 def begin(seat: Any, first: float, end: float) -> None:
@@ -193,12 +194,16 @@ def point_now(seat: Any, shared: Any, mates: Any, time: float) -> Point:
     if seat.joined >= 0:
         y = coupled_motion.state_at(shared, mates[seat.joined], time - shared.begin)
     else:
-        numbers = numbers_now(seat)
-        u = source(seat, numbers)
-        m = motion.prepared(choice.begin(numbers, p.mode, u, tau_by(seat, seat.origin), p.anchor_time, p.anchor,
-                                         p.step, seat.limit - p.anchor_time, seat.accuracy))
+        m = motion.prepared(motion_of(seat))
         y = motion.ended(m, t - m.t0)
     return Point(t, y, p.mode, p.anchor_time, p.anchor, p.step, wiper_of(seat, y.q))
+
+
+def motion_of(seat: Any) -> Motion:
+    """Return the motion of a servo that moves on its own."""
+    p, numbers = point_of(seat.point), numbers_now(seat)
+    return choice.begin(numbers, p.mode, source(seat, numbers), tau_by(seat, seat.origin), p.anchor_time, p.anchor,
+                        p.step, seat.limit - p.anchor_time, seat.accuracy)
 
 
 def wiper_of(seat: Any, q: float) -> float:

@@ -22,7 +22,8 @@ from servotwin.models.engine.bus.bus_records import (
 from servotwin.models.engine.bus.coupled_step import turns
 from servotwin.models.engine.dynamics import contacts
 from servotwin.models.engine.events import crossings, guards
-from servotwin.models.engine.memory import FIRST_STEP
+from servotwin.models.engine.lowest import ROUNDS, lower
+from servotwin.models.engine.memory import FIRST_STEP, FLAT, NOT_ASKED, Lowest
 from servotwin.models.engine.motions import stribeck
 from servotwin.models.engine.motions.motion import LONG_STEP
 from servotwin.models.state.modes import BACKWARD, FORWARD, NO_CURRENT, RIGID, STUCK, Mode, Vector, sign_of
@@ -38,6 +39,7 @@ _NEAR, _TURNINGS = 1e-6, 24  # of the time between two looks: to tell whether a 
 _MOST_SERIES = 1e6  # one after the other
 _LOOKS = (0.25, 0.5, 0.75, 1.0)  # parts of a motion at which its guards are looked at
 _SOURCE_GUARDS = 2
+_PARTS = 8  # of a common motion: it is short beside what happens in it
 
 # They move each on its own, in common, or a common motion has just ended.
 APART, TOGETHER, ENDED = range(3)
@@ -46,7 +48,7 @@ APART, TOGETHER, ENDED = range(3)
 def at_start(source: Source) -> Shared:
     """Return what servos on a source remember when none has moved yet."""
     return Shared(APART, shared_source.FOLLOWING, 1, -1, -1, 0, coupled_step.BY_SERIES, 0, source.V, FIRST_STEP, 0.0,
-                  0.0, math.inf, source)
+                  0.0, math.inf, source, NOT_ASKED)
 
 
 def begin(shared: Any, mates: Any, time: float, limit: float, same: bool) -> None:
@@ -299,6 +301,49 @@ def look(shared: Any, mates: Any, s: float) -> None:
     """Put all mates where they are at s [s] after the beginning."""
     for k in range(shared.members):
         put_vector(mates[k].y, state_at(shared, mates[k], s))
+
+
+def lowest_between(lowest: Lowest, shared: Any, mates: Any, origin: float, a: float, b: float) -> Lowest:
+    """Return the least voltage of the bus after a common motion has gone on, from a to b [s] after its beginning.
+
+    Its times are those since `origin` [s].
+    """
+    step, here, slack = (b - a) / _PARTS, _voltage_at(shared, mates, a), 0.0
+    before, least, at = here, here, a
+    for n in range(1, _PARTS + 1):
+        before, here = here, _voltage_at(shared, mates, a + n * step)
+        slack = max(slack, abs(here - before))
+        if here < least:
+            least, at = here, a + n * step
+    if least - slack < lowest.voltage:
+        low, high = max(at - step, a), min(at + step, b)
+        for _ in range(ROUNDS):
+            third = (high - low) / 3.0
+            one = _voltage_at(shared, mates, low + third)
+            other = _voltage_at(shared, mates, high - third)
+            if one < other:
+                high -= third
+            else:
+                low += third
+        other = _voltage_at(shared, mates, 0.5 * (low + high))
+        if other < least:
+            least, at = other, 0.5 * (low + high)
+    if not least < lowest.level - FLAT:
+        return lower(lowest, least, origin + at)
+    low, high = a, at
+    for _ in range(ROUNDS):  # to when it has fallen so far
+        middle = 0.5 * (low + high)
+        if _voltage_at(shared, mates, middle) <= least + FLAT:
+            high = middle
+        else:
+            low = middle
+    return Lowest(least, least, origin + high)
+
+
+def _voltage_at(shared: Any, mates: Any, s: float) -> float:
+    """Return V_bus [V] at s [s] after the beginning."""
+    look(shared, mates, s)
+    return shared_source.bus_voltage(source_of(shared.source), shared.state, mates, shared.members)
 
 
 def arrive(shared: Any, mates: Any) -> Mode:

@@ -16,10 +16,12 @@ from servotwin.models.engine.bus.bus_records import (
     chip_of,
     decided_of,
     drive_of,
+    lowest_of,
     mode_of,
     numbers_of,
     piece_of,
     point_of,
+    put_lowest,
     put_mode,
     put_piece,
     put_vector,
@@ -29,10 +31,12 @@ from servotwin.models.engine.bus.bus_records import (
 from servotwin.models.engine.bus.coupled_motion import APART, ENDED, TOGETHER
 from servotwin.models.engine.bus.event_log import Tape
 from servotwin.models.engine.dynamics import currents
+from servotwin.models.engine.lowest import asked, followed, lower
 from servotwin.models.engine.memory import (
     FRAMES,
     SAME,
     Inputs,
+    Lowest,
     Point,
     counted_anew,
     due,
@@ -112,6 +116,8 @@ def run(told: Any, firms: Any, count: int, shared: Any, seats: Any, mates: Any, 
         if status != COMPLETED:
             return status, time
         following = next_time(count, shared, seats, until)
+        if asked(lowest_of(shared.lowest)) and following > time:
+            put_lowest(shared.lowest, lowest_until(count, shared, seats, mates, time, following))
         idle = idle + 1 if following == time else 0
         if idle > MOST_IDLE * count:
             return CHATTER, time
@@ -146,6 +152,22 @@ def next_time(count: int, shared: Any, seats: Any, until: float) -> float:
         arrival = seats[j].arrival
         following = min(following, arrival if bus_unit.is_known(arrival) else seats[j].due)
     return float(following)
+
+
+def lowest_until(count: int, shared: Any, seats: Any, mates: Any, time: float, following: float) -> Lowest:
+    """Return the least voltage of the bus after it has gone on from a time to the following, by its clock [s]."""
+    lowest, origin, connected = lowest_of(shared.lowest), seats[0].origin, -1
+    if shared.phase == TOGETHER:
+        return coupled_motion.lowest_between(lowest, shared, mates, origin + shared.begin, time - shared.begin,
+                                             following - shared.begin)
+    for j in range(count):
+        connected = j if bus_unit.is_connected(seats[j]) else connected
+    if connected < 0:
+        return lower(lowest, source_of(shared.source).V, origin + time)
+    seat = seats[connected]
+    share = duty.share_of(seat.numbers.bridge, seat.shown.duty) if duty.present(seat.numbers.bridge) else 1.0
+    m = bus_unit.motion_of(seat)
+    return followed(lowest, m, share, origin + time - seat.clock, seat.clock, seat.clock + (following - time))
 
 
 def come(count: int, shared: Any, seats: Any, mates: Any, written: Tape, time: float, until: float) -> int:

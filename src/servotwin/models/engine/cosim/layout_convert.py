@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from servotwin.models.engine.memory import BEAT, NOTHING, SAME, Memory, Point
+from servotwin.models.engine.memory import BEAT, NOT_ASKED, NOTHING, SAME, Memory, Point
 from servotwin.models.state.modes import INSIDE, ON_BACKWARD, ON_FORWARD, RIGID, Mode, Vector
 from servotwin.models.terms.control import Programs
 from servotwin.models.terms.frame import Decision, Frame
@@ -32,7 +32,7 @@ def remembered(tile: Any, j: int, firm: Programs) -> Memory:
     wiper = 1.0 * servo.wiper[j] if tile.hung.half_slack[j] > 0.0 else q
     point = Point(now, y, Mode(0, 0, mesh, 0, 0), math.inf, y, 1.0 * servo.step[j], wiper)
     return Memory(number if regular else 0, clock.period[j] if regular else BEAT, point, chip, NOTHING, math.inf,
-                  NOTHING, math.inf, firm)
+                  NOTHING, math.inf, NOT_ASKED, firm)
 
 
 def put_beside(memory: Memory, period: float, tile: Any, j: int) -> None:

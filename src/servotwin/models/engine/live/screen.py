@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.models.engine.events import kinds
 from servotwin.models.engine.log import Row
-from servotwin.models.engine.memory import Inputs, Memory, in_force
+from servotwin.models.engine.memory import FLAT, Inputs, Memory, in_force
 from servotwin.models.engine.observe import Observed, observed, told_by
 from servotwin.models.state.modes import Mode, Vector
 from servotwin.models.terms import duty
@@ -72,6 +72,16 @@ class Looks(NamedTuple):
     until: float
     at_end: int  # 1: at `until`, too
     switches: int  # 1: just before and just after a bridge switches, too
+
+
+class Low(NamedTuple):
+    """The least voltage of a supply since the latest look [V], and whether a row of it stands behind those used (1)."""
+
+    voltage: float
+    pending: int
+
+
+NO_LOW = Low(math.inf, 0)
 
 
 def first_look(start: float, rate: float) -> int:
@@ -144,6 +154,12 @@ def note(screen: Screen, time: float, code: int) -> None:
     if n < len(screen.events) and not kinds.is_usual(code):
         screen.events[n, 0], screen.events[n, 1] = time, 1.0 * code
         screen.used[1] = n + 1
+
+
+def taken_up(screen: Screen, low: Low, voltage: float) -> None:
+    """Count the row of the least voltage where it lies below another one, too, that comes next [V]."""
+    if low.pending > 0 and low.voltage < voltage - FLAT and screen.used[0] < len(screen.rows) - 1:
+        screen.used[0] += 1
 
 
 def is_before(time: float, end: float, program: bool) -> bool:

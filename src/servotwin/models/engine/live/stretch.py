@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.models.engine.at import motion_of, row_at
 from servotwin.models.engine.live.screen import LEFT as STEPS_LEFT
 from servotwin.models.engine.live.screen import (
     NEXT,
+    NO_LOW,
     TOO_LONG,
     Lines,
     Looks,
+    Low,
     Said,
     Screen,
     Switch,
@@ -18,17 +21,19 @@ from servotwin.models.engine.live.screen import (
     note,
     said_by,
     switch_of,
+    taken_up,
     told_of,
     write,
 )
 from servotwin.models.engine.log import ALL, BEGUN, EVENTS, KEEPS, LEFT, MOTIONS, PAUSED, Log, Row
-from servotwin.models.engine.memory import Inputs, Memories, Memory, memory_at, origin_of, time_of
+from servotwin.models.engine.lowest import lowest_on, voltage_at
+from servotwin.models.engine.memory import FLAT, Inputs, Memories, Memory, memory_at, origin_of, time_of
 from servotwin.models.engine.motions import motion
 from servotwin.models.engine.motions.motion import Motion
 from servotwin.models.engine.run import plant_of, run
 from servotwin.models.engine.runs import as_now, mode_under, told
 from servotwin.models.engine.step import COMPLETED, at_pulses
-from servotwin.models.terms import duty, firmware
+from servotwin.models.terms import duty, firmware, source
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.chip import present as pulsed_chip
 from servotwin.models.terms.numbers import Numbers, warm
@@ -56,7 +61,7 @@ def go_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, changed:
     before. After a status that is not `COMPLETED` the memory is that of before what went wrong.
     """
     program, begins, status, k = firmware.present(inputs.firmware[0]), True, PAUSED, looks.next
-    stood = Stood(memory, told_of(memory, program))
+    stood, low = Stood(memory, told_of(memory, program)), NO_LOW
     log.counts[KEEPS], log.counts[BEGUN] = ALL, 0
     while status == PAUSED:
         most = min(AT_ONCE, screen.used[STEPS_LEFT]) if screen.used[STEPS_LEFT] > 0 else AT_ONCE
@@ -67,8 +72,8 @@ def go_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, changed:
             screen.used[STEPS_LEFT] -= most - max(log.counts[LEFT], 0)
             if screen.used[STEPS_LEFT] == 0 and status == PAUSED:
                 status = TOO_LONG
-        k, was = show(numbers, inputs, log.motions, log.counts[MOTIONS], log.numbers, stood, k, was, looks, lines,
-                      screen, status == COMPLETED)
+        k, was, low = show(numbers, inputs, log.motions, log.counts[MOTIONS], log.numbers, stood, k, was, low, looks,
+                           lines, screen, status == COMPLETED)
         for n in range(log.counts[EVENTS]):
             note(screen, log.events[n].time, log.events[n].kind)
         stood = Stood(memory, told_of(memory, program))
@@ -77,8 +82,8 @@ def go_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, changed:
 
 
 def show(numbers: Numbers, inputs: Inputs, rows: Any, count: int, shared: Floats, stood: Stood, k: int, was: Switch,
-         looks: Looks, lines: Lines, screen: Screen, ends: bool) -> tuple[int, Switch]:
-    """Write what shows of motions; return the number of the next look, and how the bridge drives at their end.
+         low: Low, looks: Looks, lines: Lines, screen: Screen, ends: bool) -> tuple[int, Switch, Low]:
+    """Write what shows of motions; return the number of the next look, how the bridge drives at their end, and `low`.
 
     Parameters
     ----------
@@ -92,12 +97,15 @@ def show(numbers: Numbers, inputs: Inputs, rows: Any, count: int, shared: Floats
         Number of the next look.
     was : Switch
         How its bridge drove before them.
+    low : Low
+        Of its supply before them.
     looks, lines, screen
     ends : bool
         Whether the last of them ends at `looks.until`.
     """
     if count == 0:
-        return k, was
+        return k, was, low
+    falls = looks.switches == 1 and source.falls(numbers.source)
     program = firmware.present(inputs.firmware[0])
     row = row_at(rows, 0)
     m = motion_of(numbers, row, shared, inputs.accuracy)
@@ -109,18 +117,34 @@ def show(numbers: Numbers, inputs: Inputs, rows: Any, count: int, shared: Floats
             now, start = switch_of(said_by(row)), row.origin + row.start
             if looks.switches == 1 and now != was and was.silent >= 0:
                 if n == 0:
+                    taken_up(screen, low, math.inf)
                     _see_stood(screen, lines, inputs, numbers, stood)
                 else:
+                    if falls:
+                        taken_up(screen, low, _voltage(before, m_before, before.origin + before.end))
                     m_before = _see(screen, lines, inputs, before, m_before, before.origin + before.end)
                 m = _see(screen, lines, inputs, row, m, start)
+                low = Low(_voltage(row, m, start), 0) if falls else low
                 k = k if is_before(start, k / looks.rate, program) else k + 1
             was = now
-            time = k / looks.rate
+            if falls and low.voltage == math.inf:
+                low = Low(_voltage(row, m, start), 0)
+            time, seen = k / looks.rate, start
             while time < looks.until and is_before(time, row.origin + row.end, program):
+                if falls:
+                    m, low = _lowered(screen, lines, inputs, row, m, seen, time, low)
+                    voltage = _voltage(row, m, time)
+                    taken_up(screen, low, voltage)
+                    low, seen = Low(voltage, 0), time
                 m = _see(screen, lines, inputs, row, m, time)
                 k += 1
                 time = k / looks.rate
+            if falls:
+                m, low = _lowered(screen, lines, inputs, row, m, seen, row.origin + row.end, low)
     if ends:
+        if falls:
+            taken_up(screen, low, _voltage(row, m, row.origin + row.end))
+            low = NO_LOW
         time = k / looks.rate
         while time < looks.until and (looks.at_end == 1 or not program):  # next to the end
             m = _see(screen, lines, inputs, row, m, time)
@@ -128,7 +152,32 @@ def show(numbers: Numbers, inputs: Inputs, rows: Any, count: int, shared: Floats
             time = k / looks.rate
         if looks.at_end == 1:
             _see(screen, lines, inputs, row, m, looks.until)
-    return k, was
+    return k, was, low
+
+
+def _voltage(row: Row, m: Motion, time: float) -> float:
+    """Return the voltage of the supply at a time [s] of a motion."""
+    m = motion.prepared(m)
+    return voltage_at(m, _share(row, m), time - row.origin - m.t0)
+
+
+def _share(row: Row, m: Motion) -> float:
+    """Return how much of the supply's voltage there is at the bridge."""
+    return duty.share_of(m.numbers.bridge, row.duty) if duty.present(m.numbers.bridge) else 1.0
+
+
+def _lowered(screen: Screen, lines: Lines, inputs: Inputs, row: Row, m: Motion, start: float, end: float,
+             low: Low) -> tuple[Motion, Low]:
+    """Return a motion and the least voltage after it has gone on between two times [s]; a row of it is written."""
+    if not end > start:
+        return m, low
+    m, begun = motion.prepared(m), row.origin + m.t0
+    voltage, age = lowest_on(m, _share(row, m), start - begun, end - begun, low.voltage)
+    if not voltage < low.voltage - FLAT or screen.used[0] >= len(screen.rows) - 1:
+        return m, low
+    m = _see(screen, lines, inputs, row, m, begun + age)
+    screen.used[0] -= 1
+    return m, Low(voltage, 1)
 
 
 def shown(plants: Any, inputs: Inputs, memories: Memories, rows: Any, shared: Floats, was: Switch, looks: Looks,
@@ -136,7 +185,7 @@ def shown(plants: Any, inputs: Inputs, memories: Memories, rows: Any, shared: Fl
     """Write what shows of all motions of a servo since it stood as its memory says; `found` has room for rows."""
     plant, memory = plant_of(plants[0]), memory_at(memories, 0)
     stood = Stood(memory, told_of(memory, firmware.present(inputs.firmware[0])))
-    show(plant.numbers, inputs, rows, len(rows), shared, stood, looks.next, was, looks, lines,
+    show(plant.numbers, inputs, rows, len(rows), shared, stood, looks.next, was, NO_LOW, looks, lines,
          Screen(found, found, used), True)
 
 

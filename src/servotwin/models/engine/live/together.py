@@ -15,27 +15,33 @@ from servotwin.models.engine.live.posts import lines_of, put_said, said_of
 from servotwin.models.engine.live.screen import (
     LEFT,
     NEXT,
+    NO_LOW,
     TOO_LONG,
     USED,
     Looks,
+    Low,
     Said,
     Screen,
     note,
     said_by,
     switch_of,
+    taken_up,
     write,
 )
 from servotwin.models.engine.log import Row
+from servotwin.models.engine.lowest import ROUNDS
+from servotwin.models.engine.memory import FLAT
 from servotwin.models.engine.motions import motion
 from servotwin.models.engine.observe import on_bus
 from servotwin.models.engine.step import COMPLETED, at_pulses
 from servotwin.models.state.modes import Mode, Vector
-from servotwin.models.terms import duty
+from servotwin.models.terms import duty, source
 from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.models.terms.sensor import wiper_at
 from servotwin.physics.pieces import piece_value
 
 PLAIN = True  # the compiler takes it for False
+_NEAR = 1e-6  # of the time between two looks: to tell whether the voltage falls
 _LATE = 1.0 + 1e-12  # of an instant: so much before a tick it is the tick
 
 
@@ -46,7 +52,7 @@ def go_on(told: Any, posts: Any, firms: Any, shared: Any, seats: Any, mates: Any
     Servos have their seats and remember where they stand; what they are `told` is found by `inputs_at`. The tape has
     room for what servos do at once.
     """
-    k, status = looks.next, event_queue.PAUSED
+    k, status, low = looks.next, event_queue.PAUSED, NO_LOW
     for j in range(len(posts)):
         seats[j].until = looks.until - seats[j].origin
     while status == event_queue.PAUSED:
@@ -57,7 +63,8 @@ def go_on(told: Any, posts: Any, firms: Any, shared: Any, seats: Any, mates: Any
             if used[LEFT] == 0 and status == event_queue.PAUSED:
                 status = TOO_LONG
         if written.used[0] > 0:
-            k = _show(told, posts, shared, seats, mates, looks, written, k, status == COMPLETED, rows, events, used)
+            k, low = _show(told, posts, shared, seats, mates, looks, written, k, low, status == COMPLETED, rows, events,
+                           used)
         _note_all(written, events, rows, used)
         if PLAIN:
             rows[0].tell(when)
@@ -66,10 +73,10 @@ def go_on(told: Any, posts: Any, firms: Any, shared: Any, seats: Any, mates: Any
     return status
 
 
-def _show(told: Any, posts: Any, shared: Any, seats: Any, mates: Any, looks: Looks, written: Tape, k: int, ends: bool,
-          rows: Any, events: Any, used: Any) -> int:
-    """Write what shows of all motions of a tape; return the number of the next look."""
-    late = 1.0
+def _show(told: Any, posts: Any, shared: Any, seats: Any, mates: Any, looks: Looks, written: Tape, k: int, low: Low,
+          ends: bool, rows: Any, events: Any, used: Any) -> tuple[int, Low]:
+    """Write what shows of all motions of a tape; return the number of the next look, and the least voltage since."""
+    falls, late, seen = looks.switches == 1 and source.falls(source_of(shared.source)), 1.0, 0.0
     for j in range(len(posts)):
         posts[j].row = -1
         late = _LATE if duty.present(seats[j].numbers.bridge) else late
@@ -79,19 +86,35 @@ def _show(told: Any, posts: Any, shared: Any, seats: Any, mates: Any, looks: Loo
         begins = _next_begin(written, posts)
         time = k / looks.rate
         if posts[0].row >= 0 and time * late < min(begins, end) and time < looks.until:
+            if falls:
+                low = _lowered(told, posts, shared, seats, mates, written, seen, time, low, rows, events, used)
+                low = _taken_up(posts, shared, seats, mates, written, time, False, low, rows, events, used)
+                seen = time
             _see_all(told, posts, shared, seats, mates, written, time, time, False, rows, events, used)
             k += 1
         elif begins < math.inf:
+            if falls and posts[0].row >= 0:
+                low = _lowered(told, posts, shared, seats, mates, written, seen, begins, low, rows, events, used)
             switched = _enter(written, posts, begins)
             if switched and looks.switches == 1:
+                if falls:
+                    low = _taken_up(posts, shared, seats, mates, written, begins, True, low, rows, events, used)
                 _see_all(told, posts, shared, seats, mates, written, begins, begins, True, rows, events, used)
             _take_over(written, posts)
             if switched and looks.switches == 1:
                 _see_all(told, posts, shared, seats, mates, written, begins, begins, False, rows, events, used)
+                low = NO_LOW
                 k = k + 1 if k / looks.rate <= begins * late else k
+            if falls and low.voltage == math.inf:
+                low = Low(_voltage(posts, shared, seats, mates, written, begins, False), 0)
+            seen = begins
         else:
             going = False
+    if falls:
+        low = _lowered(told, posts, shared, seats, mates, written, seen, end, low, rows, events, used)
     if ends:
+        if falls:
+            low = _taken_up(posts, shared, seats, mates, written, end, False, low, rows, events, used)
         time = k / looks.rate
         while time < looks.until and (looks.at_end == 1 or late == 1.0):  # next to the end
             _see_all(told, posts, shared, seats, mates, written, end, time, False, rows, events, used)
@@ -99,7 +122,49 @@ def _show(told: Any, posts: Any, shared: Any, seats: Any, mates: Any, looks: Loo
             time = k / looks.rate
         if looks.at_end == 1:
             _see_all(told, posts, shared, seats, mates, written, end, looks.until, False, rows, events, used)
-    return k
+    return k, low
+
+
+def _lowered(told: Any, posts: Any, shared: Any, seats: Any, mates: Any, written: Tape, a: float, b: float, low: Low,
+             rows: Any, events: Any, used: Any) -> Low:
+    """Return the least voltage after all have gone on between two times [s]; rows of it are written.
+
+    It lies between them where it falls at the first and rises at the other.
+    """
+    if not b > a:
+        return low
+    least, at, near = _voltage(posts, shared, seats, mates, written, a, False), a, _NEAR * (b - a)
+    last = _voltage(posts, shared, seats, mates, written, b, False)
+    after = _voltage(posts, shared, seats, mates, written, a + near, False)
+    before = _voltage(posts, shared, seats, mates, written, b - near, False)
+    if after < least and before < last:
+        first, end = a, b
+        for _ in range(ROUNDS):
+            third = (end - first) / 3.0
+            after = _voltage(posts, shared, seats, mates, written, first + third, False)
+            before = _voltage(posts, shared, seats, mates, written, end - third, False)
+            if after < before:
+                end -= third
+            else:
+                first += third
+        least, at = min(after, before), 0.5 * (first + end)
+    elif last < least:
+        least, at = last, b
+    if not least < low.voltage - FLAT or used[0] >= len(rows[0]) - 1:
+        return low
+    _see_all(told, posts, shared, seats, mates, written, at, at, False, rows, events, used)
+    for j in range(len(posts)):
+        used[USED * j] -= 1
+    return Low(least, 1)
+
+
+def _taken_up(posts: Any, shared: Any, seats: Any, mates: Any, written: Tape, time: float, earlier: bool, low: Low,
+              rows: Any, events: Any, used: Any) -> Low:
+    """Count the rows of the least voltage where it is below that of a look at a time [s]; return how it goes on."""
+    voltage = _voltage(posts, shared, seats, mates, written, time, earlier)
+    for j in range(len(posts)):
+        taken_up(Screen(rows[j], events[j], used[USED * j:USED * j + USED]), low, voltage)
+    return Low(voltage, 0)
 
 
 def _following(written: Tape, j: int, n: int) -> int:
@@ -166,7 +231,7 @@ def _now(numbers: Numbers, said: Said) -> Numbers:
 
 def _voltage(posts: Any, shared: Any, seats: Any, mates: Any, written: Tape, time: float, earlier: bool) -> float:
     """Return the voltage of the supply at a time [s], from where all servos stand; mates beyond theirs are used."""
-    count, connected, source = len(posts), 0, source_of(shared.source)
+    count, connected, supply = len(posts), 0, source_of(shared.source)
     for j in range(count):
         row, numbers = row_at(written.motions, posts[j].row), numbers_of(seats[j].numbers)
         said, y = _said_in(posts[j], row, earlier), _state_in(numbers, row, written.numbers, seats[j].accuracy, time)
@@ -178,7 +243,7 @@ def _voltage(posts: Any, shared: Any, seats: Any, mates: Any, written: Tape, tim
             mate.sign = shared_source.part_on_bus(said.drive, numbers.bridge, said.duty, y)
             mate.returns = 1 if said.drive == 0.0 else 0
             connected += 1
-    return shared_source.put_in_zones(source, mates[count:], connected, source.V)[1]
+    return shared_source.put_in_zones(supply, mates[count:], connected, supply.V)[1]
 
 
 def _see_all(told: Any, posts: Any, shared: Any, seats: Any, mates: Any, written: Tape, time: float, shown_at: float,

@@ -43,6 +43,8 @@ from servotwin.physics.pieces import Piece, piece_rate, piece_value
 
 _TURN = 2.0 * math.pi
 _GONE = 2.0  # times that of what fades fast: most of it is over
+_SETTLING, _FADING = 4.0, 3.0  # times in which a creep settles, or friction fades, that an interval may last
+_NOTHING, _TIMES = 1e-15, 3.0  # A, what is left of a current; of 1/rate: an interval in which it fades
 FINE = 1e-3  # error of one explicit step, relative to 1 + |state|: a part of the accuracy asked for
 _ORIGIN = (0.0, 0.0, 0.0)
 NO_STAGES = (_ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN)
@@ -277,6 +279,25 @@ def scales(motion: Motion) -> tuple[float, float]:
     if a * a >= c:
         return 1.0 / rate, 40.0 / rate
     return 1.0 / rate, 45.0 / a if a > 0.0 else math.inf
+
+
+def fine_scales(m: Motion) -> tuple[float, float]:
+    """Return `scales`; of a creep, which may be long, the time in which its speed would change at most.
+
+    Of a step of a servo that warms up, those of the current that fades, as long as anything is left of it.
+    """
+    fine, settled = scales(m)
+    if m.kind == WARMING:
+        m = prepared(m)
+        fast, left = m.long_dense[5].w, abs(m.long_dense[6].q_m) / _NOTHING
+        return (_TIMES / fast, math.log(left) / fast) if fast > 0.0 and left > 1.0 else (fine, settled)
+    if m.kind != CREEP:
+        return fine, settled
+    most = max(abs(rates(m, 0.0, m.start).w), abs(rates(m, m.length, m.end).w))
+    change = abs(m.end.w - m.start.w)
+    change = min(_SETTLING * change, _FADING * m.numbers.friction.w_s)
+    fine = min(fine, change / most) if change > 0.0 else fine
+    return fine, 10.0 * fine
 
 
 def periodic(u: Piece, tau: Piece) -> bool:
