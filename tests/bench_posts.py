@@ -9,6 +9,7 @@ from servotwin import signals
 from servotwin.errors import ServotwinError
 from servotwin.models import DigitalServo
 from servotwin.models.engine.live.posts import NONE_BEFORE, NOTHING_SAID, Follow, Post
+from servotwin.models.engine.live.screen import NO_LOW
 from servotwin.models.engine.memory import ACCURACY
 from servotwin.models.switched import SwitchedServo
 from servotwin.models.terms.chip import NO_CHIP
@@ -35,7 +36,7 @@ def post_of(model: Model, load: Load, seed: int = 0) -> Post:
             for angle in map(model.start_angle, _extremes(model))]
     return Post(
         numbers=model.pack(load), chip=model.chip() or NO_CHIP, lines=lines_of(model), width=follow_of(model, "us"),
-        angle=follow_of(model, "deg"), voltage=follow_of(model, "V"), was=NONE_BEFORE,
+        angle=follow_of(model, "deg"), voltage=follow_of(model, "V"), was=NONE_BEFORE, low=NO_LOW,
         lowest=min(ends), highest=max(ends), torque=load.torque, push=0.0, sent=0.0, accuracy=ACCURACY, seed=seed,
         pulsed=int(pulsed(model)), changed=1, command_first=0, command_count=0, curve_first=0, curve_count=0, heard=0,
         said=NOTHING_SAID, zone=0, contact=0, mesh=0, motor=0, share=0, row=0)

@@ -10,7 +10,8 @@ import numpy as np
 from servotwin.errors import InputError
 from servotwin.models.engine import controller
 from servotwin.models.engine.live import together
-from servotwin.models.engine.live.screen import NEXT, USED, Looks
+from servotwin.models.engine.live.posts import put_low
+from servotwin.models.engine.live.screen import NEXT, NO_LOW, USED, Looks
 from servotwin.models.engine.step import COMPLETED, DIVERGED
 from servotwin.models.terms import control
 from servotwin.models.terms.source import Source
@@ -73,6 +74,7 @@ class BusSteps:
         way = self._begun(source, plans, states)
         used = np.zeros(USED * len(plans), np.int64)
         used[NEXT] = looks.next
+        put_low(self._posts[0].low, NO_LOW)
         firms = way.seated()
         try:
             status = together.go_on(way.inputs, self._posts, firms, way.shared, way.seats, way.mates, looks, self._tape,

@@ -6,7 +6,7 @@ import pytest
 import servotwin as st
 from servotwin.models.engine.live import stretch
 from servotwin.models.engine.live.posts import NONE_BEFORE
-from servotwin.models.engine.live.screen import COLUMNS, USED, Looks, Screen
+from servotwin.models.engine.live.screen import COLUMNS, NO_LOW, USED, Looks, Screen
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.terms import control
 from servotwin.simulation.engine import RunLog
@@ -37,7 +37,7 @@ def rows_of(kind, servo, values, load, rate, switches):
         Endless(), Endless(), np.zeros(USED, np.int64))
     if plan.digital:
         memory = memory._replace(firm=(control.thawed(memory.firm[0]),))
-    _, _, status = stretch.go_on(plan.numbers, plan.chip, plan.inputs, memory, True, NONE_BEFORE,
+    _, _, _, status = stretch.go_on(plan.numbers, plan.chip, plan.inputs, memory, True, NONE_BEFORE, NO_LOW,
                                  Looks(1, rate, 0.4, 1, switches), lines_of(model), screen, RunLog().lists)
     assert status == COMPLETED
     return result, dict(zip(COLUMNS, np.array(screen.rows.rows).T, strict=True)), names_of(model, sim.load)

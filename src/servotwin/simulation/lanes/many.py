@@ -91,7 +91,7 @@ def simulate_many(
     accuracy : float
         As in `simulate` [rad].
     watch_supply : bool
-        Whether `Batch.lowest_voltage` is kept, for which lanes go from event to event: it takes a few times as long.
+        Whether `Batch.lowest_voltage` is kept, for which lanes go from event to event: it takes six times as long.
 
     Returns
     -------

@@ -77,7 +77,7 @@ class VectorSimulator:
     accuracy : float
         Of what is integrated, as in `Simulator` [rad].
     watch_supply : bool
-        Whether `lowest_voltage` is kept, for which lanes go from event to event: it takes a few times as long.
+        Whether `lowest_voltage` is kept, for which lanes go from event to event: it takes six times as long.
 
     Raises
     ------

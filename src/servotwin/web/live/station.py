@@ -10,7 +10,7 @@ import numpy as np
 
 from servotwin.models.engine import log
 from servotwin.models.engine.live import stretch
-from servotwin.models.engine.live.posts import NONE_BEFORE, NOTHING_SAID, Post, put_said
+from servotwin.models.engine.live.posts import NONE_BEFORE, NOTHING_SAID, Post, put_low, put_said
 from servotwin.models.engine.live.screen import COLUMNS, NO_LOW, SHOWN, USED, Looks, Screen, Switch, first_look, told_of
 from servotwin.models.state.records import object_of, record_of
 from servotwin.simulation import Simulator
@@ -31,6 +31,7 @@ def post_of(model: Model) -> Any:
     post = object_of(Post)
     post.lines, post.was = lines_of(model), NONE_BEFORE
     put_said(post.said, NOTHING_SAID)
+    put_low(post.low, NO_LOW)
     return post
 
 

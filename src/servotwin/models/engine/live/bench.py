@@ -15,7 +15,7 @@ from servotwin.models.engine.live import making, stretch, together
 from servotwin.models.engine.live import posts as those
 from servotwin.models.engine.live import sender as transmitter
 from servotwin.models.engine.live.posts import Told
-from servotwin.models.engine.live.screen import NEXT, USED, Looks, Screen, first_look
+from servotwin.models.engine.live.screen import NEXT, NO_LOW, USED, Looks, Screen, first_look
 from servotwin.models.engine.log import Log
 from servotwin.models.engine.memory import Memories, memory_at, put_memory, resumed
 from servotwin.models.engine.step import COMPLETED
@@ -153,6 +153,7 @@ def advance_together(posts: Any, told: Told, programs: Any, memories: Memories, 
 def _begin_looks(posts: Any, k: int, used: Any) -> None:
     for n in range(len(posts)):
         used[USED * n], used[USED * n + 1], used[USED * n + 2], used[USED * n + NEXT] = 0, 0, 0, k
+        those.put_low(posts[n].low, NO_LOW)
 
 
 def _is_full(rows: Any, events: Any, pulses: Any, used: Any) -> bool:
@@ -204,12 +205,13 @@ def _take_seats(posts: Any, told: Told, memories: Memories, lanes: Lanes, on_bus
 def _advance_one(post: Any, k: int, servos: int, told: Told, programs: Any, memories: Memories, looks: Looks,
                  log: Log, screen: Screen) -> int:
     """Let one servo go on by itself; return a status."""
-    memory, was, status = stretch.go_on(
+    memory, was, low, status = stretch.go_on(
         those.numbers_of(post.numbers), those.chip_of(post.chip), those.inputs_of(post, k, servos, told, programs),
-        memory_at(memories, k), post.changed == 1, those.was_of(post.was), looks, those.lines_of(post.lines), screen,
-        log)
+        memory_at(memories, k), post.changed == 1, those.was_of(post.was), those.low_of(post.low), looks,
+        those.lines_of(post.lines), screen, log)
     if status == COMPLETED:
         put_memory(memories.rows[k], memory)
         those.put_was(post.was, was)
+        those.put_low(post.low, low)
         post.changed = 0
     return status

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.models.engine.live import shapes
-from servotwin.models.engine.live.screen import USED, Lines, Said, Switch
+from servotwin.models.engine.live.screen import NO_LOW, USED, Lines, Low, Said, Switch
 from servotwin.models.engine.live.sender import is_lost, next_edge, pass_edge
 from servotwin.models.engine.memory import Inputs, Memories, in_force, memory_at, put_memory, put_started, with_bodies
 from servotwin.models.state.modes import INSIDE, RIGID, Vector
@@ -46,6 +46,7 @@ class Post(NamedTuple):
     voltage: Follow
     said: Said  # what showed of chip or program at the end of the latest stretch, on a shared supply
     was: Switch  # how its bridge drove at the end of the latest stretch
+    low: Low  # of its supply since the latest look, of the first on a shared one
     lowest: float  # where it may begin [rad]
     highest: float
     torque: float  # of its load, constant [N m]
@@ -93,9 +94,11 @@ numbers_of = record_reader("numbers_of", Numbers)
 chip_of = record_reader("chip_of", Chip)
 lines_of = record_reader("lines_of", Lines)
 was_of = record_reader("was_of", Switch)
+low_of = record_reader("low_of", Low)
 said_of = record_reader("said_of", Said)
 put_said = record_writer("put_said", Said)
 put_was = record_writer("put_was", Switch)
+put_low = record_writer("put_low", Low)
 put_numbers = record_writer("put_numbers", Numbers)
 put_chip = record_writer("put_chip", Chip)
 put_lines = record_writer("put_lines", Lines)
@@ -174,6 +177,7 @@ def _stand(posts: Any, k: int, memories: Memories, angle: float) -> None:
     put_started(memories, k, Vector(angle, 0.0, 0.0, warm, warm, angle, 0.0),
                 INSIDE if play.present(numbers_of(post.numbers).play) else RIGID)
     put_was(post.was, NONE_BEFORE)
+    put_low(post.low, NO_LOW)
     put_said(post.said, NOTHING_SAID)
     post.changed = 1
 

@@ -30,12 +30,14 @@ from servotwin.models.engine.lowest import lowest_on, voltage_at
 from servotwin.models.engine.memory import FLAT, Inputs, Memories, Memory, memory_at, origin_of, time_of
 from servotwin.models.engine.motions import motion
 from servotwin.models.engine.motions.motion import Motion
+from servotwin.models.engine.observe import bus_voltage
 from servotwin.models.engine.run import plant_of, run
 from servotwin.models.engine.runs import as_now, mode_under, told
 from servotwin.models.engine.step import COMPLETED, at_pulses
 from servotwin.models.terms import duty, firmware, source
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.chip import present as pulsed_chip
+from servotwin.models.terms.elastic import turning
 from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.models.terms.sensor import wiper_at
 from servotwin.physics.pieces import piece_value
@@ -53,15 +55,16 @@ class Stood(NamedTuple):
     said: Said
 
 
-def go_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, changed: bool, was: Switch, looks: Looks,
-          lines: Lines, screen: Screen, log: Log) -> tuple[Memory, Switch, int]:
-    """Go on to `looks.until`; return the memory, how the bridge drives there, and a status.
+def go_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, changed: bool, was: Switch, low: Low,
+          looks: Looks, lines: Lines, screen: Screen, log: Log) -> tuple[Memory, Switch, Low, int]:
+    """Go on to `looks.until`; return the memory, how the bridge drives there, the supply's `low`, and a status.
 
     `changed` is whether the servo is another one than before, `was` how its bridge drove at the end of the stretch
-    before. After a status that is not `COMPLETED` the memory is that of before what went wrong.
+    before, and `low` how low its supply was since the latest look. After a status that is not `COMPLETED` the memory is
+    that of before what went wrong.
     """
     program, begins, status, k = firmware.present(inputs.firmware[0]), True, PAUSED, looks.next
-    stood, low = Stood(memory, told_of(memory, program)), NO_LOW
+    stood = Stood(memory, told_of(memory, program))
     log.counts[KEEPS], log.counts[BEGUN] = ALL, 0
     while status == PAUSED:
         most = min(AT_ONCE, screen.used[STEPS_LEFT]) if screen.used[STEPS_LEFT] > 0 else AT_ONCE
@@ -78,7 +81,7 @@ def go_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, changed:
             note(screen, log.events[n].time, log.events[n].kind)
         stood = Stood(memory, told_of(memory, program))
     screen.used[NEXT] = k
-    return memory, was, status
+    return memory, was, low, status
 
 
 def show(numbers: Numbers, inputs: Inputs, rows: Any, count: int, shared: Floats, stood: Stood, k: int, was: Switch,
@@ -117,7 +120,8 @@ def show(numbers: Numbers, inputs: Inputs, rows: Any, count: int, shared: Floats
             now, start = switch_of(said_by(row)), row.origin + row.start
             if looks.switches == 1 and now != was and was.silent >= 0:
                 if n == 0:
-                    taken_up(screen, low, math.inf)
+                    if falls:
+                        taken_up(screen, low, _voltage_as_stood(numbers, stood))
                     _see_stood(screen, lines, inputs, numbers, stood)
                 else:
                     if falls:
@@ -142,10 +146,11 @@ def show(numbers: Numbers, inputs: Inputs, rows: Any, count: int, shared: Floats
             if falls:
                 m, low = _lowered(screen, lines, inputs, row, m, seen, row.origin + row.end, low)
     if ends:
-        if falls:
-            taken_up(screen, low, _voltage(row, m, row.origin + row.end))
-            low = NO_LOW
         time = k / looks.rate
+        if falls and (looks.at_end == 1 or (time < looks.until and not program)):
+            voltage = _voltage(row, m, row.origin + row.end)
+            taken_up(screen, low, voltage)
+            low = Low(voltage, 0)
         while time < looks.until and (looks.at_end == 1 or not program):  # next to the end
             m = _see(screen, lines, inputs, row, m, time)
             k += 1
@@ -210,6 +215,18 @@ def _see(screen: Screen, lines: Lines, inputs: Inputs, row: Row, m: Motion, time
     write(screen, lines, inputs, said_by(row), warm(m.numbers, y), m.mode, piece_value(m.u, local),
           piece_value(m.tau, local), y, wiper_at(m.numbers.sensor, row.wiper, y.q), time)
     return m
+
+
+def _voltage_as_stood(numbers: Numbers, stood: Stood) -> float:
+    """Return the voltage of the supply as a servo stood before its bridge switches."""
+    memory, said = stood.memory, stood.said
+    y, u = memory.point.y, piece_value(memory.u, time_of(memory))
+    if duty.present(numbers.bridge):
+        now = warm(duty.at_duty(numbers, said.duty), y)
+        share = duty.share_of(numbers.bridge, said.duty)
+    else:
+        now, share = warm(at_pulses(numbers, said.silent), y), 1.0
+    return bus_voltage(now, u, y.q, turning(now.elastic, y), y.i) / share
 
 
 def _see_stood(screen: Screen, lines: Lines, inputs: Inputs, numbers: Numbers, stood: Stood) -> None:

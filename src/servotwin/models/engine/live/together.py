@@ -11,7 +11,7 @@ from servotwin.models.engine.bus.bus_inputs import inputs_at
 from servotwin.models.engine.bus.bus_records import numbers_of, put_numbers, put_vector, source_of
 from servotwin.models.engine.bus.event_log import Tape
 from servotwin.models.engine.events import kinds
-from servotwin.models.engine.live.posts import lines_of, put_said, said_of
+from servotwin.models.engine.live.posts import lines_of, low_of, put_low, put_said, said_of
 from servotwin.models.engine.live.screen import (
     LEFT,
     NEXT,
@@ -52,7 +52,7 @@ def go_on(told: Any, posts: Any, firms: Any, shared: Any, seats: Any, mates: Any
     Servos have their seats and remember where they stand; what they are `told` is found by `inputs_at`. The tape has
     room for what servos do at once.
     """
-    k, status, low = looks.next, event_queue.PAUSED, NO_LOW
+    k, status, low = looks.next, event_queue.PAUSED, low_of(posts[0].low)
     for j in range(len(posts)):
         seats[j].until = looks.until - seats[j].origin
     while status == event_queue.PAUSED:
@@ -68,6 +68,7 @@ def go_on(told: Any, posts: Any, firms: Any, shared: Any, seats: Any, mates: Any
         _note_all(written, events, rows, used)
         if PLAIN:
             rows[0].tell(when)
+    put_low(posts[0].low, low)
     for j in range(len(posts)):
         used[USED * j + NEXT] = k
     return status
@@ -113,9 +114,9 @@ def _show(told: Any, posts: Any, shared: Any, seats: Any, mates: Any, looks: Loo
     if falls:
         low = _lowered(told, posts, shared, seats, mates, written, seen, end, low, rows, events, used)
     if ends:
-        if falls:
-            low = _taken_up(posts, shared, seats, mates, written, end, False, low, rows, events, used)
         time = k / looks.rate
+        if falls and (looks.at_end == 1 or (time < looks.until and late == 1.0)):
+            low = _taken_up(posts, shared, seats, mates, written, end, False, low, rows, events, used)
         while time < looks.until and (looks.at_end == 1 or late == 1.0):  # next to the end
             _see_all(told, posts, shared, seats, mates, written, end, time, False, rows, events, used)
             k += 1
