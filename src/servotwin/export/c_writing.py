@@ -22,7 +22,7 @@ from servotwin.models import (
 )
 from servotwin.models.engine.alone import Alone, Seen
 from servotwin.models.engine.log import COUNTS, EVENTS, LEFT, Happened, Log, Row
-from servotwin.models.engine.memory import BEAT, Inputs, Memories, Memory, Point
+from servotwin.models.engine.memory import BEAT, Inputs, Lowest, Memories, Memory, Point
 from servotwin.models.outputs import SIGNALS
 from servotwin.models.state.modes import Mode, Vector
 from servotwin.models.state.records import numbers_in, record_of
@@ -57,7 +57,7 @@ _BEAT = "    double beat; /* by which the clock counts [s], in all its digits */
 _TABLE = Array(FLOAT64, 2)
 _PROGRAM, _FIRM, _MEMORY, _EVENT = (Record(record_of(kind)) for kind in (Firmware, Firm, Memory, Happened))
 _RECORDS: dict[Kind, str] = {Record(record_of(kind)): kind.__name__ for kind in (
-    Firmware, Firm, Memory, Happened, Point, Vector, Mode, Frame, Decision, Piece)}
+    Firmware, Firm, Memory, Happened, Lowest, Point, Vector, Mode, Frame, Decision, Piece)}
 _OWN_NAMES = {"Numbers": "plant", "Alone": "numbers", "Firmware": "program", "Happened": "event"}
 
 
