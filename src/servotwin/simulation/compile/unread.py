@@ -11,11 +11,13 @@ from servotwin.simulation.compile.finding import shipped_folder, source_key
 from servotwin.simulation.compile.recipe import Recipe
 from servotwin.simulation.compile.storage import is_there, kept_folder, key_of, write
 
+IN_GENERAL = "_in_general"
+
 
 @cache
 def in_general(recipe: Recipe) -> Recipe:
     """Return a recipe in which no way of going on is chosen by the numbers that it knows."""
-    return replace(recipe, name=f"{recipe.name}_in_general", never=(*recipe.never, "LEGS"))
+    return replace(recipe, name=recipe.name + IN_GENERAL, never=(*recipe.never, "LEGS"))
 
 
 @cache

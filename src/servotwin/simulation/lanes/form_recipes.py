@@ -46,7 +46,7 @@ from servotwin.models.terms.dependence import (
     TWO_BODIES,
 )
 from servotwin.simulation.compile import Recipe
-from servotwin.simulation.compile.unread import in_general
+from servotwin.simulation.compile.unread import IN_GENERAL
 
 _SIDE = tuple(f"servotwin.models.engine.batch.side_by_side:{name}" for name in ("start", "go_on", "advance", "refit"))
 _ENTRIES = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "ready", "go_on", "note_failures"))
@@ -179,7 +179,7 @@ def side_by_side(form: int, dtype: str) -> Recipe:
     return _BY_FORMULA[dtype] if form == tiles.ONE_FORMULA else _BY_FORM[form]
 
 
-KERNELS = tuple(sorted(one.name for one in (ALL_RUNS, PLAIN_RUNS, ALL_DIGITAL, BY_LEGS, BY_SERIES, BY_TICKS,
-                                            in_general(ALL_RUNS), in_general(ALL_DIGITAL),
-                                            *_BY_FORMULA.values(), *_BY_FORM.values())))
+KERNELS = tuple(sorted((*(one.name for one in (ALL_RUNS, PLAIN_RUNS, ALL_DIGITAL, BY_LEGS, BY_SERIES, BY_TICKS,
+                                               *_BY_FORMULA.values(), *_BY_FORM.values())),
+                        *(one.name + IN_GENERAL for one in (ALL_RUNS, ALL_DIGITAL)))))
 """Names of all kernels in which lanes run."""
