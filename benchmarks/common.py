@@ -24,27 +24,34 @@ def best(run: Callable[[], object], repetitions: int = 15) -> float:
 
 def averaged_right_side(model: st.AveragedServo, v_c: float) -> Callable[[float, np.ndarray], list[float]]:
     """The averaged servo as a SciPy user would write it, in plain floats."""
-    p = model.pack(Load())
+    numbers = model.pack(Load())
+    K, K_b, R, _ = numbers.motor
+    gain, p, b_o, J, b = numbers.follower.gain, numbers.sensor.p, numbers.sensor.b_o, numbers.shaft.J, numbers.shaft.b
+    forward, backward, kappa = numbers.friction.F_forward, numbers.friction.F_backward, numbers.friction.kappa
 
     def f(t: float, y: np.ndarray) -> list[float]:
         q, w = y
-        v_a = p.gain * (v_c - p.p * q - p.b_o)
-        f_ec = (p.F_forward if w >= 0.0 else p.F_backward) * math.tanh(p.kappa * w)
-        return [w, (p.K * (v_a - p.K_b * w) / p.R - p.b * w - f_ec) / p.J]
+        v_a = gain * (v_c - p * q - b_o)
+        f_ec = (forward if w >= 0.0 else backward) * math.tanh(kappa * w)
+        return [w, (K * (v_a - K_b * w) / R - b * w - f_ec) / J]
 
     return f
 
 
 def bounded_right_side(model: st.BoundedServo, v_c: float) -> Callable[[float, np.ndarray], list[float]]:
     """The bounded servo while it turns forward: saturation, deadband and Coulomb friction in plain floats."""
-    p = model.pack(Load())
+    numbers = model.pack(Load())
+    K, K_b, R, _ = numbers.motor
+    p, b_o, J, b = numbers.sensor.p, numbers.sensor.b_o, numbers.shaft.J, numbers.shaft.b
+    gain, half_deadband, V_max = numbers.follower
+    forward = numbers.friction.F_forward
 
     def f(t: float, y: np.ndarray) -> list[float]:
         q, w = y
-        v_e = v_c - p.p * q - p.b_o
-        v_d = 0.0 if abs(v_e) <= p.half_deadband else v_e - math.copysign(p.half_deadband, v_e)
-        v_a = min(max(p.gain * v_d, -p.V_max), p.V_max)
-        return [w, (p.K * (v_a - p.K_b * w) / p.R - p.b * w - p.F_forward) / p.J]
+        v_e = v_c - p * q - b_o
+        v_d = 0.0 if abs(v_e) <= half_deadband else v_e - math.copysign(half_deadband, v_e)
+        v_a = min(max(gain * v_d, -V_max), V_max)
+        return [w, (K * (v_a - K_b * w) / R - b * w - forward) / J]
 
     return f
 

@@ -1,6 +1,6 @@
-"""Digital servos with ticks of 1 ms: a fleet on two cores and one servo in plain Python, beside fixed-step rules.
+"""Digital servos with ticks of 1 ms: a fleet on two cores and one servo by `simulate`, beside fixed-step rules.
 
-`run.py` prints servo-seconds per second of 4096 servos for 2 s, and the time of one servo-second in plain Python.
+`run.py` prints servo-seconds per second of 4096 servos for 2 s, and the time of one servo-second by `simulate`.
 """
 
 import sys
@@ -40,7 +40,7 @@ def main() -> None:
         rows.append(("mujoco.rollout, P joint at 1 ms", FEW * DURATION / best(peer, 3), ""))
     for name, speed, more in rows:
         print(f"{name:34} {speed:10.2e} servo-s/s   servotwin {rows[0][1] / speed:8.3g}x   {more}")
-    print(f"one servo in plain Python: {1e3 * best(lambda: st.simulate(model, told[0], duration=1.0), 5):.0f} ms a "
+    print(f"one servo by simulate: {1e3 * best(lambda: st.simulate(model, told[0], duration=1.0), 5):.1f} ms a "
           "servo-second, with 1001 outputs")
 
 

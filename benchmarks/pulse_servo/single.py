@@ -1,4 +1,4 @@
-"""Part 2: one servo: compiled beside SciPy's LSODA, in plain Python, and what a compiled run costs beyond its call."""
+"""Part 2: one servo: compiled beside SciPy's LSODA, by `simulate`, and what a lane costs beyond its call."""
 
 import runpy
 import sys
@@ -48,7 +48,7 @@ def pulse() -> None:
             + st.loads.Constant(float(fleet.parameters["load.torque"][0])))
     model = st.PulseServo(servo)
 
-    def plain() -> float:
+    def alone() -> float:
         return float(st.simulate(model, signal, duration=2.0, load=load, initial=start,
                                  output_times=[2.0])["output_angle"][0])
 
@@ -62,8 +62,8 @@ def pulse() -> None:
         (job, arguments), = recorder.jobs
         return best(lambda: job(*arguments), 200)
 
-    print(f"PulseServo, one, 2 s; plain and compiled {abs(plain() - many(2.0, 'float64')):.0e} rad apart")
-    print(f"  plain Python, st.simulate        {1e3 * best(plain, 5):9.2f} ms")
+    print(f"PulseServo, one, 2 s; `simulate` and a lane {abs(alone() - many(2.0, 'float64')):.0e} rad apart")
+    print(f"  st.simulate                      {1e3 * best(alone, 5):9.2f} ms")
     for dtype in ("float64", "float32"):
         many(2.0, dtype)
         whole, long, short = best(lambda d=dtype: many(2.0, d), 50), kernel(2.0, dtype), kernel(1e-3, dtype)
