@@ -22,7 +22,7 @@ from servotwin.errors import SimulationError
 from servotwin.models.base import Place
 from servotwin.models.engine import run as engine_run
 from servotwin.models.engine.events import kinds
-from servotwin.models.engine.log import ALL, COUNTS, EVENTS, KEEPS, LEFT, MOTIONS, PAUSED, Happened, Log, Row
+from servotwin.models.engine.log import ALL, COUNTS, EVENTS, FEW, KEEPS, LEFT, MOTIONS, PAUSED, Happened, Log, Row
 from servotwin.models.engine.memory import ACCURACY, Inputs, Memories, Memory, time_of
 from servotwin.models.engine.run import Plant
 from servotwin.models.engine.step import COMPLETED
@@ -38,7 +38,8 @@ from servotwin.simulation.compile import Recipe, is_compiled, is_plain, kernels
 from servotwin.simulation.status import Status
 
 ONE = Recipe("one", ("servotwin.models.engine.run:go_on", "servotwin.models.engine.at:at",
-                     "servotwin.models.engine.at:resolution", "servotwin.models.engine.live.stretch:shown"))
+                     "servotwin.models.engine.at:resolution", "servotwin.models.engine.live.stretch:shown"),
+             never=("SAMPLES",))
 """One servo by the one loop, and its signals at any times; kernels take hardly longer for what a servo lacks."""
 ROOM, STEPS = 4096, 4096  # rows of a log, and steps between two looks at the log, at progress and at interrupts
 _MEMORY, _FIRM, _ROW, _HAPPENED = (record_of(kind) for kind in (Memory, Firm, Row, Happened))
@@ -264,7 +265,7 @@ class RunLog:
 
 def _log(motions: NDArray[Any], events: NDArray[Any]) -> Log:
     counts = np.zeros(COUNTS, np.int64)
-    counts[KEEPS] = ALL if len(motions) else 0
+    counts[KEEPS] = ALL if len(motions) else FEW
     return Log(motions, events, np.zeros(0), counts)
 
 

@@ -16,8 +16,7 @@ from servotwin.models.engine.memory import (
     time_of,
 )
 from servotwin.models.engine.observe import Observed, observed, told_by
-from servotwin.models.engine.run import run
-from servotwin.models.engine.runs import as_now, mode_under, told
+from servotwin.models.engine.run import as_now, mode_under, run, told
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.state.modes import INSIDE, RIGID, Vector
 from servotwin.models.terms import control, duty, play

@@ -17,12 +17,13 @@ PAUSED = -1
 """As a status: the log is full, or the run has taken as many steps as it was to take."""
 ALONE, SERIES, DENSE = range(3)
 """How a motion is known: by its own law, or by numbers of a common one, a series or a step."""
-MOTIONS, EVENTS, NUMBERS, LEFT, IDLE, SHORT, BEGUN, KEEPS = range(8)
+MOTIONS, EVENTS, NUMBERS, LEFT, IDLE, SHORT, BEGUN, KEEPS, SAMPLED = range(9)
 """What a log counts: rows and numbers written, steps left, steps in no time one after the other, short ones between
-two contacts; whether any motion was written, and what it keeps."""
-COUNTS = 8
-ALL = 1
-"""As what a log keeps: motions and events, for both of which there is room; else events as far as there is."""
+two contacts; whether any motion was written, what it keeps, and how many samples were taken."""
+COUNTS = 9
+FEW, ALL, SAMPLES = range(3)
+"""What a log keeps: events, as far as there is room; motions and events, with room for both; samples at given times
+alone, for which there is always room."""
 _AT_ONCE = 6  # events of one step at most
 
 
@@ -72,8 +73,30 @@ class Log(NamedTuple):
     counts: Any
 
 
+class Samples(NamedTuple):
+    """Given times [s], and what stands at them, shape (18, n).
+
+    These are angle, speed, contact, drive, error, angle of the potentiometer, and what only few servos have: current,
+    temperatures of winding and housing, angle and speed of the motor at the output shaft, place in the play and contact
+    of the motor there, silence of the chip; duty, goal, reference and trip of a program.
+    """
+
+    times: Any
+    values: Any
+
+
+NO_SAMPLES = Samples(0.0, 0.0)
+NO_ROWS = 0.0  # in the place of rows that a log does not keep
+WITH_ROWS = ("ALL", "FEW")  # of what logs keep that, for kernels whose logs have no rows
+
+
 row_of = record_reader("row_of", Row)
 put_row = record_writer("put_row", Row)
+
+
+def has_rows(keeps: int) -> bool:
+    """Tell whether a log has rows, by what it keeps."""
+    return keeps == ALL or keeps == FEW
 
 
 def is_full(log: Log) -> bool:

@@ -13,6 +13,7 @@ import ast
 from collections.abc import Iterator
 from dataclasses import replace
 
+from servotwin.models.engine.log import WITH_ROWS
 from servotwin.models.state import records
 from servotwin.models.terms.rooms import ACTS, paths
 from servotwin.simulation.compile.derive import derive
@@ -30,7 +31,8 @@ _COPYING = flat_name(records.__name__, "")  # functions that only take records o
 
 def unread_numbers(recipe: Recipe, of: tuple[str, ...]) -> Iterator[str]:
     """Return the numbers that the general form reads and a recipe's kernels do not know, as `unread` keeps them."""
-    general = _readers(replace(in_general(recipe), entries=_RUNS, vector=False, single=False))
+    never = {*in_general(recipe).never, *WITH_ROWS}
+    general = _readers(replace(recipe, entries=_RUNS, vector=False, single=False, never=tuple(sorted(never))))
     own = _readers(recipe if of else replace(recipe, never=(*recipe.never, "LEGS")), of)  # legs are asked apart
     by_itself = set().union(*(own[name] for name in own.keys() - general.keys()))
     left_out = {path.split(".")[0] for path in ACTS} - {path.split(".")[0] for path in ACTS.keys() - recipe.absent}

@@ -13,6 +13,7 @@ import numpy as np
 
 from servotwin.models.engine.batch import digital_tiles, tiles
 from servotwin.models.engine.bus.coupled_units import Coupling, Unit
+from servotwin.models.engine.log import COUNTS, WITH_ROWS
 from servotwin.models.state.records import record_of
 from servotwin.models.terms.dependence import (
     AT_COMMANDS,
@@ -83,17 +84,19 @@ _BY_FORM = {getattr(tiles, form): _side(f"by_{form.lower()}", form) for form in 
 
 # --- Lanes one by one -------------------------------------------------------------------------------------------------
 
-ALL_RUNS = Recipe("runs", _ENTRIES)  # they take hardly longer for what others lack
+ALL_RUNS = Recipe("runs", _ENTRIES, never=WITH_ROWS)  # they take hardly longer for what others lack
 _PLAIN = _EVERYWHERE | DROPS | SILENCE | FREE_RUNNING | STEPS | TABLE | ON_Q
 _CALM = "servotwin.models.engine.batch.event_free:go"
-PLAIN_RUNS = Recipe("plain_runs", (*_ENTRIES, _CALM), knows=_PLAIN | CURVED_Q | PULSES | FOLLOWS | RECORDED)
+PLAIN_RUNS = Recipe("plain_runs", (*_ENTRIES, _CALM), knows=_PLAIN | CURVED_Q | PULSES | FOLLOWS | RECORDED,
+                    never=WITH_ROWS)
 _LEFT_TO_EVENTS = AT_STOPS | SHOWN | PULSES | STEPS
 CALM = PLAIN_RUNS.knows & ~(_LEFT_TO_EVENTS | CURVED_Q | RECORDED | TABLE)
 """What lanes of those kernels may ask for that go on calmly, as far as that leads."""
 # Not compiled for its own sake: it says which numbers are known where lanes go on calmly
 _CALMLY = (Recipe("calm", (_CALM,), knows=CALM, leaves=_LEFT_TO_EVENTS), ())
 _FIRST_TICKS = "servotwin.models.engine.runs:to_first_ticks"
-ALL_DIGITAL = Recipe("digital_runs", (*_ENTRIES, _FIRST_TICKS), knows=~(_NOT_DIGITAL | SPRING), always=PROGRAM | PWM)
+ALL_DIGITAL = Recipe("digital_runs", (*_ENTRIES, _FIRST_TICKS), knows=~(_NOT_DIGITAL | SPRING), always=PROGRAM | PWM,
+                     never=WITH_ROWS)
 _TICKS = _PLAIN & ~ON_Q | _DIGITAL
 LEGS = _TICKS | PLAY | TWO_BODIES | BY_SHARE
 """What legs follow exactly."""
@@ -152,11 +155,12 @@ def steps_of(recipe: Recipe, ended: Any) -> Iterator[tuple[Recipe, str, tuple[An
     All of them have the arguments of `runs.go_on`, with these in the place of the last one.
     """
     *ahead, last = _CHAINS.get(recipe, (recipe,))
+    counts = np.zeros(COUNTS, np.int64)
     if ahead:
-        yield last, "to_first_ticks", ()
+        yield last, "to_first_ticks", (counts,)
     for one in ahead:
         yield one, one.entries[0].partition(":")[2], _room_of(one)
-    yield last, "go_on", (ended,)
+    yield last, "go_on", (ended, counts)
 
 
 def _room_of(recipe: Recipe) -> tuple[Any, ...]:

@@ -8,7 +8,8 @@ from servotwin.models.engine.batch.tiles import chip_of, numbers_of
 from servotwin.models.engine.dynamics import contacts, currents
 from servotwin.models.engine.memory import memory_at, time_of
 from servotwin.models.engine.observe import Observed, observed, told_by
-from servotwin.models.engine.runs import as_now, inputs_of, mode_under, told
+from servotwin.models.engine.run import as_now, mode_under, told
+from servotwin.models.engine.runs import inputs_of
 from servotwin.models.state.modes import RIGID, Vector
 from servotwin.models.state.records import TILE
 from servotwin.models.terms import duty

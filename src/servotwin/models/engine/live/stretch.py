@@ -31,8 +31,7 @@ from servotwin.models.engine.memory import FLAT, Inputs, Memories, Memory, memor
 from servotwin.models.engine.motions import motion
 from servotwin.models.engine.motions.motion import Motion
 from servotwin.models.engine.observe import bus_voltage
-from servotwin.models.engine.run import plant_of, run
-from servotwin.models.engine.runs import as_now, mode_under, told
+from servotwin.models.engine.run import as_now, mode_under, plant_of, run, told
 from servotwin.models.engine.step import COMPLETED, at_pulses
 from servotwin.models.terms import duty, firmware, source
 from servotwin.models.terms.chip import Chip
