@@ -30,8 +30,7 @@ CASES = (  # a form, and servos that run in it
     ("by_ticks", st.DigitalServo, "dsservo-ds3218", {}, PLAIN),
     ("by_ticks", st.DigitalServo, "dynamixel-xl330-m077", {}, PLAIN),
     ("by_legs", st.DigitalServo, "feetech-sts3215-12v", {}, PLAIN),
-    ("by_series", st.DigitalServo, "feetech-sts3215-12v", HEAT, PLAIN),
-    ("plain_runs", st.BoundedServo, "hitec-hs-755hb", {}, PLAIN))
+    ("by_series", st.DigitalServo, "feetech-sts3215-12v", HEAT, PLAIN))
 
 
 def seconds(kind: type, name: str, changes: dict[str, float], load: st.loads.Load, without: str = "") -> float:

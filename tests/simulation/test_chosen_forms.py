@@ -56,7 +56,7 @@ OF_ANALOG = {
     "by_bands": (
         "coast coast+silent limit share limit+share limit+slack limit+coast share+slack share+coast slack+coast creep "
         "limit+creep creep+share creep+slack creep+coast"),
-    "plain_runs": (
+    "runs": (
         "steps bend silent told steps+bend steps+coast steps+silent steps+held steps+told bend+coast bend+silent "
         "bend+held bend+told coast+told silent+held silent+told held+told steps+hangs bend+hangs silent+hangs "
         "hangs+told"),
@@ -138,7 +138,7 @@ def test_analog_servos_take_the_forms_that_they_took(servo, dtype):
 def test_servos_without_pulses_take_the_forms_that_they_took(servo):
     rng = np.random.default_rng(3)
     for names in pairs(("coil", "silent")):  # only a load's are terms of theirs
-        assert combined(st.BoundedServo, servo.replace(MEAN), names, "float64", rng) == "plain_runs", names
+        assert combined(st.BoundedServo, servo.replace(MEAN), names, "float64", rng) == "runs", names
 
 
 @pytest.mark.long

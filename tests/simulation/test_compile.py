@@ -16,7 +16,7 @@ from servotwin.simulation.compile.building import printed
 from servotwin.simulation.compile.compilers import compilers
 from servotwin.simulation.compile.derive import derive
 from servotwin.simulation.compile.translate import header
-from servotwin.simulation.lanes.form_recipes import _BY_FORMULA, ALL_RUNS, BY_LEGS, PLAIN_RUNS, parts_of
+from servotwin.simulation.lanes.form_recipes import _BY_FORMULA, ALL_RUNS, BY_LEGS, CALM
 
 SLIDE = Recipe("slide", ("servotwin.models.engine.batch.linear_segments:slide",), vector=True)
 NUMBERS = ArcNumbers(60.0, 60.0, 0.2, 1 / 60.0, 1 / 60.0, 5.0, 330.0, 20.0, 5.0, 6.0, 0.4, 0.1, 33.0, 40.0, 5.0, 1.0,
@@ -104,12 +104,10 @@ def test_two_processes_at_once(tmp_path):
 
 @pytest.mark.long
 def test_what_no_term_asks_for_is_left_out():
-    plain, calm, loose, everything = (
-        derive(one).text for one in (PLAIN_RUNS, parts_of(PLAIN_RUNS)[1][0], BY_LEGS, ALL_RUNS))
+    calm, loose, everything = (derive(one).text for one in (CALM, BY_LEGS, ALL_RUNS))
     assert not any(f"motions_choice__{name}" in calm for name in FLAGGED)
-    assert "motions_choice___long_step" in plain
     assert all(f"motions_choice__{name}" in everything for name in FLAGGED)
     assert "terms_heat__warming_rates" in everything
-    assert "terms_heat__warming_rates" not in plain + calm + loose
+    assert "terms_heat__warming_rates" not in calm + loose
     assert "dynamics_contacts__apart(" in loose
-    assert "dynamics_contacts__apart(" not in plain + calm
+    assert "dynamics_contacts__apart(" not in calm

@@ -92,7 +92,6 @@ FORMS = {  # of servos that resist between drives: what they have anyway, by the
     "by_strides": ("pulse", HEATS | {"friction.load_friction": 0.05}),
     "by_coils": ("inductive", {"motor.armature_inductance": 5e-4, "friction.load_friction": 0.05}),
     "by_gaps": ("pulse", PLAYS | HEATS),
-    "plain_runs": ("pulse", {"potentiometer.quantisation": 1e-3}),
     "runs": ("inductive", HEATS | {"motor.armature_inductance": 5e-4})}
 # A number in each room, and of friction one of which `depends` says nothing
 NUMBERS = {

@@ -18,7 +18,6 @@ FORMS = {
     "by_bands": ({"friction.breakaway_ratio": 1.4, "friction.stribeck_speed": 5.0}, None, "float64", 1e-9),
     "side_by_side_float64": ({}, st.loads.Inertia(1e-3), "float64", 1e-9),
     "side_by_side_float32": ({}, st.loads.Inertia(1e-3), "float32", 1e-4),
-    "plain_runs": ({}, st.loads.Recorded([0.0, 1.0], [0.0, 0.05]), "float64", 1e-9),
 }
 
 

@@ -26,14 +26,14 @@ from servotwin.models.samples import Samples
 from servotwin.models.state.records import TILE, numbers_in, object_of, put_fields, record_of, room, rows_of
 from servotwin.models.terms import control
 from servotwin.models.terms.chip import NO_CHIP, Chip
-from servotwin.models.terms.dependence import CURVED_Q, SPRING
+from servotwin.models.terms.dependence import SPRING
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.source import Source
 from servotwin.physics.pieces import Piece
 from servotwin.simulation.compile import Recipe, is_compiled, is_plain, kernels
 from servotwin.simulation.engine import Plan, State
-from servotwin.simulation.lanes.form_recipes import PLAIN_RUNS
+from servotwin.simulation.lanes.form_recipes import PLAIN
 from servotwin.simulation.lanes.memories import nothing_yet
 from servotwin.simulation.lanes.packed import programs_of
 
@@ -42,7 +42,6 @@ Array = NDArray[np.float64]
 _ENTRIES = tuple(f"servotwin.models.engine.bus.bus_batch:{name}" for name in ("go_on", "look", "voltages"))
 BUSES = Recipe("buses", _ENTRIES, knows=~SPRING)
 """All servos but those with a spring between two bodies; they take hardly longer for what others lack."""
-_PLAINLY = PLAIN_RUNS.knows & ~CURVED_Q
 SHARED, SEAT, MATE, ROW = record_of(Shared), record_of(Seat), record_of(Mate), record_of(Row)
 UNIT, COUPLING = record_of(Unit), record_of(Coupling)
 
@@ -128,7 +127,7 @@ def tape_of(servos: int, plain: bool) -> Tape:
 
 def _weight(plan: Plan) -> float:
     """Return how many times as long as one that moves by plain laws a servo takes in plain Python."""
-    plainly = plan.digital or demanded(plan.numbers, NO_CHIP, NO_FIRMWARE, Piece()) & ~_PLAINLY == 0
+    plainly = plan.digital or demanded(plan.numbers, NO_CHIP, NO_FIRMWARE, Piece()) & ~PLAIN == 0
     return 1.0 if plainly else _INTEGRATED
 
 

@@ -39,7 +39,7 @@ def test_no_compiler_complains(name, compiler, tmp_path):
 
 
 @pytest.mark.long(but="ending")
-@pytest.mark.parametrize("name", ["plain_runs", "side_by_side_float32", "ending", "drivers"])
+@pytest.mark.parametrize("name", ["runs", "side_by_side_float32", "ending", "drivers"])
 def test_what_compilers_add_to_c99_stands_in_the_header_alone(name):
     text = printed(RECIPES[name]).text
     before, own = text.split(header())

@@ -49,10 +49,10 @@ def written_down(function, arguments):
 
 @pytest.fixture(scope="module")
 def calls():
-    """Return calls of `plain_runs` in a run of a few servos: name, what goes in, what comes out of this process."""
+    """Return calls of `runs` in a run of a few servos: name, what goes in, what comes out of this process."""
     found, call = [], Function.__call__
     names = {}
-    kernels = whole_runs.kernels(form_recipes.PLAIN_RUNS)
+    kernels = whole_runs.kernels(form_recipes.ALL_RUNS)
     for name in ("start", "go_on"):
         for function in getattr(kernels, name).functions:
             names[function] = name
@@ -80,7 +80,7 @@ def calls():
 def programs(tmp_path_factory):
     """Return a program for each target and entry."""
     folder = tmp_path_factory.mktemp("programs")
-    (folder / "kernels.c").write_text(printed(form_recipes.PLAIN_RUNS).text)
+    (folder / "kernels.c").write_text(printed(form_recipes.ALL_RUNS).text)
     found = {}
     for target in TARGETS:
         for name in ("start", "go_on"):

@@ -86,14 +86,12 @@ _BY_FORM = {getattr(tiles, form): _side(f"by_{form.lower()}", form) for form in 
 
 ALL_RUNS = Recipe("runs", _ENTRIES, never=WITH_ROWS)  # they take hardly longer for what others lack
 _PLAIN = _EVERYWHERE | DROPS | SILENCE | FREE_RUNNING | STEPS | TABLE | ON_Q
-_CALM = "servotwin.models.engine.batch.event_free:go"
-PLAIN_RUNS = Recipe("plain_runs", (*_ENTRIES, _CALM), knows=_PLAIN | CURVED_Q | PULSES | FOLLOWS | RECORDED,
-                    never=WITH_ROWS)
+PLAIN = _PLAIN | PULSES | FOLLOWS | RECORDED
+"""What servos may ask for that move by plain laws."""
 _LEFT_TO_EVENTS = AT_STOPS | SHOWN | PULSES | STEPS
-CALM = PLAIN_RUNS.knows & ~(_LEFT_TO_EVENTS | CURVED_Q | RECORDED | TABLE)
-"""What lanes of those kernels may ask for that go on calmly, as far as that leads."""
-# Not compiled for its own sake: it says which numbers are known where lanes go on calmly
-_CALMLY = (Recipe("calm", (_CALM,), knows=CALM, leaves=_LEFT_TO_EVENTS), ())
+CALM = Recipe("calm", ("servotwin.models.engine.batch.event_free:go",), knows=PLAIN & ~(
+    _LEFT_TO_EVENTS | RECORDED | TABLE), leaves=_LEFT_TO_EVENTS)
+"""Ticks of lanes in which nothing happens, three times faster; the others are for `ALL_RUNS`."""
 _FIRST_TICKS = "servotwin.models.engine.runs:to_first_ticks"
 ALL_DIGITAL = Recipe("digital_runs", (*_ENTRIES, _FIRST_TICKS), knows=~(_NOT_DIGITAL | SPRING), always=PROGRAM | PWM,
                      never=WITH_ROWS)
@@ -138,7 +136,7 @@ TICKS = Recipe("ticks", (
         "show_records", "read_clocks", "take_status", "note_lost_buses", "break_up"))))
 """Lanes of all forms between two calls: what is imposed on them, and the way from tiles to records and back."""
 ENDING = Recipe("ending", ("servotwin.models.engine.cosim.final_checks:look_at_lanes",), vector=True, knows=~_DIGITAL)
-_PARTS = {PLAIN_RUNS: ((PLAIN_RUNS, ()), _CALMLY), BY_TICKS: (_BY_TICKS, _BY_LEGS), BY_LEGS: (_BY_LEGS,),
+_PARTS = {BY_TICKS: (_BY_TICKS, _BY_LEGS), BY_LEGS: (_BY_LEGS,),
           BY_SERIES: (_BY_SERIES,), ALL_DIGITAL: ((ALL_DIGITAL, ()), _BY_LEGS)}
 _CHAINS = {BY_TICKS: (BY_TICKS, BY_LEGS, ALL_DIGITAL), BY_LEGS: (BY_LEGS, ALL_DIGITAL),
            BY_SERIES: (BY_SERIES, ALL_DIGITAL)}
@@ -183,7 +181,7 @@ def side_by_side(form: int, dtype: str) -> Recipe:
     return _BY_FORMULA[dtype] if form == tiles.ONE_FORMULA else _BY_FORM[form]
 
 
-KERNELS = tuple(sorted((*(one.name for one in (ALL_RUNS, PLAIN_RUNS, ALL_DIGITAL, BY_LEGS, BY_SERIES, BY_TICKS,
+KERNELS = tuple(sorted((*(one.name for one in (ALL_RUNS, ALL_DIGITAL, BY_LEGS, BY_SERIES, BY_TICKS,
                                                *_BY_FORMULA.values(), *_BY_FORM.values())),
                         *(one.name + IN_GENERAL for one in (ALL_RUNS, ALL_DIGITAL)))))
 """Names of all kernels in which lanes run."""

@@ -103,12 +103,6 @@ class SideBySide(NamedTuple):
         """Their kernels."""
         return recipes.side_by_side(self.form, self.dtype)
 
-    @property
-    def general(self) -> Recipe:
-        """The kernels of those that cannot go on side by side."""
-        plain = self.form == tiles.ONE_FORMULA and not self.slack
-        return recipes.PLAIN_RUNS if plain else recipes.ALL_RUNS
-
 
 class OneByOne(NamedTuple):
     """Lanes that run one by one, by a form that leaves out what they lack; whether some may go on calmly."""
@@ -152,8 +146,8 @@ def _of_analog(terms: Terms, left: Mask, dtype: str) -> Iterator[SideBySide | On
         which = _take(terms, left, recipes.side_by_side(form, own_type), terms.suit(knows) & asked & side)
         if len(which):
             yield _together(terms, form, own_type, which)
-    for wanted, calm in () if is_plain() else ((terms.suit(recipes.CALM), True), (True, False)):
-        yield OneByOne(_take(terms, left, recipes.PLAIN_RUNS, wanted), recipes.PLAIN_RUNS, calm)
+    if not is_plain() and np.any(left & terms.suit(recipes.CALM.knows)):
+        yield OneByOne(_take(terms, left, recipes.ALL_RUNS, terms.fit(recipes.CALM)), recipes.ALL_RUNS, True)
     yield from _at_last(terms, left, recipes.ALL_RUNS)
 
 

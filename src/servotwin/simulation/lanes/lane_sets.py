@@ -37,7 +37,7 @@ Indices = NDArray[np.int64]
 SHAFT = {"output_angle": "q", "output_speed": "w"}  # where tiles and records have them
 _WORD = 8  # bytes
 _WORTH = 64  # tiles for a thread: fewer cost more in waking it
-_QUICK = (form_recipes.PLAIN_RUNS, form_recipes.BY_TICKS, form_recipes.BY_LEGS)
+_QUICK = (form_recipes.BY_TICKS, form_recipes.BY_LEGS)
 _WORTH_QUICK, _WORTH_SLOW = 64, 4  # lanes for a thread that go on one by one, by kernels that take so long
 
 
@@ -99,7 +99,7 @@ class Tiles:
             lost = room._replace(memories=Memories(*(Some(array, number) for array in room.memories)), **first)
             put = call_of(TICKS, "to_tiles", Some(places, number), lost.which, lost.memories,
                           store.numbers.frame_period, rows)
-            return [gather, *_one_by_one(kind.general, store, lost, number), put]
+            return [gather, *_one_by_one(form_recipes.ALL_RUNS, store, lost, number), put]
 
         return Chain([advance], given_up)
 
@@ -163,7 +163,8 @@ class Records:
         self.memories = nothing_yet(len(self.which))
         self.rows = self.memories.rows
         kernels(form_recipes.last_of(kind.recipe)).start(columns, self.which, self.memories)
-        self._workers = min(threads, len(self.which) // (_WORTH_QUICK if kind.recipe in _QUICK else _WORTH_SLOW))
+        quick = kind.calm or kind.recipe in _QUICK
+        self._workers = min(threads, len(self.which) // (_WORTH_QUICK if quick else _WORTH_SLOW))
         self._chains: list[Chain] = []
         self._look: Call | None = None
 
@@ -177,7 +178,7 @@ class Records:
         """Return what lets some lanes go on: those without an event at once, if some may go on calmly."""
         going = Going.of(self.which[part], taken(self.memories, part))
         done = np.zeros(len(going.which), np.int64)
-        calm = [call_of(form_recipes.PLAIN_RUNS, "go", store.columns, going.which, store.now, store.status,
+        calm = [call_of(form_recipes.CALM, "go", store.columns, going.which, store.now, store.status,
                         going.memories.rows, done, returns=True)] if self._calms else []
         ready = call_of(form_recipes.last_of(self._recipe), "ready", going.which, store.status, store.now, done,
                         going.durations, going.status, returns=True)

@@ -96,7 +96,7 @@ def run_side_by_side(work: Work, lanes: Lanes, kind: SideBySide, raw: Raw) -> No
         owed = flat(rows, "clock", "owed")[:len(which)]
         places = np.flatnonzero(owed > 0.0)
         _finish(work, lanes, which[places], owed[places], flat(rows, "count", "output")[places],
-                memories_of(rows, places), raw, kind.general)
+                memories_of(rows, places), raw, ALL_RUNS)
 
 
 def run_one_by_one(work: Work, lanes: Lanes, which: Indices, raw: Raw, recipe: Recipe = ALL_RUNS) -> None:
