@@ -56,10 +56,6 @@ OF_ANALOG = {
     "by_bands": (
         "coast coast+silent limit share limit+share limit+slack limit+coast share+slack share+coast slack+coast creep "
         "limit+creep creep+share creep+slack creep+coast"),
-    "runs": (
-        "steps bend silent told steps+bend steps+coast steps+silent steps+held steps+told bend+coast bend+silent "
-        "bend+held bend+told coast+told silent+held silent+told held+told steps+hangs bend+hangs silent+hangs "
-        "hangs+told"),
 }
 OF_DIGITAL = {
     "by_legs": (  # the plain one has drops
@@ -112,12 +108,12 @@ def combined(kind, servo, names, dtype, rng):
     return form_of(kind(varied(servo.replace(own), rng)), load, dtype, "told" in names, "bend" in names)
 
 
-def expected(table, names, digital):
+def expected(table, names):
     """Return what is written down for a set of features."""
     if "spring" in names:
         return "runs"
     told = "+".join(names) or "plain"
-    return next((form for form, sets in table.items() if told in sets.split()), "digital_runs" if digital else "runs")
+    return next((form for form, sets in table.items() if told in sets.split()), "runs")
 
 
 def pairs(without=()):
@@ -131,7 +127,7 @@ def pairs(without=()):
 def test_analog_servos_take_the_forms_that_they_took(servo, dtype):
     rng = np.random.default_rng(3)
     for names in pairs():
-        form = expected(OF_ANALOG, names, False).replace("side_by_side_float64", f"side_by_side_{dtype}")
+        form = expected(OF_ANALOG, names).replace("side_by_side_float64", f"side_by_side_{dtype}")
         assert combined(st.PulseServo, servo, names, dtype, rng) == form, names
 
 
@@ -145,7 +141,7 @@ def test_servos_without_pulses_take_the_forms_that_they_took(servo):
 def test_digital_servos_take_the_forms_that_they_took(servo):
     rng = np.random.default_rng(3)
     for names in pairs(OF_PULSES):
-        form = expected(OF_DIGITAL, names, True)
+        form = expected(OF_DIGITAL, names)
         assert combined(st.DigitalServo, servo.replace(PROGRAM), names, "float64", rng) == form, names
 
 
@@ -156,7 +152,7 @@ def test_servos_of_the_catalog_take_the_forms_that_they_took():
         servo = st.load_servo(name)
         analog = servo.kind == "analog"
         found = form_of((st.PulseServo if analog else st.DigitalServo)(servo))
-        assert found == known.get(name, "runs" if analog else "digital_runs"), name
+        assert found == known.get(name, "runs"), name
 
 
 @pytest.mark.long
@@ -170,8 +166,7 @@ def test_no_servo_of_today_needs_kernels_that_are_not_made_beforehand(servo):
     for _ in range(150):
         names = rng.permutation(own)[:rng.integers(3, 7)].tolist()
         digital = programs[rng.integers(len(programs))]
-        assert combined(st.DigitalServo, digital, names, "float64", rng) in (
-            "by_ticks", "by_legs", "digital_runs", "runs"), names
+        assert combined(st.DigitalServo, digital, names, "float64", rng) in ("by_ticks", "by_legs", "runs"), names
 
 
 def test_many_lanes_are_asked_what_each_of_them_is(servo):

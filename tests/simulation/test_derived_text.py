@@ -9,7 +9,7 @@ from servotwin.simulation.compile.derive import derive
 from servotwin.simulation.lanes import form_recipes
 
 RECIPES = (bus_run.BUSES, form_recipes.ALL_RUNS,
-           form_recipes.CALM, form_recipes.ALL_DIGITAL, form_recipes.LOOK, form_recipes.BY_TICKS,
+           form_recipes.CALM, form_recipes.LOOK, form_recipes.BY_TICKS,
            form_recipes.TICKS)
 
 

@@ -61,7 +61,7 @@ def recipe_of(flags: int) -> Recipe:
     """Return the recipe of a servo that asks for this; what else there is is left out."""
     always = PROGRAM | PWM if flags & PROGRAM else 0
     return Recipe("alone", tuple(f"servotwin.models.engine.alone:{entry}" for entry in ENTRIES), knows=flags,
-                  always=always, never=("ALL", "SAMPLES"))
+                  always=always, never=("ALL", "READINGS"))
 
 
 _WORDS = {

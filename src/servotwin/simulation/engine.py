@@ -39,7 +39,7 @@ from servotwin.simulation.status import Status
 
 ONE = Recipe("one", ("servotwin.models.engine.run:go_on", "servotwin.models.engine.at:at",
                      "servotwin.models.engine.at:resolution", "servotwin.models.engine.live.stretch:shown"),
-             never=("SAMPLES",))
+             never=("READINGS",))
 """One servo by the one loop, and its signals at any times; kernels take hardly longer for what a servo lacks."""
 ROOM, STEPS = 4096, 4096  # rows of a log, and steps between two looks at the log, at progress and at interrupts
 _MEMORY, _FIRM, _ROW, _HAPPENED = (record_of(kind) for kind in (Memory, Firm, Row, Happened))

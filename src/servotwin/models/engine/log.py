@@ -17,12 +17,12 @@ PAUSED = -1
 """As a status: the log is full, or the run has taken as many steps as it was to take."""
 ALONE, SERIES, DENSE = range(3)
 """How a motion is known: by its own law, or by numbers of a common one, a series or a step."""
-MOTIONS, EVENTS, NUMBERS, LEFT, IDLE, SHORT, BEGUN, KEEPS, SAMPLED = range(9)
+MOTIONS, EVENTS, NUMBERS, LEFT, IDLE, SHORT, BEGUN, KEEPS, READ = range(9)
 """What a log counts: rows and numbers written, steps left, steps in no time one after the other, short ones between
-two contacts; whether any motion was written, what it keeps, and how many samples were taken."""
+two contacts; whether any motion was written, what it keeps, and how many readings were taken."""
 COUNTS = 9
-FEW, ALL, SAMPLES = range(3)
-"""What a log keeps: events, as far as there is room; motions and events, with room for both; samples at given times
+FEW, ALL, READINGS = range(3)
+"""What a log keeps: events, as far as there is room; motions and events, with room for both; readings at given times
 alone, for which there is always room."""
 _AT_ONCE = 6  # events of one step at most
 
@@ -73,7 +73,7 @@ class Log(NamedTuple):
     counts: Any
 
 
-class Samples(NamedTuple):
+class Readings(NamedTuple):
     """Given times [s], and what stands at them, shape (18, n).
 
     These are angle, speed, contact, drive, error, angle of the potentiometer, and what only few servos have: current,
@@ -85,9 +85,9 @@ class Samples(NamedTuple):
     values: Any
 
 
-NO_SAMPLES = Samples(0.0, 0.0)
+NO_READINGS = Readings(0.0, 0.0)
 NO_ROWS = 0.0  # in the place of rows that a log does not keep
-WITH_ROWS = ("ALL", "FEW")  # of what logs keep that, for kernels whose logs have no rows
+WITH_ROWS = ("ALL", "FEW")  # names of what a log with rows keeps
 
 
 row_of = record_reader("row_of", Row)

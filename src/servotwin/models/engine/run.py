@@ -14,13 +14,13 @@ from servotwin.models.engine.log import (
     BEGUN,
     IDLE,
     KEEPS,
-    NO_SAMPLES,
+    NO_READINGS,
     PAUSED,
-    SAMPLED,
-    SAMPLES,
+    READ,
+    READINGS,
     SHORT,
     Log,
-    Samples,
+    Readings,
     has_rows,
     is_full,
     motion_row,
@@ -115,12 +115,12 @@ def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, until: flo
     end = instant(pulsed, inputs, memory, until - origin_of(memory))
     if log.counts[KEEPS] != ALL and stands(numbers, chip, inputs, memory, end):
         return memory_then(memory, end), COMPLETED
-    return from_step_to_step(numbers, chip, inputs, memory, end, log, NO_SAMPLES)
+    return from_step_to_step(numbers, chip, inputs, memory, end, log, NO_READINGS)
 
 
 def from_step_to_step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, end: float, log: Log,
-                      samples: Samples) -> tuple[Memory, int]:
-    """Go on to a time since the memory's origin [s], as `run` does; by legs wherever these lead on under samples."""
+                      readings: Readings) -> tuple[Memory, int]:
+    """Go on to a time since the memory's origin [s], as `run` does; by legs wherever these lead on under readings."""
     pulsed, origin = pulsed_chip(chip), origin_of(memory)
     m = motion.nothing(numbers, memory.u, memory.tau)
     trip = 0
@@ -131,10 +131,10 @@ def from_step_to_step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memo
             memory = counted_anew(memory)
             end = instant(pulsed, inputs, memory, end - (origin_of(memory) - origin))
             origin = origin_of(memory)
-        if log.counts[KEEPS] == SAMPLES and firmware.present(inputs.firmware[0]) and not asked(
+        if log.counts[KEEPS] == READINGS and firmware.present(inputs.firmware[0]) and not asked(
                 memory.lowest) and tick_legs.way_of(numbers, inputs, end - memory.point.time, False) == LEGS:
-            gone = tick_legs.go(numbers, inputs, memory, end, samples.times, log.counts[SAMPLED], samples.values)
-            memory, log.counts[SAMPLED] = tick_legs.as_gone(memory, gone), gone.done
+            gone = tick_legs.go(numbers, inputs, memory, end, readings.times, log.counts[READ], readings.values)
+            memory, log.counts[READ] = tick_legs.as_gone(memory, gone), gone.done
             if memory.point.time >= end or due(memory):
                 continue
         before = memory
@@ -151,11 +151,11 @@ def from_step_to_step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memo
             return before, CHATTER
         if has_rows(log.counts[KEEPS]):
             _note(numbers, chip, inputs, before, trip, memory, m, event, log)
-        if log.counts[KEEPS] == SAMPLES:
+        if log.counts[KEEPS] == READINGS:
             if asked(memory.lowest) and memory.point.time > before.point.time:
                 memory = memory._replace(lowest=followed(memory.lowest, m, share_of(numbers, inputs, memory), origin,
                                                          before.point.time, memory.point.time))
-            sample(numbers, inputs, before, memory, m, end, log, samples)
+            write_readings(numbers, inputs, before, memory, m, end, log, readings)
         log.counts[SHORT] = log.counts[SHORT] + 1 if play.present(numbers.play) and is_short(
             before, memory, event) else 0
         if log.counts[SHORT] >= legs.MOST_SHORT:
@@ -210,14 +210,14 @@ def _note(numbers: Numbers, chip: Chip, inputs: Inputs, before: Memory, trip: in
         write_event(log, time_of(memory), kind, memory.point.y.q)
 
 
-def sample(numbers: Numbers, inputs: Inputs, before: Memory, memory: Memory, m: Motion, end: float, log: Log,
-           samples: Samples) -> None:
+def write_readings(numbers: Numbers, inputs: Inputs, before: Memory, memory: Memory, m: Motion, end: float, log: Log,
+           readings: Readings) -> None:
     """Write down what stands at the given times that a motion reaches."""
-    origin, done, values = origin_of(memory), log.counts[SAMPLED], samples.values
+    origin, done, values = origin_of(memory), log.counts[READ], readings.values
     shown = memory.point.time - (SAME * memory.beat if firmware.present(inputs.firmware[0]) else 0.0)
-    while done < samples.times.size and (samples.times[done] - origin < shown or memory.point.time >= end):
+    while done < readings.times.size and (readings.times[done] - origin < shown or memory.point.time >= end):
         m = motion.prepared(m)
-        y = motion.state(m, min(samples.times[done] - origin, end) - m.t0)
+        y = motion.state(m, min(readings.times[done] - origin, end) - m.t0)
         values[0, done], values[1, done], values[2, done] = y.q, y.w, m.mode.contact
         values[3, done], values[4, done] = memory.chip.drive, memory.chip.error
         values[5, done] = wiper_at(numbers.sensor, before.point.wiper, y.q)
@@ -230,7 +230,7 @@ def sample(numbers: Numbers, inputs: Inputs, before: Memory, memory: Memory, m: 
             values[14, done], values[16, done], values[17, done] = firm.duty, firm.r, firm.trip
             values[15, done] = firm.r if firm.goal == NOWHERE else firm.goal
         done += 1
-    log.counts[SAMPLED] = done
+    log.counts[READ] = done
 
 
 def stands(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, end: float) -> bool:

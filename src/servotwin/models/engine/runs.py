@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from servotwin.models.engine import controller
 from servotwin.models.engine.batch.tiles import chip_of, numbers_of
 from servotwin.models.engine.bus.bus_records import put_vector
-from servotwin.models.engine.log import IDLE, KEEPS, NO_ROWS, SAMPLED, SAMPLES, SHORT, Log, Samples
+from servotwin.models.engine.log import IDLE, KEEPS, NO_ROWS, READ, READINGS, SHORT, Log, Readings
 from servotwin.models.engine.memory import (
     Inputs,
     Memory,
@@ -49,7 +49,7 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
           status: Indices, ended: Floats, counts: Indices) -> None:
     """Let the lanes named in `which`, whose memories are given, go on for durations of their own [s].
 
-    `outputs` has the shape (n, 18, T), a table of `Samples` for each, and gets what stands at `times` from the one
+    `outputs` has the shape (n, 18, T), a table of `Readings` for each, and gets what stands at `times` from the one
     numbered `first_output` on; `counts` are those of a log. A lane whose status is `UNDERWAY` may be in the middle of a
     tick, one that has `ARRIVED` stays.
     """
@@ -61,7 +61,7 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
             continue
         inputs = inputs_of(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
         memory, how = run(numbers_of(lanes, lane), chip_of(lanes, lane), inputs, memory_at(memories, k),
-                          durations[k], status[k] == UNDERWAY, Samples(times, outputs[k]), first_output[k], counts)
+                          durations[k], status[k] == UNDERWAY, Readings(times, outputs[k]), first_output[k], counts)
         status[k] = how
         ended[k] = time_of(memory)
         if how == COMPLETED:
@@ -100,7 +100,7 @@ def to_first_ticks(lanes: Lanes, curve: Floats, torques: Floats, torque_first: I
             seen += 1
         inputs = inputs_of(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
         memory, how = run(numbers_of(lanes, lane), chip_of(lanes, lane), inputs, memory_at(memories, k), phase, False,
-                          Samples(times[:seen], outputs[k]), 0, counts)
+                          Readings(times[:seen], outputs[k]), 0, counts)
         if how == COMPLETED:
             put_memory(memories.rows[k], memory)
             durations[k], first_output[k] = durations[k] - phase, seen
@@ -128,15 +128,15 @@ def inputs_of(lanes: Lanes, curve: Floats, torque: Floats, lane: int) -> Inputs:
 
 
 def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: float, underway: bool,
-        samples: Samples, done: int, counts: Indices) -> tuple[Memory, int]:
+        readings: Readings, done: int, counts: Indices) -> tuple[Memory, int]:
     """Go on for a duration [s]; return the memory, of before what went wrong, and a status.
 
-    `underway` is whether a program knows its next tick and pulse. Samples are taken from the one numbered `done` on.
+    `underway` is whether a program knows its next tick and pulse. Readings are taken from the one numbered `done` on.
     """
     pulsed = pulsed_chip(chip)
     memory = resumed(pulsed, inputs, memory, False)
     if firmware.present(inputs.firmware[0]) and not underway:
         controller.resume(inputs, memory)
-    counts[KEEPS], counts[IDLE], counts[SHORT], counts[SAMPLED] = SAMPLES, 0, 0, done
+    counts[KEEPS], counts[IDLE], counts[SHORT], counts[READ] = READINGS, 0, 0, done
     end = instant(pulsed, inputs, memory, memory.point.time + duration)
-    return from_step_to_step(numbers, chip, inputs, memory, end, Log(NO_ROWS, NO_ROWS, NO_ROWS, counts), samples)
+    return from_step_to_step(numbers, chip, inputs, memory, end, Log(NO_ROWS, NO_ROWS, NO_ROWS, counts), readings)

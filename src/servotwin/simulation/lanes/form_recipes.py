@@ -39,8 +39,6 @@ from servotwin.models.terms.dependence import (
     SHOWN,
     SILENCE,
     SLACK,
-    SPRING,
-    STEEP_W,
     STEPS,
     STRAIGHT,
     TABLE,
@@ -49,11 +47,11 @@ from servotwin.models.terms.dependence import (
 from servotwin.simulation.compile import Recipe
 from servotwin.simulation.compile.unread import IN_GENERAL
 
+Parts = tuple[tuple[Recipe, tuple[str, ...]], ...]  # kernels, and entries of theirs
 _SIDE = tuple(f"servotwin.models.engine.batch.side_by_side:{name}" for name in ("start", "go_on", "advance", "refit"))
-_ENTRIES = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "ready", "go_on", "note_failures"))
+_ENTRIES = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "ready", "to_first_ticks", "go_on",
+                                                                    "note_failures"))
 _DIGITAL = PROGRAM | BEYOND | AT_COMMANDS | PWM | ONE_WAY
-_MEAN = FOLLOWS | STEEP_W  # servos without pulses
-_NOT_DIGITAL = _MEAN | PULSES | ON_I
 _EVERYWHERE = STRAIGHT | DRY | AT_STOPS | SHOWN
 
 # --- Lanes side by side -----------------------------------------------------------------------------------------------
@@ -92,19 +90,16 @@ _LEFT_TO_EVENTS = AT_STOPS | SHOWN | PULSES | STEPS
 CALM = Recipe("calm", ("servotwin.models.engine.batch.event_free:go",), knows=PLAIN & ~(
     _LEFT_TO_EVENTS | RECORDED | TABLE), leaves=_LEFT_TO_EVENTS)
 """Ticks of lanes in which nothing happens, three times faster; the others are for `ALL_RUNS`."""
-_FIRST_TICKS = "servotwin.models.engine.runs:to_first_ticks"
-ALL_DIGITAL = Recipe("digital_runs", (*_ENTRIES, _FIRST_TICKS), knows=~(_NOT_DIGITAL | SPRING), always=PROGRAM | PWM,
-                     never=WITH_ROWS)
 _TICKS = _PLAIN & ~ON_Q | _DIGITAL
 LEGS = _TICKS | PLAY | TWO_BODIES | BY_SHARE
 """What legs follow exactly."""
 BY_LEGS = Recipe("by_legs", ("servotwin.models.engine.legs.leg_runs:go_on",), vector=True,
                  knows=LEGS | ON_Q | CURVED_Q | FADING, always=PROGRAM | PWM)
-"""Digital servos from tick to tick, one after the other; what is left of a call is for `ALL_DIGITAL`. A spring, a
+"""Digital servos from tick to tick, one after the other; what is left of a call is for `ALL_RUNS`. A spring, a
 pendulum and friction that fades count as if their torques stayed within a tick: only where that is asked for."""
 BY_SERIES = Recipe("by_series", ("servotwin.models.engine.bus.coupled_runs:go_on",),
                    knows=LEGS & ~TABLE | ON_HEAT | REGULATED, always=PROGRAM | PWM)
-"""The same whose windings get warm, or whose supply has a limit; what is left of a call is for `ALL_DIGITAL`."""
+"""The same whose windings get warm, or whose supply has a limit; what is left of a call is for `ALL_RUNS`."""
 BY_TICKS = Recipe("by_ticks", ("servotwin.models.engine.batch.digital_batch:go_on",), vector=True,
                   knows=_TICKS & ~DROPS,
                   always=PROGRAM | PWM)
@@ -137,9 +132,10 @@ TICKS = Recipe("ticks", (
 """Lanes of all forms between two calls: what is imposed on them, and the way from tiles to records and back."""
 ENDING = Recipe("ending", ("servotwin.models.engine.cosim.final_checks:look_at_lanes",), vector=True, knows=~_DIGITAL)
 _PARTS = {BY_TICKS: (_BY_TICKS, _BY_LEGS), BY_LEGS: (_BY_LEGS,),
-          BY_SERIES: (_BY_SERIES,), ALL_DIGITAL: ((ALL_DIGITAL, ()), _BY_LEGS)}
-_CHAINS = {BY_TICKS: (BY_TICKS, BY_LEGS, ALL_DIGITAL), BY_LEGS: (BY_LEGS, ALL_DIGITAL),
-           BY_SERIES: (BY_SERIES, ALL_DIGITAL)}
+          BY_SERIES: (_BY_SERIES,)}
+IN_LEGS = (_BY_LEGS,)
+"""What follows programs within `ALL_RUNS` wherever legs lead on, as `parts_of` has it."""
+_CHAINS = {BY_TICKS: (BY_TICKS, BY_LEGS, ALL_RUNS), BY_LEGS: (BY_LEGS, ALL_RUNS), BY_SERIES: (BY_SERIES, ALL_RUNS)}
 
 
 def last_of(recipe: Recipe) -> Recipe:
@@ -168,7 +164,7 @@ def _room_of(recipe: Recipe) -> tuple[Any, ...]:
     return (digital_tiles.tile_room(),) if recipe == BY_TICKS else ()
 
 
-def parts_of(recipe: Recipe) -> tuple[tuple[Recipe, tuple[str, ...]], ...]:
+def parts_of(recipe: Recipe) -> Parts:
     """Return the kernels by which lanes of a form may go, as `compile.unread` is asked of them.
 
     Those that say by themselves whether they do follow all numbers.
@@ -181,7 +177,7 @@ def side_by_side(form: int, dtype: str) -> Recipe:
     return _BY_FORMULA[dtype] if form == tiles.ONE_FORMULA else _BY_FORM[form]
 
 
-KERNELS = tuple(sorted((*(one.name for one in (ALL_RUNS, ALL_DIGITAL, BY_LEGS, BY_SERIES, BY_TICKS,
+KERNELS = tuple(sorted((*(one.name for one in (ALL_RUNS, BY_LEGS, BY_SERIES, BY_TICKS,
                                                *_BY_FORMULA.values(), *_BY_FORM.values())),
-                        *(one.name + IN_GENERAL for one in (ALL_RUNS, ALL_DIGITAL)))))
+                        ALL_RUNS.name + IN_GENERAL)))
 """Names of all kernels in which lanes run."""

@@ -68,7 +68,11 @@ class Terms:
 
     def fit(self, recipe: Recipe) -> Any:
         """Tell for which lanes kernels are made: for those whose numbers they know, and all of whose terms."""
-        return self.suit(recipe.knows) & np.logical_not(self.have_any(_unknown(recipe)))
+        return self.suit(recipe.knows) & self.known_to(recipes.parts_of(recipe))
+
+    def known_to(self, parts: recipes.Parts) -> Any:
+        """Tell in which lanes kernels, or what they call, know all numbers."""
+        return np.logical_not(self.have_any(_unknown(parts)))
 
     def suit(self, knows: int) -> Any:
         """Tell for which lanes kernels would be made that follow this, if they knew all numbers."""
@@ -85,9 +89,9 @@ def _said(law: Callable[..., int], *given: Any) -> Any:
 
 
 @cache
-def _unknown(recipe: Recipe) -> tuple[str, ...]:
+def _unknown(parts: recipes.Parts) -> tuple[str, ...]:
     """Return the numbers that kernels do not know, nor those by which they may go."""
-    return tuple(dict.fromkeys(name for part in recipes.parts_of(recipe) for name in unread(*part)))
+    return tuple(dict.fromkeys(name for part in parts for name in unread(*part)))
 
 
 class SideBySide(NamedTuple):
@@ -132,7 +136,7 @@ def kinds_with(numbers: Numbers, chip: Chip, lanes: int, dtype: str, sweeps: Mas
     terms = Terms(numbers, chip, firmware, sweeps.any() and sweeps, inputs | TABLE * curved)
     left = np.ones(lanes, np.bool_)
     found: Iterator[SideBySide | OneByOne] = (
-        _at_last(terms, left, recipes.ALL_DIGITAL if np.any(terms.ask(PWM)) else recipes.ALL_RUNS) if watched
+        _at_last(terms, left) if watched
         else _alone(terms, left, nearly) if np.any(terms.ask(SPRING | PWM)) else _of_analog(terms, left, dtype))
     return [kind for kind in found if len(kind.which)]
 
@@ -148,27 +152,29 @@ def _of_analog(terms: Terms, left: Mask, dtype: str) -> Iterator[SideBySide | On
             yield _together(terms, form, own_type, which)
     if not is_plain() and np.any(left & terms.suit(recipes.CALM.knows)):
         yield OneByOne(_take(terms, left, recipes.ALL_RUNS, terms.fit(recipes.CALM)), recipes.ALL_RUNS, True)
-    yield from _at_last(terms, left, recipes.ALL_RUNS)
+    yield from _at_last(terms, left)
 
 
 def _alone(terms: Terms, left: Mask, nearly: bool) -> Iterator[OneByOne]:
     """Return how lanes run of which some have a spring between two bodies, or a program."""
     digital, sprung = np.any(terms.ask(PWM)), left & terms.ask(SPRING)
     left &= ~sprung
-    yield from _at_last(terms, sprung, recipes.ALL_RUNS)
+    yield from _at_last(terms, sprung)
     if digital and not is_plain():
         yield OneByOne(_take(terms, left, recipes.BY_TICKS), recipes.BY_TICKS)
         yield OneByOne(_take(terms, left, recipes.BY_LEGS, nearly or terms.suit(recipes.LEGS)), recipes.BY_LEGS)
         yield OneByOne(_take(terms, left, recipes.BY_SERIES), recipes.BY_SERIES)
-    yield from _at_last(terms, left, recipes.ALL_DIGITAL if digital else recipes.ALL_RUNS)
+    yield from _at_last(terms, left)
 
 
-def _at_last(terms: Terms, left: Mask, recipe: Recipe) -> Iterator[OneByOne]:
+def _at_last(terms: Terms, left: Mask) -> Iterator[OneByOne]:
     """Return how those run that no faster form takes: none that its kernels do not know either, as terms are now."""
-    if not is_plain():  # a fast form has no worth there, nor to ask for it
-        yield OneByOne(_take(terms, left, recipe), recipe)
-        recipe = in_general(recipe)
-    yield OneByOne(np.flatnonzero(left), recipe)
+    if is_plain():  # a fast form has no worth there, nor to ask for it
+        yield OneByOne(np.flatnonzero(left), recipes.ALL_RUNS)
+        return
+    in_legs = terms.known_to(recipes.IN_LEGS) if np.any(left & terms.ask(PWM)) else True
+    yield OneByOne(_take(terms, left, recipes.ALL_RUNS, in_legs), recipes.ALL_RUNS)
+    yield OneByOne(np.flatnonzero(left), in_general(recipes.ALL_RUNS))
 
 
 def _take(terms: Terms, left: Mask, recipe: Recipe, wanted: Any = True) -> Indices:

@@ -51,7 +51,7 @@ def recipe() -> Recipe:
     """Return what the kernel is made of; it is none of those that wheels have libraries of."""
     return Recipe("bench", tuple(f"servotwin.models.engine.live.bench:{name}" for name in (
         "make", "begin", "begin_at", "heed", "change", "take", "count", "draw", "look",
-        "tune", "snapped", "next_edge", "advance", "advance_together")), never=("SAMPLES",))
+        "tune", "snapped", "next_edge", "advance", "advance_together")), never=("READINGS",))
 
 
 class NoCompilerError(InputError):
