@@ -13,6 +13,7 @@ from typing import NamedTuple
 from .drivetrain_laws import Plant, Signs, sgn
 
 REST_SPEED = 1e-6  # rad/s: slower after an impact, it rests on its stop
+NO_WAY = 4e-15  # of an angle of 1 rad: so near to a stop there is nothing between them
 Q, W, I, X, V, T_W, T_H = range(7)  # noqa: E741 - the letter of the current
 
 
@@ -177,6 +178,13 @@ def _flank(P: Plant, m: Mode, y: list[float]) -> float:
         return 0.0
     y[W] = y[V] = (P.J_L * w + P.J_m * v) / P.J
     lost = 0.5 * (P.J_L * w**2 + P.J_m * v**2 - P.J * y[W] ** 2)
+    near = NO_WAY * max(1.0, abs(y[Q]))
+    if w != 0.0 and (y[Q] >= P.upper - near if y[W] > 0.0 else y[Q] <= P.lower + near):
+        # Motor and stop hit the output in turn, ever weaker and in no time (`test_drivetrain_stops.impacts`)
+        lost += 0.5 * P.J * y[W] ** 2
+        y[Q] = P.upper if y[W] > 0.0 else P.lower
+        y[X], y[W], y[V] = y[Q] + 0.5 * m.flank * P.play, 0.0, 0.0
+        return lost
     low, high = blocked(P, y[Q])
     if (high and y[W] > 0.0) or (low and y[W] < 0.0):
         return lost + _stop(P, m, y)

@@ -122,6 +122,13 @@ def test_effects_mixed_in_many_servos(terms):
     assert left_out([random_case(seed, frozenset(terms)) for seed in range(101, 107)], tolerance_of(terms)) <= 1
 
 
+@pytest.mark.long
+def test_a_motor_that_hits_an_output_on_its_way_into_a_stop():
+    """Whatever it is followed by hangs on how the impacts between motor and stop end."""
+    case = random_case(245, frozenset({"m3", "heat", "backlash", "stops", "limit"}))
+    assert left_out([replace(case, duration=0.13)], tolerance_of({"backlash"}), plain=True) == 0
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [*range(2000, 2016), 2030, 2033, 2056, 2071, 2078, 2109, 2138, 2149])
 def test_any_half_of_the_effects(seed):

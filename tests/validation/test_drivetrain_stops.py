@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mpmath import mp, mpf
 from scipy.optimize import brentq
 
 from servotwin.models.engine.motions.motion import ended, prepared, state
@@ -131,6 +132,52 @@ def test_a_flank_that_hits_an_output_on_its_stop(restitution, pull):
     assert result["motor_speed"][0] / N == pytest.approx(back, abs=1e-6)
     assert result["output_speed"][0] == pytest.approx(back, abs=1e-6)
     assert result.energy.stops > 0.0
+
+
+def impacts(way, speed, pull, restitution):
+    """Yield when each impact comes of an output that is pulled to a stop ahead of its motor, with the motor's speed.
+
+    Both begin together, so far before the stop. Each flight is a parabola, in 60 digits, and no impact is too small.
+    """
+    with mp.workdps(60):
+        left, gap, w, v, t, a = mpf(way), mpf(0), mpf(speed), mpf(speed), mpf(0), pull / mpf(OUTPUT)
+        while True:
+            root, closing = mp.sqrt(w * w + 2 * a * left), v - w
+            hits = 2 * left / (w + root) if w > 0 else (root - w) / a
+            reach = closing * closing - 2 * a * gap
+            meets = 2 * gap / (closing + mp.sqrt(reach)) if closing > 0 and reach > 0 else mp.inf
+            after = min(hits, meets)
+            left -= w * after + a * after**2 / 2
+            gap += a * after**2 / 2 - closing * after
+            w, t = w + a * after, t + after
+            if hits < meets:
+                left, w = mpf(0), -restitution * w
+            else:
+                gap, w = mpf(0), (OUTPUT * w + (INERTIA - OUTPUT) * v) / INERTIA
+                v = w
+            yield float(t), float(v), float(left + gap)
+
+
+@pytest.mark.parametrize("restitution", [0.1, 0.395, 0.7])
+def test_an_output_between_motor_and_stop_hits_both_until_they_rest(restitution):
+    """Ever smaller impacts without end, in no time: where they lead is where the engine stops both, on the stop."""
+    pull, stop, half = 1e-6, 1.005, 0.5 * PLAY["gear.backlash"]
+    case = undriven(PLAY | {"electronics.off_state": "coast", "stops.upper_angle": stop,
+                            "stops.restitution": restitution}, load={"torque": -pull}, duration=0.005,
+                    initial={"output_angle": 1.0, "output_speed": 1.2, "motor_angle": N * (1.0 + half),
+                             "motor_speed": 1.2 * N})
+    result = simulate(case, np.array([0.005]))
+    every = list(itertools.takewhile(lambda impact: impact[1] > 1e-12, impacts(stop - 1.0, 1.2, pull, restitution)))
+    first, (last, slowest, left) = every[:2], every[-1]
+    assert len(every) > 60
+    assert slowest < 2e-12
+    assert left < 1e-9  # of the motor's way to the stop, when it has lost all speed
+    assert [event.time for event in result.events[-4:]] == pytest.approx(
+        [first[0][0], first[1][0], last, last], abs=1e-8)
+    assert result["output_angle"][0] == stop
+    assert result["motor_angle"][0] / N - half == pytest.approx(stop, abs=1e-15)
+    assert result["output_speed"][0] == result["motor_speed"][0] == 0.0
+    assert result.energy.stops == pytest.approx(0.5 * INERTIA * 1.2**2 + 0.005 * pull, rel=1e-12)
 
 
 def test_a_locked_motor_lets_the_output_bounce_within_its_play():
