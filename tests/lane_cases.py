@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from servotwin.models.engine.batch.tiles import Lanes
+from servotwin.models.engine.lanes import Lanes
 from servotwin.models.engine.memory import ACCURACY
 from servotwin.models.terms.bridge import Bridge, Off
 from servotwin.models.terms.chip import NO_CHIP

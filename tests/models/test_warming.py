@@ -9,9 +9,8 @@ from scipy.integrate import solve_ivp
 import servotwin as st
 from servotwin.models.engine.batch import warm_backlash, warm_segments
 from servotwin.models.engine.batch.rk_steps import State
-from servotwin.models.engine.dynamics import coefficients
+from servotwin.models.engine.dynamics import coefficients, guards
 from servotwin.models.engine.dynamics.rates import rates_of
-from servotwin.models.engine.events import guards
 from servotwin.models.engine.legs import legs
 from servotwin.models.engine.motions import warm_exponential, warm_law, warm_linear
 from servotwin.models.state.modes import (

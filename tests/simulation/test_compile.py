@@ -41,7 +41,7 @@ def test_compiled_equals_plain():
 
 @pytest.mark.long
 def test_what_is_derived():
-    text = derive(Recipe("run", ("servotwin.models.engine.runs:run",))).text
+    text = derive(Recipe("run", ("servotwin.models.engine.run.runs:run",))).text
     assert "def terms_frame__decide(" in text
     assert "from servotwin.models.engine.memory import Point as engine_memory__Point" in text
     assert "physics_elementary__log1p(" in text  # whose digits are the same everywhere

@@ -9,8 +9,7 @@ import servotwin as st
 from servotwin.models.engine.bus.coupled_courses import first_below
 from servotwin.models.engine.bus.coupled_laws import pressing_of, share_of
 from servotwin.models.engine.bus.coupled_units import Unit
-from servotwin.models.engine.dynamics import contacts, currents
-from servotwin.models.engine.events import guards
+from servotwin.models.engine.dynamics import contacts, currents, guards
 from servotwin.models.state.modes import (
     BACKWARD,
     CURRENT_BACKWARD,

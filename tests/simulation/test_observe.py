@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import servotwin as st
-from servotwin.models.engine.run import mode_of
+from servotwin.models.engine.run.run import mode_of
 from servotwin.models.outputs import PLAIN
 from servotwin.simulation.simulator import _sample
 

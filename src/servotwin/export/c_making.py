@@ -21,10 +21,10 @@ from servotwin.simulation.compile.signatures import named
 
 if TYPE_CHECKING:
     from servotwin.loads import Load
-    from servotwin.models.engine.alone import Alone
+    from servotwin.models.engine.run.alone import Alone
     from servotwin.simulation.compile.standalone import Standalone
 
-_KERNELS = "servotwin.models.engine.alone_making"
+_KERNELS = "servotwin.models.engine.run.alone_making"
 _ENTRIES = ((BoundedServo, "bounded"), (AveragedServo, "averaged"), (AveragedServoInductive, "averaged"),
             (DigitalServo, "digital"))
 _MAKING = Template('''

@@ -20,9 +20,9 @@ from servotwin.models import (
     BoundedServo,
     DigitalServo,
 )
-from servotwin.models.engine.alone import Alone, Seen
 from servotwin.models.engine.log import COUNTS, EVENTS, LEFT, Happened, Log, Row
 from servotwin.models.engine.memory import BEAT, Inputs, Lowest, Memories, Memory, Point
+from servotwin.models.engine.run.alone import Alone, Seen
 from servotwin.models.outputs import SIGNALS
 from servotwin.models.state.modes import Mode, Vector
 from servotwin.models.state.records import numbers_in, record_of

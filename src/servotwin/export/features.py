@@ -60,7 +60,7 @@ def features_of(numbers: Numbers, chip: Chip, program: Firmware, table: bool) ->
 def recipe_of(flags: int) -> Recipe:
     """Return the recipe of a servo that asks for this; what else there is is left out."""
     always = PROGRAM | PWM if flags & PROGRAM else 0
-    return Recipe("alone", tuple(f"servotwin.models.engine.alone:{entry}" for entry in ENTRIES), knows=flags,
+    return Recipe("alone", tuple(f"servotwin.models.engine.run.alone:{entry}" for entry in ENTRIES), knows=flags,
                   always=always, never=("ALL", "READINGS"))
 
 

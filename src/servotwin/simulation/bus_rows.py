@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from servotwin.models.engine.bus import event_log
-from servotwin.models.engine.events import guards
+from servotwin.models.engine.dynamics import guards
 from servotwin.models.state.modes import Mode
 from servotwin.simulation.engine import TRIPS, Event, Part, Plan, event_name
 from servotwin.simulation.trajectory import Motions

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine import controller
-from servotwin.models.engine.batch.tiles import Lanes
 from servotwin.models.engine.bus import bus_batch, bus_unit, event_log, event_queue
 from servotwin.models.engine.bus.bus_batch import Buses
 from servotwin.models.engine.bus.bus_inputs import Tables
@@ -19,6 +18,7 @@ from servotwin.models.engine.bus.coupled_motion import at_start
 from servotwin.models.engine.bus.coupled_units import Coupling, Unit
 from servotwin.models.engine.bus.event_log import Tape
 from servotwin.models.engine.demands import demanded
+from servotwin.models.engine.lanes import Lanes
 from servotwin.models.engine.log import Row
 from servotwin.models.engine.memory import Memories, Memory, forgotten, resumed
 from servotwin.models.engine.step import DIVERGED

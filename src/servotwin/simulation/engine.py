@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 
 from servotwin.errors import SimulationError
 from servotwin.models.base import Place
-from servotwin.models.engine import run as engine_run
 from servotwin.models.engine.events import kinds
 from servotwin.models.engine.log import ALL, COUNTS, EVENTS, FEW, KEEPS, LEFT, MOTIONS, PAUSED, Happened, Log, Row
 from servotwin.models.engine.memory import ACCURACY, Inputs, Memories, Memory, time_of
-from servotwin.models.engine.run import Plant
+from servotwin.models.engine.run import run as engine_run
+from servotwin.models.engine.run.run import Plant
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.state.modes import Mode
 from servotwin.models.state.records import fields_of, record_of
@@ -37,8 +37,8 @@ from servotwin.physics.pieces import Pieces
 from servotwin.simulation.compile import Recipe, is_compiled, is_plain, kernels
 from servotwin.simulation.status import Status
 
-ONE = Recipe("one", ("servotwin.models.engine.run:go_on", "servotwin.models.engine.at:at",
-                     "servotwin.models.engine.at:resolution", "servotwin.models.engine.live.stretch:shown"),
+ONE = Recipe("one", ("servotwin.models.engine.run.run:go_on", "servotwin.models.engine.run.at:at",
+                     "servotwin.models.engine.run.at:resolution", "servotwin.models.engine.live.stretch:shown"),
              never=("READINGS",))
 """One servo by the one loop, and its signals at any times; kernels take hardly longer for what a servo lacks."""
 ROOM, STEPS = 4096, 4096  # rows of a log, and steps between two looks at the log, at progress and at interrupts

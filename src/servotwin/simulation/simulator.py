@@ -14,7 +14,7 @@ from servotwin.errors import CommandError, InputError, UnknownNameError
 from servotwin.loads import Constant, as_load
 from servotwin.models import DigitalServo, Model
 from servotwin.models.engine.memory import ACCURACY, Memory, started, with_bodies
-from servotwin.models.engine.run import mode_of
+from servotwin.models.engine.run.run import mode_of
 from servotwin.models.outputs import PLAIN
 from servotwin.models.samples import Samples
 from servotwin.models.state.modes import INSIDE, RIGID, Mode

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine import at as engine_at
-from servotwin.models.engine.at import SHOWN
 from servotwin.models.engine.bus.shared_source import on_stiff_source
 from servotwin.models.engine.log import ALONE, DENSE, SERIES, Row
 from servotwin.models.engine.motions import motion
 from servotwin.models.engine.motions.motion import CREEP, Motion
-from servotwin.models.engine.run import Plant
+from servotwin.models.engine.run import at as engine_at
+from servotwin.models.engine.run.at import SHOWN
+from servotwin.models.engine.run.run import Plant
 from servotwin.models.samples import Samples
 from servotwin.models.state.records import record_of
 from servotwin.simulation.engine import Part, Plan, kernels_of_one, named
@@ -137,7 +137,7 @@ class Motions(Sequence[Segment]):
 
     @cached_property
     def resolution(self) -> Array:
-        """What `engine.at.resolution` finds of each, shape (3, n) [s]."""
+        """What `engine.run.at.resolution` finds of each, shape (3, n) [s]."""
         found = np.empty((3, len(self)))
         for plan, places in self._by_plan():
             own = np.empty((3, len(places)))
@@ -146,7 +146,7 @@ class Motions(Sequence[Segment]):
         return found
 
     def shown(self, index: NDArray[np.intp], ages: Array, *, ends: bool = False) -> Array:
-        """Return what holds at times after the beginnings of motions [s], as `engine.at.at` shows it, shape (20, n).
+        """Return what holds at times after the beginnings of motions [s], as `engine.run.at.at` shows it, shape (20, n).
 
         `ends` says that motions end there: what is only interpolated is followed anew.
         """

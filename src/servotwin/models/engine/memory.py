@@ -99,6 +99,7 @@ put_memory = record_writer("put_memory", Memory)
 put_firm = record_writer("put_firm", Firm)
 point_of = record_reader("point_of", Point)
 put_point = record_writer("put_point", Point)
+put_vector = record_writer("put_vector", Vector)
 
 
 def started(y: Vector, mesh: int, firm: Programs) -> Memory:

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 
 from servotwin.models.engine import controller
-from servotwin.models.engine.dynamics import currents
-from servotwin.models.engine.events import crossings, first_event, guards
+from servotwin.models.engine.dynamics import currents, guards
+from servotwin.models.engine.events import crossings, first_event
 from servotwin.models.engine.memory import SAME, Inputs, Memory, Point, edge_of, in_force, origin_of, since
 from servotwin.models.engine.motions import choice, motion
 from servotwin.models.engine.motions.motion import Motion

@@ -118,7 +118,7 @@ def _no_solution(square: Any, x: NDArray[np.float64]) -> None:
 
 
 _INSTEAD: dict[str, Callable[..., Any]] = {
-    "engine_step__step": _lost_step, "engine_runs__run": _lost_run, "bus_event_queue__through": _lost_bus,
-    "batch_event_free__after": _not_calm, "engine_run__mode_under": _mode_so_far,
+    "engine_step__step": _lost_step, "run_runs__run": _lost_run, "bus_event_queue__through": _lost_bus,
+    "batch_event_free__after": _not_calm, "run_run__mode_under": _mode_so_far,
     "engine_observe__observed": _nothing_seen, "cosim_final_checks__marks": _no_marks,
     "compile_joint_torques___solve": _no_solution}

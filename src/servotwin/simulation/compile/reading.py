@@ -25,7 +25,7 @@ from servotwin.simulation.compile.signatures import signatures
 from servotwin.simulation.compile.unread import in_general
 
 _Number = tuple[tuple[str, ...], str]  # the fields of its record, and its own name
-_RUNS = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "go_on"))
+_RUNS = tuple(f"servotwin.models.engine.run.runs:{name}" for name in ("start", "go_on"))
 _COPYING = flat_name(records.__name__, "")  # functions that only take records out of memory, or put them there
 
 

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine.batch import tiles
-from servotwin.models.engine.batch.tiles import Lanes, Outputs
+from servotwin.models.engine.lanes import Lanes, Outputs
 from servotwin.models.engine.log import Happened, Log, Row
 from servotwin.models.engine.memory import Inputs, Memories, Memory
-from servotwin.models.engine.run import Plant
+from servotwin.models.engine.run.run import Plant
 from servotwin.models.state.records import record_of, rows_of
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.control import Firm

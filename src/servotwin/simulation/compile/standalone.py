@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from servotwin.simulation.compile.recipe import Recipe
 
 _ONCE = frozenset({  # called at one place, with structs of a kilobyte that would be copied: a third of the time
-    "engine_alone__advance", "engine_run__run", "engine_run__from_step_to_step", "engine_memory__resumed",
+    "run_alone__advance", "run_run__run", "run_run__from_step_to_step", "engine_memory__resumed",
     "engine_step__step", "engine_step__onward", "engine_step__follow", "motions_choice__begin",
     "motions_motion__nothing", "motions_motion__closed"})
 _SIZES = re.compile(r"\nCHECKED_SIZE\(.*?\);")

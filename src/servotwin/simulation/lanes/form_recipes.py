@@ -49,7 +49,7 @@ from servotwin.simulation.compile.unread import IN_GENERAL
 
 Parts = tuple[tuple[Recipe, tuple[str, ...]], ...]  # kernels, and entries of theirs
 _SIDE = tuple(f"servotwin.models.engine.batch.side_by_side:{name}" for name in ("start", "go_on", "advance", "refit"))
-_ENTRIES = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "ready", "to_first_ticks", "go_on",
+_ENTRIES = tuple(f"servotwin.models.engine.run.runs:{name}" for name in ("start", "ready", "to_first_ticks", "go_on",
                                                                     "note_failures"))
 _DIGITAL = PROGRAM | BEYOND | AT_COMMANDS | PWM | ONE_WAY
 _EVERYWHERE = STRAIGHT | DRY | AT_STOPS | SHOWN
@@ -121,7 +121,7 @@ _BY_TICKS = (replace(BY_TICKS, name="ticks_by_loops", knows=BY_TICKS.knows & ~_L
 
 # --- Lanes between calls ----------------------------------------------------------------------------------------------
 
-LOOK = Recipe("look", tuple(f"servotwin.models.engine.cosim.observe_batch:{name}" for name in ("side_by_side",
+LOOK = Recipe("look", tuple(f"servotwin.models.engine.batch.observe_batch:{name}" for name in ("side_by_side",
                                                                                                "one_by_one")))
 """Lanes of all forms: to look leaves out little where terms are absent."""
 TICKS = Recipe("ticks", (

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, LoadError
 from servotwin.models.base import Model
-from servotwin.models.engine.batch.tiles import Lanes
 from servotwin.models.engine.cosim.cosim_calls import INERTIA, SLACK, VOLTAGE
+from servotwin.models.engine.lanes import Lanes
 from servotwin.models.engine.memory import Memories, put_started
 from servotwin.models.state.modes import INSIDE, NOWHERE, RIGID, Vector
 from servotwin.models.state.records import columns_of, fields_of
@@ -56,7 +56,7 @@ class LaneNumbers:
 
     Attributes
     ----------
-    columns : models.engine.batch.tiles.Lanes
+    columns : models.engine.lanes.Lanes
     available : tuple of str
         Names of the signals, `time` apart.
     reduction : ndarray, shape (lanes,)

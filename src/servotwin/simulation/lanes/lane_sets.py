@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine.batch import tiles
+from servotwin.models.engine.lanes import Lanes
 from servotwin.models.engine.memory import NONE_YET, Memories
 from servotwin.models.state.records import TILE
 from servotwin.simulation.compile import Recipe, kernels
@@ -69,7 +70,7 @@ class Chain:
 class Tiles:
     """Lanes that run side by side, as they start."""
 
-    def __init__(self, kind: SideBySide, columns: tiles.Lanes, threads: int) -> None:
+    def __init__(self, kind: SideBySide, columns: Lanes, threads: int) -> None:
         self.which, self._kind, self.kernel = kind.which, kind, kind.recipe.name
         self.rows = tiles_of(kind, columns, math.inf)
         self.rows["clock"]["piece_end"] = math.inf
@@ -107,7 +108,7 @@ class Tiles:
         """Put what lanes remember into their places."""
         kernels(TICKS).to_tiles(places, self.which[places], memories, numbers.frame_period, self.rows)
 
-    def refit(self, columns: tiles.Lanes, lanes: Indices, places: Indices) -> None:
+    def refit(self, columns: Lanes, lanes: Indices, places: Indices) -> None:
         """Take the numbers of lanes anew."""
         kernels(self._kind.recipe).refit(columns, self._kind.form, lanes, places, self.rows)
 
@@ -158,7 +159,7 @@ class Tiles:
 class Records:
     """Lanes that run one by one, as they start."""
 
-    def __init__(self, kind: OneByOne, columns: tiles.Lanes, threads: int) -> None:
+    def __init__(self, kind: OneByOne, columns: Lanes, threads: int) -> None:
         self.which, self._recipe, self._calms, self.kernel = kind.which, kind.recipe, kind.calm, kind.recipe.name
         self.memories = nothing_yet(len(self.which))
         self.rows = self.memories.rows
@@ -188,7 +189,7 @@ class Records:
         """Put what lanes remember into their places."""
         put_back(self.memories, places, memories)
 
-    def refit(self, columns: tiles.Lanes, lanes: Indices, places: Indices) -> None:
+    def refit(self, columns: Lanes, lanes: Indices, places: Indices) -> None:
         """Let motions of lanes begin anew: their numbers are read at each step."""
         self.rows["point"]["anchor_time"][places] = math.inf
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine.batch.tiles import Lanes
+from servotwin.models.engine.lanes import Lanes
 from servotwin.models.state.records import columns_of, mapped, record_of, tiles_with
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
@@ -43,7 +43,7 @@ class Packed(NamedTuple):
     ----------
     law : str
         "voltage", "bounded", "pulse" or "digital".
-    lanes : models.engine.batch.tiles.Lanes
+    lanes : models.engine.lanes.Lanes
         Numbers, chips, torque and firmware as named tuples, each number one for all lanes or an array (B,); firmware
         is None where there is no program. Pieces are armature voltages or v_c [V] for "voltage" and "bounded", widths
         of pulses [s] for "pulse", either these or goals [rad] for "digital".

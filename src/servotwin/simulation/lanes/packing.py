@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, LoadError
 from servotwin.models.columns import LanePieces, LaneServo, LaneSignal
-from servotwin.models.engine.batch.tiles import Lanes
+from servotwin.models.engine.lanes import Lanes
 from servotwin.models.outputs import FIELDS as FIELDS_OF
 from servotwin.models.state.modes import Vector
 from servotwin.models.state.records import mapped

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine.batch import tiles
-from servotwin.models.engine.batch.tiles import Lanes, Outputs
+from servotwin.models.engine.lanes import Lanes, Outputs
 from servotwin.models.engine.memory import NONE_YET, Memories
 from servotwin.models.state.records import room
 from servotwin.simulation.compile import Recipe, kernels

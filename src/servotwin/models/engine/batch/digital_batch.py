@@ -12,17 +12,16 @@ from typing import TYPE_CHECKING, Any
 from servotwin.models.engine import controller
 from servotwin.models.engine.batch import digital_rounds as rounds
 from servotwin.models.engine.batch import digital_tiles as tiles
-from servotwin.models.engine.batch.tiles import numbers_of
+from servotwin.models.engine.lanes import ARRIVED, inputs_of, numbers_of
 from servotwin.models.engine.legs import tick_legs
 from servotwin.models.engine.memory import SAME, in_force
-from servotwin.models.engine.runs import ARRIVED, inputs_of
 from servotwin.models.state.modes import BACKWARD, FORWARD, FREE, RIGID, STUCK, Mode, one_body
 from servotwin.models.terms import control, profile
 from servotwin.models.terms.control import NOTHING_SENSED
 from servotwin.models.terms.sensor import sensed_voltage
 
 if TYPE_CHECKING:
-    from servotwin.models.engine.batch.tiles import Floats, Indices, Lanes
+    from servotwin.models.engine.lanes import Floats, Indices, Lanes
     from servotwin.models.engine.memory import Memories
 
 

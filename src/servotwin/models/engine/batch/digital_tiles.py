@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.models.engine import controller
-from servotwin.models.engine.batch.tiles import numbers_of
 from servotwin.models.engine.dynamics import contacts
+from servotwin.models.engine.lanes import UNDERWAY, inputs_of, numbers_of
 from servotwin.models.engine.memory import (
     SAME,
     Inputs,
@@ -19,7 +19,6 @@ from servotwin.models.engine.memory import (
     resumed,
 )
 from servotwin.models.engine.motions.choice import may_depend
-from servotwin.models.engine.runs import UNDERWAY, inputs_of
 from servotwin.models.state.modes import BACKWARD, FORWARD, RIGID, Mode, one_body
 from servotwin.models.state.records import reader, room, rows_of, tile_of, writer
 from servotwin.models.terms import profile, sensor, shaft, source, trips
@@ -39,7 +38,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from servotwin.models.engine.batch.tiles import Floats, Indices, Lanes
+    from servotwin.models.engine.lanes import Floats, Indices, Lanes
     from servotwin.models.engine.memory import Memories
 
 _GIVEN = Piece()  # what a servo follows that a program drives

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from servotwin.models.engine.batch.tiles import numbers_of
 from servotwin.models.engine.dynamics import contacts, currents
 from servotwin.models.engine.dynamics.coefficients import linear_coefficients
+from servotwin.models.engine.lanes import numbers_of
 from servotwin.models.engine.memory import BEAT, FRAMES, point_of
 from servotwin.models.engine.motions import first_order, second_order
 from servotwin.models.engine.step import COMPLETED
@@ -21,7 +21,7 @@ from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import error_of
 
 if TYPE_CHECKING:
-    from servotwin.models.engine.batch.tiles import Floats, Indices, Lanes
+    from servotwin.models.engine.lanes import Floats, Indices, Lanes
 
 
 def go(lanes: Lanes, which: Indices, duration: Floats, status: Any, rows: Any, done: Indices) -> int:

@@ -19,7 +19,7 @@ from servotwin.physics import bridge, motor, potentiometer, supply
 from servotwin.physics.pieces import Piece, piece_value
 
 if TYPE_CHECKING:
-    from servotwin.models.engine.batch.tiles import Floats
+    from servotwin.models.engine.lanes import Floats
 
 
 def begin(listed: Floats, size: int, own: bool, tile: Any, plan: Any, before: Any) -> int:

@@ -14,7 +14,7 @@ from servotwin.models.engine.batch import linear_segments, piecewise_segments
 from servotwin.models.engine.batch.linear_segments import MOST_ARCS, Arc
 from servotwin.models.engine.dynamics import contacts, currents
 from servotwin.models.engine.dynamics.coefficients import speed_coefficients
-from servotwin.models.engine.events.guards import SPEED
+from servotwin.models.engine.dynamics.guards import SPEED
 from servotwin.models.engine.motions import second_order
 from servotwin.models.engine.motions.elementary import fading, fma, log
 from servotwin.models.state.modes import BACKWARD, CONDUCTING, FORWARD, FREE, NO_CURRENT, RIGID, STUCK, Mode, sign_of

@@ -14,7 +14,7 @@ from servotwin.models.engine.batch.inductive_segments import Circuit, Flow, Went
 from servotwin.models.engine.batch.linear_segments import MOST_ARCS
 from servotwin.models.engine.dynamics import contacts, currents
 from servotwin.models.engine.dynamics.coefficients import against_of, speed_coefficients
-from servotwin.models.engine.events.guards import SPEED
+from servotwin.models.engine.dynamics.guards import SPEED
 from servotwin.models.engine.motions.elementary import fma
 from servotwin.models.state.modes import (
     BACKWARD,

@@ -14,7 +14,7 @@ from servotwin.models.engine.batch import linear_segments
 from servotwin.models.engine.batch.linear_segments import MOST_ARCS, Arc, Slid
 from servotwin.models.engine.dynamics import contacts, currents
 from servotwin.models.engine.dynamics.coefficients import linear_coefficients
-from servotwin.models.engine.events.guards import CREEPS, SHARE, SPEED, ZONE_DOWN, ZONE_UP
+from servotwin.models.engine.dynamics.guards import CREEPS, SHARE, SPEED, ZONE_DOWN, ZONE_UP
 from servotwin.models.engine.motions import stribeck
 from servotwin.models.engine.motions.elementary import decay, fma
 from servotwin.models.state.modes import BACKWARD, FORWARD, FREE, RIGID, Mode, Vector

@@ -13,8 +13,7 @@ import math
 from typing import Any, NamedTuple
 
 from servotwin.models.engine.batch import linear_segments
-from servotwin.models.engine.dynamics import contacts, currents
-from servotwin.models.engine.events import guards
+from servotwin.models.engine.dynamics import contacts, currents, guards
 from servotwin.models.engine.motions.elementary import log
 from servotwin.models.state.modes import BACKWARD, FORWARD, FREE, RIGID, STUCK, Mode, Vector
 from servotwin.models.terms import heat

@@ -25,7 +25,7 @@ from servotwin.models.state.modes import BACKWARD, FORWARD, FREE, RIGID, STUCK, 
 from servotwin.models.state.noise import gaussian
 
 if TYPE_CHECKING:
-    from servotwin.models.engine.batch.tiles import Floats, Indices, Lanes, Outputs
+    from servotwin.models.engine.lanes import Floats, Indices, Lanes, Outputs
 
 
 def go_on(pieces: Floats, listed: Floats, form: int, slack: bool, which: Indices, duration: float, times: Floats,

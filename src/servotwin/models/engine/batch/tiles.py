@@ -17,6 +17,7 @@ from servotwin.models.engine.batch.linear_segments import ArcNumbers
 from servotwin.models.engine.batch.rk_slots import slots_type
 from servotwin.models.engine.batch.rk_steps import SMOOTH, STEEP
 from servotwin.models.engine.dynamics import contacts
+from servotwin.models.engine.lanes import chip_at, chip_of, numbers_at, numbers_of
 from servotwin.models.engine.memory import FIRST_STEP
 from servotwin.models.engine.motions.motion import FINE
 from servotwin.models.engine.motions.warm_exponential import Gone, Law
@@ -29,9 +30,7 @@ from servotwin.physics.backlash import play
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Floats = NDArray[np.float64]
-    Indices = NDArray[np.int64]
-    Smalls = NDArray[np.int8]
+    from servotwin.models.engine.lanes import Lanes
 
 FEW = 2  # lanes that are not worth going together
 # How lanes go through a phase: as `braked_rounds`, `arc_rounds`, `band_rounds`, `stride_rounds`, `coil_rounds` and
@@ -237,8 +236,6 @@ def plan_room(real: str, form: int) -> NDArray[Any]:
     return rows
 
 
-chip_at = reader("chip_at", Chip)
-numbers_at = reader("numbers_at", Numbers)
 put_numbers = writer("put_numbers", Numbers)
 put_chip = writer("put_chip", Chip)
 arc_numbers_at = reader("arc_numbers_at", ArcNumbers)
@@ -253,51 +250,6 @@ put_clock = writer("put_clock", Clock)
 put_count = writer("put_count", Count)
 meter_at = reader("meter_at", Meter)
 put_meter = writer("put_meter", Meter)
-
-
-class Lanes(NamedTuple):
-    """What comes in, for all lanes of a chunk; each array has a column, an entry or a place in a tile for each lane."""
-
-    numbers: Any  # tiles of Numbers
-    chips: Any  # tiles of Chip
-    start: Floats  # (7, B), numbers of the state at t = 0
-    torque: Floats
-    seeds: Indices
-    pieces: Floats  # (n, 7)
-    piece_first: Indices
-    piece_count: Indices
-    edges: Floats
-    edge_first: Indices
-    edge_count: Indices
-    accuracy: float  # of what is integrated [rad]
-    firmware: Any  # records of Firmware, for each lane, or one for all that have none
-
-
-class Outputs(NamedTuple):
-    """What goes out: (B, T) each, or (0, 0) where it is not wanted."""
-
-    angle: Floats
-    speed: Floats
-    contact: Smalls
-    drive: Smalls
-    error: Floats
-    wiper: Floats
-    current: Floats
-    winding: Floats
-    housing: Floats
-    motor_angle: Floats
-    motor_speed: Floats
-    mesh: Smalls
-
-
-def numbers_of(lanes: Lanes, lane: int) -> Numbers:
-    """Return the numbers of a lane."""
-    return numbers_at(lanes.numbers[lane // TILE], lane % TILE)
-
-
-def chip_of(lanes: Lanes, lane: int) -> Chip:
-    """Return the chip of a lane."""
-    return chip_at(lanes.chips[lane // TILE], lane % TILE)
 
 
 def set_numbers(lanes: Lanes, form: int, first: int, size: int, tile: Any, place: int) -> None:
@@ -379,4 +331,4 @@ def plain_chip_at(rows: Any, j: int) -> Chip:
                 0.0, 0.0)
 
 
-__all__ = ["FEW", "TILE", "Lanes", "Outputs", "Plan", "Servo", "arc_numbers_at", "chip_at", "plan_type", "tile_type"]
+__all__ = ["FEW", "TILE", "Plan", "Servo", "arc_numbers_at", "chip_at", "numbers_at", "plan_type", "tile_type"]

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 from servotwin.models.engine.batch.rk_steps import cooled
 from servotwin.models.engine.batch.warm_segments import LONGEST, MARGIN, NEAR
-from servotwin.models.engine.dynamics import coefficients
+from servotwin.models.engine.dynamics import coefficients, guards
 from servotwin.models.engine.dynamics.coefficients import Apart
-from servotwin.models.engine.events import crossings, guards
+from servotwin.models.engine.events import crossings
 from servotwin.models.engine.legs import legs
 from servotwin.models.engine.legs.legs import MOST_LEGS, MOST_SHORT, SHORT, Gone, stands
 from servotwin.models.engine.motions import first_order, warm_exponential

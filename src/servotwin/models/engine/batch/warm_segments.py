@@ -13,7 +13,7 @@ from servotwin.models.engine.batch.linear_segments import Arc
 from servotwin.models.engine.batch.piecewise_segments import Band
 from servotwin.models.engine.batch.rk_steps import SMOOTH, STEEP, State, cooled, way_from_rest
 from servotwin.models.engine.dynamics import coefficients, currents
-from servotwin.models.engine.events.guards import SPEED
+from servotwin.models.engine.dynamics.guards import SPEED
 from servotwin.models.engine.motions import warm_exponential
 from servotwin.models.engine.motions.warm_exponential import Gone
 from servotwin.models.terms import friction, heat, load

@@ -6,24 +6,15 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.models.engine import controller, step
-from servotwin.models.engine.batch.tiles import chip_of
-from servotwin.models.engine.batch.tiles import numbers_of as numbers_at
+from servotwin.models.engine.batch.observe_batch import put
 from servotwin.models.engine.bus import bus_unit, coupled_ticks, event_queue, shared_source
 from servotwin.models.engine.bus.bus_inputs import Tables, Told, inputs_at
-from servotwin.models.engine.bus.bus_records import (
-    drive_of,
-    lowest_of,
-    numbers_of,
-    put_numbers,
-    put_point,
-    put_vector,
-    source_of,
-)
+from servotwin.models.engine.bus.bus_records import drive_of, lowest_of, numbers_of, put_numbers, put_point, source_of
 from servotwin.models.engine.bus.coupled_motion import APART
 from servotwin.models.engine.bus.coupled_units import put_unit_numbers, unit_state
 from servotwin.models.engine.bus.event_log import Tape, runs
-from servotwin.models.engine.cosim.observe_batch import put
-from servotwin.models.engine.lowest import asked
+from servotwin.models.engine.lanes import chip_of
+from servotwin.models.engine.lanes import numbers_of as numbers_at
 from servotwin.models.engine.memory import (
     FRAMES,
     Memories,
@@ -36,11 +27,13 @@ from servotwin.models.engine.memory import (
     memory_at,
     origin_of,
     put_memory,
+    put_vector,
     resumed,
     silent_now,
     since,
 )
 from servotwin.models.engine.observe import observed, on_bus, told_by
+from servotwin.models.engine.run.lowest import asked
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.state.modes import Mode, Vector
 from servotwin.models.terms import duty, firmware
@@ -48,7 +41,7 @@ from servotwin.models.terms.numbers import warm
 from servotwin.physics.pieces import Piece, piece_value
 
 if TYPE_CHECKING:
-    from servotwin.models.engine.batch.tiles import Floats, Indices, Lanes
+    from servotwin.models.engine.lanes import Floats, Indices, Lanes
 
 
 class Buses(NamedTuple):

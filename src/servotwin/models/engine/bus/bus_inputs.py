@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.models.engine import runs
+from servotwin.models.engine import lanes as columns
 from servotwin.models.engine.memory import Inputs
 
 if TYPE_CHECKING:
-    from servotwin.models.engine.batch.tiles import Floats, Indices, Lanes
+    from servotwin.models.engine.lanes import Floats, Indices, Lanes
 
 PLAIN = True  # the compiler takes it for False
 
@@ -42,5 +42,5 @@ def inputs_at(told: Any, seat: Any) -> Inputs:
 def inputs_of(lanes: Lanes, tables: Tables, lane: int) -> Inputs:
     """Return what a lane is told, and what hangs on its shaft."""
     first, start = tables.curve_first[lane], tables.torque_first[lane]
-    return runs.inputs_of(lanes, tables.curves[first:first + tables.curve_count[lane]],
+    return columns.inputs_of(lanes, tables.curves[first:first + tables.curve_count[lane]],
                           tables.torques[start:start + tables.torque_count[lane]], lane)

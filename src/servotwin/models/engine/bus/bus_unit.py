@@ -27,10 +27,9 @@ from servotwin.models.engine.bus.bus_records import (
     put_piece,
     put_point,
     put_track,
-    put_vector,
     vector_of,
 )
-from servotwin.models.engine.memory import NOT_ASKED, Inputs, Memory, Point, since
+from servotwin.models.engine.memory import NOT_ASKED, Inputs, Memory, Point, put_vector, since
 from servotwin.models.engine.motions import choice, motion
 from servotwin.models.engine.motions.motion import Motion
 from servotwin.models.state.modes import Mode

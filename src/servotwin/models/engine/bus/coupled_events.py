@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from servotwin.models.engine.bus.coupled_courses import BY_PLACE, first_below
 from servotwin.models.engine.bus.coupled_series import state_at, voltage_at
 from servotwin.models.engine.bus.coupled_units import unit_mode, unit_numbers
-from servotwin.models.engine.events import guards
+from servotwin.models.engine.dynamics import guards
 from servotwin.models.state.modes import Vector
 
 _HALVINGS = 200

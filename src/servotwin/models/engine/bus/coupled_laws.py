@@ -12,8 +12,7 @@ from servotwin.models.engine.bus.coupled_units import (
     unit_numbers,
     unit_state,
 )
-from servotwin.models.engine.dynamics import contacts, currents
-from servotwin.models.engine.events import guards
+from servotwin.models.engine.dynamics import contacts, currents, guards
 from servotwin.models.engine.legs import legs
 from servotwin.models.state.modes import (
     FORWARD,

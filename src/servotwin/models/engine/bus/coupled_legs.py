@@ -23,8 +23,8 @@ from servotwin.models.engine.bus.coupled_units import (
     unit_state,
 )
 from servotwin.models.engine.bus.shared_source import driven, part_on_bus
-from servotwin.models.engine.dynamics import contacts, currents
-from servotwin.models.engine.events import crossings, guards
+from servotwin.models.engine.dynamics import contacts, currents, guards
+from servotwin.models.engine.events import crossings
 from servotwin.models.engine.legs import legs
 from servotwin.models.engine.legs.legs import MOST_SHORT, SHORT
 from servotwin.models.state.modes import (

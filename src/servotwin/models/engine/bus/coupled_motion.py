@@ -15,17 +15,16 @@ from servotwin.models.engine.bus.bus_records import (
     numbers_of,
     piece_of,
     put_mode,
-    put_vector,
     source_of,
     vector_of,
 )
 from servotwin.models.engine.bus.coupled_step import turns
-from servotwin.models.engine.dynamics import contacts
-from servotwin.models.engine.events import crossings, guards
-from servotwin.models.engine.lowest import ROUNDS, lower
-from servotwin.models.engine.memory import FIRST_STEP, FLAT, NOT_ASKED, Lowest
+from servotwin.models.engine.dynamics import contacts, guards
+from servotwin.models.engine.events import crossings
+from servotwin.models.engine.memory import FIRST_STEP, FLAT, NOT_ASKED, Lowest, put_vector
 from servotwin.models.engine.motions import stribeck
 from servotwin.models.engine.motions.motion import LONG_STEP
+from servotwin.models.engine.run.lowest import ROUNDS, lower
 from servotwin.models.state.modes import BACKWARD, FORWARD, NO_CURRENT, RIGID, STUCK, Mode, Vector, sign_of
 from servotwin.models.terms.load import external_torque
 from servotwin.models.terms.play import with_motor

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from servotwin.models.engine import controller, runs
-from servotwin.models.engine.batch.tiles import numbers_of
+from servotwin.models.engine import controller
 from servotwin.models.engine.bus import coupled_legs, coupled_ticks
 from servotwin.models.engine.bus.bus_inputs import Tables, Told
 from servotwin.models.engine.bus.coupled_legs import LEFT
 from servotwin.models.engine.bus.coupled_units import put_unit_numbers, unit_mode, unit_state
+from servotwin.models.engine.lanes import ARRIVED, UNDERWAY, inputs_of, numbers_of
 from servotwin.models.engine.legs.leg_runs import counted, laid_down
 from servotwin.models.engine.legs.tick_legs import Gone, as_gone, show_one
 from servotwin.models.engine.memory import (
@@ -24,10 +24,9 @@ from servotwin.models.engine.memory import (
     memory_at,
     resumed,
 )
-from servotwin.models.engine.runs import ARRIVED, UNDERWAY
 
 if TYPE_CHECKING:
-    from servotwin.models.engine.batch.tiles import Floats, Indices, Lanes
+    from servotwin.models.engine.lanes import Floats, Indices, Lanes
     from servotwin.models.engine.memory import Memories
 
 
@@ -44,7 +43,7 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
             continue
         lane = which[k]
         numbers = numbers_of(lanes, lane)
-        inputs = runs.inputs_of(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]],
+        inputs = inputs_of(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]],
                                 lane)
         if durations[k] < inputs.firmware[0].T_c * (1.0 - SAME) or not coupled_ticks.possible(numbers, inputs):
             continue

@@ -8,19 +8,11 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from servotwin.models.engine.bus.bus_records import (
-    ROOM,
-    Linear,
-    mode_of,
-    numbers_of,
-    piece_of,
-    put_law,
-    put_vector,
-    vector_of,
-)
+from servotwin.models.engine.bus.bus_records import ROOM, Linear, mode_of, numbers_of, piece_of, put_law, vector_of
 from servotwin.models.engine.bus.shared_source import BROKEN_DOWN, FOLLOWING, KEEPING, LIMITED, behind, bus_voltage
 from servotwin.models.engine.dynamics import contacts
 from servotwin.models.engine.dynamics.rates import rates_of
+from servotwin.models.engine.memory import put_vector
 from servotwin.models.engine.motions import dormand_prince, stribeck
 from servotwin.models.engine.motions.dormand_prince import STAGES, rates_in
 from servotwin.models.engine.motions.motion import LONG_STEP

@@ -24,14 +24,12 @@ from servotwin.models.engine.bus.bus_records import (
     put_lowest,
     put_mode,
     put_piece,
-    put_vector,
     source_of,
     vector_of,
 )
 from servotwin.models.engine.bus.coupled_motion import APART, ENDED, TOGETHER
 from servotwin.models.engine.bus.event_log import Tape
 from servotwin.models.engine.dynamics import currents
-from servotwin.models.engine.lowest import asked, followed, lower
 from servotwin.models.engine.memory import (
     FRAMES,
     SAME,
@@ -42,10 +40,12 @@ from servotwin.models.engine.memory import (
     due,
     in_force,
     instant,
+    put_vector,
     resumed,
     since,
 )
 from servotwin.models.engine.motions.motion import LONG_STEP
+from servotwin.models.engine.run.lowest import asked, followed, lower
 from servotwin.models.engine.step import CHATTER, COMPLETED, CROWDED, MOST_IDLE, STEP_TOO_SMALL, TOO_FAST
 from servotwin.models.state.modes import Mode, Vector
 from servotwin.models.terms import control, duty, firmware, frame

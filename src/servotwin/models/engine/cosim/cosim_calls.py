@@ -19,7 +19,7 @@ from servotwin.models.terms.source import Source
 from servotwin.models.terms.stops import Stops
 
 if TYPE_CHECKING:
-    from servotwin.models.engine.batch.tiles import Floats, Indices
+    from servotwin.models.engine.lanes import Floats, Indices
 
 PULSE_WIDTH, COMMAND_ANGLE, COMMAND_VOLTAGE, TORQUE, ANGLE, SPEED, INERTIA, VOLTAGE = range(8)
 ACCEPTED = 0

@@ -8,18 +8,17 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from servotwin.models.engine.bus.bus_records import put_vector
 from servotwin.models.engine.bus.coupled_motion import APART
 from servotwin.models.engine.cosim.cosim_calls import ANGLE, SPEED, shaft_at, stops_at
 from servotwin.models.engine.cosim.imposed_state import behind, carried, impulse_work, placed
 from servotwin.models.engine.cosim.layout_convert import put_beside, remembered
-from servotwin.models.engine.memory import memory_at, point_of, put_memory, put_point, time_of
+from servotwin.models.engine.memory import memory_at, point_of, put_memory, put_point, put_vector, time_of
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.state.modes import INSIDE, LOST
 from servotwin.models.state.records import TILE
 
 if TYPE_CHECKING:
-    from servotwin.models.engine.batch.tiles import Floats, Indices
+    from servotwin.models.engine.lanes import Floats, Indices
     from servotwin.models.engine.memory import Memories
 
 

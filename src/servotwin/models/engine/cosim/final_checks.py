@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from servotwin.models.engine.batch.tiles import chip_of, numbers_of
 from servotwin.models.engine.dynamics import contacts, currents
+from servotwin.models.engine.lanes import chip_of, numbers_of
 from servotwin.models.terms import elastic, frame, heat
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.load import external_torque
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from servotwin.models.engine.batch.tiles import Floats, Indices, Lanes, Smalls
+    from servotwin.models.engine.lanes import Floats, Indices, Lanes, Smalls
 
 ON_STOP, CANNOT_HOLD = 1, 2  # added up
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from servotwin.models.engine.dynamics import contacts, currents, spring_contact
-from servotwin.models.engine.events.guards import (
+from servotwin.models.engine.dynamics.guards import (
     CORE_BACKWARD,
     CORE_FORWARD,
     CREEPS,

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-from servotwin.models.engine.dynamics import contacts, currents
+from servotwin.models.engine.dynamics import contacts, currents, guards
 from servotwin.models.engine.dynamics.coefficients import Apart
-from servotwin.models.engine.events import guards
 from servotwin.models.engine.motions import first_order
 from servotwin.models.engine.motions.relative_motion import Course, both, lead_of, leaves
 from servotwin.models.state.modes import FORWARD, Mode, Vector, moving

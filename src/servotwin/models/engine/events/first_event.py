@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 
+from servotwin.models.engine.dynamics import guards
 from servotwin.models.engine.dynamics.coefficients import Apart
-from servotwin.models.engine.events import guards
 from servotwin.models.engine.events.event_times import first_end
 from servotwin.models.engine.motions.motion import (
     APART,

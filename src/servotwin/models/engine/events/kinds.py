@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from servotwin.models.engine.events import guards
+from servotwin.models.engine.dynamics import guards
 from servotwin.models.state.modes import (
     CONDUCTING,
     CORE,

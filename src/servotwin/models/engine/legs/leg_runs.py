@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from servotwin.models.engine import controller
-from servotwin.models.engine.batch.tiles import numbers_of
+from servotwin.models.engine.lanes import ARRIVED, UNDERWAY, inputs_of, numbers_of
 from servotwin.models.engine.legs import tick_legs
 from servotwin.models.engine.legs.tick_legs import LEGS
 from servotwin.models.engine.memory import (
@@ -19,10 +19,9 @@ from servotwin.models.engine.memory import (
     put_memory,
     resumed,
 )
-from servotwin.models.engine.runs import ARRIVED, UNDERWAY, inputs_of
 
 if TYPE_CHECKING:
-    from servotwin.models.engine.batch.tiles import Floats, Indices, Lanes
+    from servotwin.models.engine.lanes import Floats, Indices, Lanes
     from servotwin.models.engine.memory import Memories
 
 

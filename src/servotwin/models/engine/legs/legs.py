@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from servotwin.models.engine.dynamics import contacts, currents
+from servotwin.models.engine.dynamics import contacts, currents, guards
 from servotwin.models.engine.dynamics.coefficients import Apart, apart_coefficients, linear_coefficients
-from servotwin.models.engine.events import crossings, guards
+from servotwin.models.engine.events import crossings
 from servotwin.models.engine.events.event_times import first_end
 from servotwin.models.engine.motions import first_order
 from servotwin.models.engine.motions.relative_motion import Course, both

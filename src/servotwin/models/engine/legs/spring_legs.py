@@ -8,9 +8,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from servotwin.models.engine import step
-from servotwin.models.engine.dynamics import currents, spring_contact
+from servotwin.models.engine.dynamics import currents, guards, spring_contact
 from servotwin.models.engine.dynamics.rates import rates_of
-from servotwin.models.engine.events import guards
 from servotwin.models.engine.legs.legs import Gone
 from servotwin.models.engine.memory import Point
 from servotwin.models.engine.motions import motion, two_mass_series

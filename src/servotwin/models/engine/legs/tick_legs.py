@@ -35,7 +35,7 @@ from servotwin.physics.motor import back_emf
 from servotwin.physics.pieces import Piece
 
 if TYPE_CHECKING:
-    from servotwin.models.engine.batch.tiles import Floats
+    from servotwin.models.engine.lanes import Floats
 
 # Seldom: with copies, or what goes by its address here would go through memory everywhere
 CALLED = ("gone_on", "show", "with_laws")

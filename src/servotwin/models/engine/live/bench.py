@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from servotwin.models.engine import controller
-from servotwin.models.engine.batch.tiles import Lanes
 from servotwin.models.engine.bus import bus_inputs, bus_unit
 from servotwin.models.engine.bus.bus_inputs import Tables
 from servotwin.models.engine.bus.bus_records import put_shared
 from servotwin.models.engine.bus.coupled_motion import at_start
 from servotwin.models.engine.bus.event_log import Tape
+from servotwin.models.engine.lanes import Lanes
 from servotwin.models.engine.live import making, stretch, together
 from servotwin.models.engine.live import posts as those
 from servotwin.models.engine.live import sender as transmitter

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.models.engine.at import motion_of, row_at
 from servotwin.models.engine.live.screen import LEFT as STEPS_LEFT
 from servotwin.models.engine.live.screen import (
     NEXT,
@@ -26,12 +25,13 @@ from servotwin.models.engine.live.screen import (
     write,
 )
 from servotwin.models.engine.log import ALL, BEGUN, EVENTS, KEEPS, LEFT, MOTIONS, PAUSED, Log, Row
-from servotwin.models.engine.lowest import lowest_on, voltage_at
 from servotwin.models.engine.memory import FLAT, Inputs, Memories, Memory, memory_at, origin_of, time_of
 from servotwin.models.engine.motions import motion
 from servotwin.models.engine.motions.motion import Motion
 from servotwin.models.engine.observe import bus_voltage
-from servotwin.models.engine.run import as_now, mode_under, plant_of, run, told
+from servotwin.models.engine.run.at import motion_of, row_at
+from servotwin.models.engine.run.lowest import lowest_on, voltage_at
+from servotwin.models.engine.run.run import as_now, mode_under, plant_of, run, told
 from servotwin.models.engine.step import COMPLETED, at_pulses
 from servotwin.models.terms import duty, firmware, source
 from servotwin.models.terms.chip import Chip

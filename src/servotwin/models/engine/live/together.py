@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from servotwin.models.engine.at import motion_of, row_at, state_of
 from servotwin.models.engine.bus import event_log, event_queue, shared_source
 from servotwin.models.engine.bus.bus_inputs import inputs_at
-from servotwin.models.engine.bus.bus_records import numbers_of, put_numbers, put_vector, source_of
+from servotwin.models.engine.bus.bus_records import numbers_of, put_numbers, source_of
 from servotwin.models.engine.bus.event_log import Tape
 from servotwin.models.engine.events import kinds
 from servotwin.models.engine.live.posts import lines_of, low_of, put_low, put_said, said_of
@@ -29,10 +28,11 @@ from servotwin.models.engine.live.screen import (
     write,
 )
 from servotwin.models.engine.log import Row
-from servotwin.models.engine.lowest import ROUNDS
-from servotwin.models.engine.memory import FLAT
+from servotwin.models.engine.memory import FLAT, put_vector
 from servotwin.models.engine.motions import motion
 from servotwin.models.engine.observe import on_bus
+from servotwin.models.engine.run.at import motion_of, row_at, state_of
+from servotwin.models.engine.run.lowest import ROUNDS
 from servotwin.models.engine.step import COMPLETED, at_pulses
 from servotwin.models.state.modes import Mode, Vector
 from servotwin.models.terms import duty, source

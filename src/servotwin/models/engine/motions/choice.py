@@ -9,7 +9,7 @@ from servotwin.models.engine.dynamics.coefficients import (
     linear_coefficients,
     speed_coefficients,
 )
-from servotwin.models.engine.events.guards import creeping
+from servotwin.models.engine.dynamics.guards import creeping
 from servotwin.models.engine.motions import (
     dormand_prince,
     kinks,

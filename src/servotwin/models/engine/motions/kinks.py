@@ -9,7 +9,7 @@ what is interpolated within it.
 from __future__ import annotations
 
 from servotwin.models.engine.dynamics import currents, spring_contact
-from servotwin.models.engine.events.guards import creeping, geared
+from servotwin.models.engine.dynamics.guards import creeping, geared
 from servotwin.models.state.modes import INSIDE, Mode, Vector, slides
 from servotwin.models.terms import elastic
 from servotwin.models.terms.friction import Friction, fades, share, static_share

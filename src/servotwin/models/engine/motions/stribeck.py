@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from servotwin.models.engine.dynamics import contacts, currents, spring_contact
 from servotwin.models.engine.dynamics.contacts import friction_torque
-from servotwin.models.engine.events.guards import (
+from servotwin.models.engine.dynamics.guards import (
     SHARE,
     SPEED,
     ZONE_DOWN,

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from servotwin.models.engine import controller
-from servotwin.models.engine.batch.tiles import chip_of, numbers_of
-from servotwin.models.engine.bus.bus_records import put_vector
+from servotwin.models.engine.lanes import ARRIVED, UNDERWAY, chip_of, inputs_of, numbers_of
 from servotwin.models.engine.log import IDLE, KEEPS, NO_ROWS, READ, READINGS, SHORT, Log, Readings
 from servotwin.models.engine.memory import (
     Inputs,
@@ -15,10 +14,11 @@ from servotwin.models.engine.memory import (
     memory_at,
     put_memory,
     put_started,
+    put_vector,
     resumed,
     time_of,
 )
-from servotwin.models.engine.run import from_step_to_step
+from servotwin.models.engine.run.run import from_step_to_step
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.state.modes import INSIDE, LOST, RIGID, Vector
 from servotwin.models.terms import firmware, play
@@ -27,11 +27,8 @@ from servotwin.models.terms.chip import present as pulsed_chip
 from servotwin.models.terms.numbers import Numbers
 
 if TYPE_CHECKING:
-    from servotwin.models.engine.batch.tiles import Floats, Indices, Lanes
+    from servotwin.models.engine.lanes import Floats, Indices, Lanes
     from servotwin.models.engine.memory import Memories
-
-# Status of a lane that has gone on in this call already, side by side with others or by legs: for all of it, or not yet
-ARRIVED, UNDERWAY = -2, -1
 
 
 def start(lanes: Lanes, which: Indices, memories: Memories) -> None:
@@ -112,19 +109,6 @@ def note_failures(lanes: Indices, how: Indices, at: Floats, records: Any, status
         if how[k] != COMPLETED:
             status[lanes[k]], ended[lanes[k]] = how[k], at[k]
             put_vector(records[k].point.y, LOST)
-
-
-def inputs_of(lanes: Lanes, curve: Floats, torque: Floats, lane: int) -> Inputs:
-    """Return what a lane is told, and what hangs on its shaft with a recorded torque."""
-    first, last = lanes.piece_first[lane], lanes.piece_first[lane] + lanes.piece_count[lane]
-    own = lanes.edge_count[lane]
-    edges = lanes.edges[lanes.edge_first[lane]:lanes.edge_first[lane] + max(own, 0)]
-    place = min(lane, len(lanes.firmware) - 1)  # one stands for all where none has a program
-    program = lanes.firmware[place:place + 1]
-    regular = program[0].T_f if firmware.present(program[0]) else chip_of(lanes, lane).frame_period
-    period = 0.0 if own >= 0 else regular
-    return Inputs(lanes.pieces[first:last], torque, lanes.torque[lane], period, edges, curve, lanes.seeds[lane],
-                  lanes.accuracy, program)
 
 
 def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: float, underway: bool,

@@ -16,7 +16,7 @@ from servotwin.models.engine.memory import (
     time_of,
 )
 from servotwin.models.engine.observe import Observed, observed, told_by
-from servotwin.models.engine.run import as_now, mode_under, run, told
+from servotwin.models.engine.run.run import as_now, mode_under, run, told
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.state.modes import INSIDE, RIGID, Vector
 from servotwin.models.terms import control, duty, play
@@ -27,7 +27,7 @@ from servotwin.models.terms.wiring import Wiring, possible, rest_angle
 from servotwin.physics.pieces import piece_value
 
 if TYPE_CHECKING:
-    from servotwin.models.engine.batch.tiles import Floats
+    from servotwin.models.engine.lanes import Floats
 
 READY, NOT_FINITE, NOT_POSSIBLE, BEFORE = 0, -1, -2, -3  # what a call is answered, beside the codes of a step
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from servotwin.models.engine.batch.tiles import chip_of, numbers_of
 from servotwin.models.engine.dynamics import contacts, currents
+from servotwin.models.engine.lanes import chip_of, inputs_of, numbers_of
 from servotwin.models.engine.memory import memory_at, time_of
 from servotwin.models.engine.observe import Observed, observed, told_by
-from servotwin.models.engine.run import as_now, mode_under, told
-from servotwin.models.engine.runs import inputs_of
+from servotwin.models.engine.run.run import as_now, mode_under, told
 from servotwin.models.state.modes import RIGID, Vector
 from servotwin.models.state.records import TILE
 from servotwin.models.terms import duty
@@ -19,7 +18,7 @@ from servotwin.models.terms.sensor import slack
 from servotwin.physics.pieces import piece_value
 
 if TYPE_CHECKING:
-    from servotwin.models.engine.batch.tiles import Floats, Indices, Lanes
+    from servotwin.models.engine.lanes import Floats, Indices, Lanes
     from servotwin.models.engine.memory import Memories
 
 

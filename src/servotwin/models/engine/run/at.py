@@ -15,7 +15,7 @@ from servotwin.models.engine.motions.motion import (
     STEP,
     Motion,
 )
-from servotwin.models.engine.run import plant_of
+from servotwin.models.engine.run.run import plant_of
 from servotwin.models.engine.step import at_pulses
 from servotwin.models.state.modes import Vector
 from servotwin.models.terms import duty
@@ -23,7 +23,7 @@ from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import wiper_at
 
 if TYPE_CHECKING:
-    from servotwin.models.engine.batch.tiles import Floats, Indices
+    from servotwin.models.engine.lanes import Floats, Indices
 
 PLAIN = True  # the compiler takes it for False
 SHOWN = 20

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from servotwin.models.engine.alone import Alone
 from servotwin.models.engine.demands import demanded
+from servotwin.models.engine.run.alone import Alone
 from servotwin.models.terms import chip, firmware, packing, wiring
 from servotwin.models.terms.chip import NO_CHIP
 from servotwin.models.terms.firmware import Firmware

@@ -27,7 +27,6 @@ from servotwin.models.engine.log import (
     write_event,
     write_motion,
 )
-from servotwin.models.engine.lowest import asked, followed
 from servotwin.models.engine.memory import (
     SAME,
     Inputs,
@@ -49,6 +48,7 @@ from servotwin.models.engine.memory import (
 from servotwin.models.engine.motions import motion
 from servotwin.models.engine.motions.motion import Motion
 from servotwin.models.engine.motions.rodas import not_constant
+from servotwin.models.engine.run.lowest import asked, followed
 from servotwin.models.engine.step import (
     CHATTER,
     COMPLETED,
