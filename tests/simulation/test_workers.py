@@ -3,7 +3,8 @@
 import multiprocessing
 import os
 import signal
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from collections import Counter
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 
 import pytest
 
@@ -46,6 +47,21 @@ class Backwards:
     def submit(self, work, *arguments):
         self.waiting.append(Waits(self, work, arguments))
         return self.waiting[-1]
+
+
+class Forgetful(Here):
+    """An executor that loses what came of each piece as often as is said, as a cluster does whose worker is killed."""
+
+    def __init__(self, times):
+        self.times, self.lost = times, Counter()
+
+    def submit(self, work, *arguments):
+        future = super().submit(work, *arguments)
+        self.lost[arguments] += 1
+        if self.lost[arguments] <= self.times:
+            future = Future()
+            future.set_exception(ValueError("too many values to unpack (expected 3)"))
+        return future
 
 
 class Waits:
@@ -106,3 +122,13 @@ def test_errors_of_the_work_pass_through(executor):
 def test_what_is_no_executor_is_refused(executor):
     with pytest.raises(InputError, match="one with a submit method"):
         Crew(executor)
+
+
+@pytest.mark.parametrize("times", [1, 3, 4])
+def test_what_an_executor_loses_is_done_again(times):
+    with Crew(Forgetful(times)) as crew:
+        if times < 4:
+            assert list(crew.done(square, [(2,), (3,)])) == [4, 9]
+        else:
+            with pytest.raises(InputError, match="too many values"):
+                list(crew.done(square, [(2,), (3,)]))

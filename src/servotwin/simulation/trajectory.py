@@ -146,7 +146,7 @@ class Motions(Sequence[Segment]):
         return found
 
     def shown(self, index: NDArray[np.intp], ages: Array, *, ends: bool = False) -> Array:
-        """Return what holds at times after the beginnings of motions [s], as `engine.run.at.at` shows it, shape (20, n).
+        """Return what holds at times after the beginnings of motions [s], shape (20, n): what `engine.run.at.at` shows.
 
         `ends` says that motions end there: what is only interpolated is followed anew.
         """

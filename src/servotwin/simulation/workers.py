@@ -79,7 +79,8 @@ class Crew:
     """Whoever does pieces of work.
 
     A pool of processes of which one was killed can do nothing more. A fresh pool of as many takes its place, and what
-    was lost is done again; the executor that was given stays as it is, and is not shut down.
+    was lost is done again; the executor that was given stays as it is, and is not shut down. A piece that it fails at,
+    or loses, is handed in again.
 
     Parameters
     ----------
@@ -166,6 +167,12 @@ class Crew:
                         raise
                     self._renew()
                     flying = deque((piece, self._again(work, piece, future)) for piece, future in flying)
+                    continue
+                except Exception as error:  # a cluster may lose what was finished by a worker that was killed
+                    tries += 1
+                    if self.is_here or isinstance(error, ServotwinError) or tries >= _TRIES:
+                        raise
+                    flying[0] = flying[0][0], self._submit(work, flying[0][0])
                     continue
                 flying.popleft()
                 tries = 0
