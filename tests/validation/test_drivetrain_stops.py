@@ -180,6 +180,21 @@ def test_an_output_between_motor_and_stop_hits_both_until_they_rest(restitution)
     assert result.energy.stops == pytest.approx(0.5 * INERTIA * 1.2**2 + 0.005 * pull, rel=1e-12)
 
 
+@pytest.mark.parametrize(("speed", "after"), [(2e-6, 2e-6), (5e-7, 0.0)])
+def test_a_motor_behind_an_output_that_comes_to_rest_on_its_stop_rests_only_if_as_slow(speed, after):
+    """Both slower than 1e-6 rad/s rest; a faster motor goes on by itself, whatever its output has come to."""
+    half, stop = 0.5 * PLAY["gear.backlash"], 1.0 + 1e-10
+    case = undriven(PLAY | {"electronics.off_state": "coast", "stops.upper_angle": stop, "stops.restitution": 0.1},
+                    load={"torque": -1e-6}, duration=1e-3,
+                    initial={"output_angle": 1.0, "output_speed": speed, "motor_angle": N * (1.0 - half),
+                             "motor_speed": speed * N})
+    result = simulate(case, np.array([1e-3]))
+    assert [event.kind for event in result.events] == ["gear meets", "upper stop"]  # they touch
+    assert result["output_angle"][0] == stop
+    assert result["output_speed"][0] == 0.0
+    assert result["motor_speed"][0] / N == pytest.approx(after, rel=0.1, abs=1e-15)
+
+
 def test_a_locked_motor_lets_the_output_bounce_within_its_play():
     """The output alone, without friction, goes to and fro between stop and flank; a plastic flank ends it."""
     case = undriven(LOCKED | PLAY | {"stops.upper_angle": 0.004, "stops.restitution": 1.0,
