@@ -1,5 +1,7 @@
 """What all tests share: a servo, a model of every class, and a folder of measured data where there is one."""
 
+import signal
+import threading
 from pathlib import Path
 
 import pytest
@@ -22,6 +24,8 @@ def pytest_addoption(parser):
 
 def pytest_configure(config):
     costs.begin(config)
+    if threading.current_thread() is threading.main_thread():  # a shell has its background jobs ignore Ctrl-C
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     if config.getoption("--seed") is not None:
         settings.load_profile("explore")
         config.option.hypothesisseed = config.getoption("--seed")
