@@ -81,7 +81,8 @@ def kernels(arguments: list[str]) -> None:
 def pytest(arguments: list[str], marks: str, budgets: str) -> None:
     """Run tests on two processes: those with marks, or what is named by a path, `-k` or `-m`."""
     command = ["python", "-m", "pytest", "-n", "2", "--dist", "worksteal"]
-    if any(a in ("-k", "-m") or (ROOT / a.split("::")[0]).exists() for a in arguments):
+    named = [ROOT / a.split("::")[0] for a in arguments]
+    if {"-k", "-m"} & {*arguments} or any(path.exists() and path.is_relative_to(ROOT) for path in named):
         run(*command, *arguments)
     else:
         kernels(["--for", budgets])
