@@ -8,6 +8,7 @@ import servotwin as st
 from servotwin.loads import Constant, Inertia, as_load
 from servotwin.models.engine.bus import coupled_step, shared_source
 from servotwin.models.engine.bus.bus_records import Mate
+from servotwin.models.engine.dynamics import bus_side
 from servotwin.models.state.modes import (
     BACKWARD,
     CURRENT_BACKWARD,
@@ -31,7 +32,7 @@ def mates(stiffness=0.0):
     model = st.PulseServo(st.load_servo("hitec-hs-755hb"))
     found = []
     for k, (sign, contact, zone) in enumerate([(1.0, FORWARD, CURRENT_FORWARD), (-1.0, BACKWARD, CURRENT_BACKWARD)]):
-        numbers = shared_source.on_stiff_source(model.pack(as_load(Inertia(1e-3 * (k + 1)) + Constant(0.1))), False)
+        numbers = bus_side.on_stiff_source(model.pack(as_load(Inertia(1e-3 * (k + 1)) + Constant(0.1))), False)
         mate, w = object_of(Mate), sign * (1.0 + k)
         mate.numbers = numbers._replace(load=numbers.load._replace(stiffness=stiffness))
         mate.mode, mate.sign, mate.tau = Mode(zone, contact, RIGID, FREE, 0), sign, Piece(value=0.1)

@@ -1,21 +1,28 @@
-"""Which kernels servos take: as it was written down when forms were chosen by the names of terms.
+"""Which kernels servos take, and which way digital ones go in them: as it was written down when forms were chosen by
+the names of terms.
 
 How long many servos take hangs on it, and what has to be compiled at all.
 """
 
 from itertools import combinations
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import servotwin as st
+from servotwin.models.engine.legs.tick_legs import LEGS, POWER_SERIES
+from servotwin.models.engine.memory import NOT_ASKED
 from servotwin.models.engine.motions.choice import may_depend
+from servotwin.models.engine.run import runs
 from servotwin.models.state.records import mapped
 from servotwin.models.terms.chip import NO_CHIP
+from servotwin.models.terms.dependence import RECORDED, TABLE
 from servotwin.models.terms.firmware import NO_FIRMWARE
 from servotwin.physics.pieces import Piece
 from servotwin.simulation.lanes import forms
 from servotwin.simulation.lanes.divided import by_groups
+from servotwin.simulation.lanes.form_recipes import ALL_RUNS
 
 NOBODY = np.zeros(1, np.bool_)
 PULSED = (st.PulseServo, st.PulseServoInductive)
@@ -58,9 +65,9 @@ OF_ANALOG = {
         "limit+creep creep+share creep+slack creep+coast"),
 }
 OF_DIGITAL = {
-    "by_legs": (  # the plain one has drops
+    "runs, by legs": (  # the plain one has drops
         "plain play share steps bend play+share play+steps play+bend share+steps share+bend steps+bend"),
-    "by_series": "heat limit play+heat play+limit heat+limit heat+share heat+steps limit+share limit+steps",
+    "runs, by series": "heat limit play+heat play+limit heat+limit heat+share heat+steps limit+share limit+steps",
 }
 OF_CATALOG = {
     "by_bands": (
@@ -70,7 +77,7 @@ OF_CATALOG = {
         "hitec-hs-645mg hitec-hs-755mg hitec-hs-805bb hitec-hs-81 hitec-hs-85bb power-hd-hd-1501mg "
         "unbranded-micro-13g"),
     "by_ticks": "dsservo-ds3218 dsservo-rds3115 dynamixel-xl330-m077 feetech-ft-7235 towerpro-mg995",
-    "by_legs": (
+    "runs, by legs": (
         "dynamixel-2xl430-w250 dynamixel-ax-12a dynamixel-mx-106 dynamixel-mx-28 dynamixel-mx-64 dynamixel-xc330-t288 "
         "dynamixel-xc430-w240 dynamixel-xl-320 dynamixel-xl330-m288 dynamixel-xl430-w250 dynamixel-xm430-w210 "
         "dynamixel-xm430-w350 emax-es08md feetech-ft-15m0 feetech-ft-2806 feetech-sts3215-12v feetech-sts3215-7v4 "
@@ -82,10 +89,19 @@ OF_CATALOG = {
 
 def form_of(model, load=NO_LOAD, dtype="float64", told=False, bent=False):
     """Return the name of the kernels that a servo takes as a lane."""
-    pulsed = isinstance(model, PULSED)
+    pulsed, numbers, program = isinstance(model, PULSED), model.pack(load), model.firmware() or NO_FIRMWARE
     (kind,) = forms.kinds_with(
-        model.pack(load), model.chip() if pulsed else NO_CHIP, 1, dtype, NOBODY, NOBODY | told, bent,
-        model.firmware() or NO_FIRMWARE)
+        numbers, model.chip() if pulsed else NO_CHIP, 1, dtype, NOBODY, NOBODY | told, bent, program)
+    if kind.recipe != ALL_RUNS or program == NO_FIRMWARE:
+        return kind.recipe.name
+    inputs = SimpleNamespace(torque=[()] * told, curve=[()] * bent, firmware=(program,))
+    for way, part, asked in ((LEGS, "legs", False), (LEGS, "legs", True), (POWER_SERIES, "series", False)):
+        if runs.way_of(numbers, inputs, SimpleNamespace(lowest=NOT_ASKED), 1.0, asked) == way:
+            (own,) = (one for one in ALL_RUNS.parts if one.name == part)
+            demands = forms.Terms(numbers, NO_CHIP, program, inputs=TABLE * bent | RECORDED * told)
+            assert demands.suit(own.knows | own.leaves), part  # what its kernels leave out is not asked for
+            if not asked:
+                return f"{kind.recipe.name}, by {part}"
     return kind.recipe.name
 
 
@@ -166,7 +182,8 @@ def test_no_servo_of_today_needs_kernels_that_are_not_made_beforehand(servo):
     for _ in range(150):
         names = rng.permutation(own)[:rng.integers(3, 7)].tolist()
         digital = programs[rng.integers(len(programs))]
-        assert combined(st.DigitalServo, digital, names, "float64", rng) in ("by_ticks", "by_legs", "runs"), names
+        assert combined(st.DigitalServo, digital, names, "float64", rng) in (
+            "by_ticks", "runs, by legs", "runs"), names
 
 
 def test_many_lanes_are_asked_what_each_of_them_is(servo):

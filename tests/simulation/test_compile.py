@@ -16,7 +16,7 @@ from servotwin.simulation.compile.building import printed
 from servotwin.simulation.compile.compilers import compilers
 from servotwin.simulation.compile.derive import derive
 from servotwin.simulation.compile.translate import header
-from servotwin.simulation.lanes.form_recipes import _BY_FORMULA, ALL_RUNS, BY_LEGS, CALM
+from servotwin.simulation.lanes.form_recipes import _BY_FORMULA, ALL_RUNS, CALM
 
 SLIDE = Recipe("slide", ("servotwin.models.engine.batch.linear_segments:slide",), vector=True)
 NUMBERS = ArcNumbers(60.0, 60.0, 0.2, 1 / 60.0, 1 / 60.0, 5.0, 330.0, 20.0, 5.0, 6.0, 0.4, 0.1, 33.0, 40.0, 5.0, 1.0,
@@ -41,7 +41,7 @@ def test_compiled_equals_plain():
 
 @pytest.mark.long
 def test_what_is_derived():
-    text = derive(Recipe("run", ("servotwin.models.engine.run.runs:run",))).text
+    text = derive(Recipe("run", ("servotwin.models.engine.run.run:run",))).text
     assert "def terms_frame__decide(" in text
     assert "from servotwin.models.engine.memory import Point as engine_memory__Point" in text
     assert "physics_elementary__log1p(" in text  # whose digits are the same everywhere
@@ -104,7 +104,7 @@ def test_two_processes_at_once(tmp_path):
 
 @pytest.mark.long
 def test_what_no_term_asks_for_is_left_out():
-    calm, loose, everything = (derive(one).text for one in (CALM, BY_LEGS, ALL_RUNS))
+    calm, loose, everything = (derive(one).text for one in (CALM, ALL_RUNS.parts[0], ALL_RUNS))
     assert not any(f"motions_choice__{name}" in calm for name in FLAGGED)
     assert all(f"motions_choice__{name}" in everything for name in FLAGGED)
     assert "terms_heat__warming_rates" in everything

@@ -8,14 +8,11 @@ from scipy.linalg import expm
 
 import servotwin as st
 from leg_draws import drawn, goals, spread
-from servotwin.models.engine.bus import coupled_legs, coupled_series, coupled_ticks
-from servotwin.models.engine.bus.coupled_units import Coupling, Unit, put_unit_numbers
+from servotwin.models.engine.legs import coupled_legs, coupled_series, coupled_ticks
+from servotwin.models.engine.legs.coupled_units import Coupling, Unit, put_unit_numbers
 from servotwin.models.state.modes import BACKWARD, FORWARD
 from servotwin.models.state.records import object_of
-from servotwin.models.terms.chip import NO_CHIP
 from servotwin.models.terms.source import Source
-from servotwin.simulation.lanes import forms
-from servotwin.simulation.lanes.form_recipes import BY_SERIES
 from simulation.test_bus_digital import LOAD, digital
 
 SERVOS, STEPS, EVERY = 3, 12, 0.02  # on a bus; new goals every so many seconds
@@ -135,14 +132,6 @@ def test_a_warm_lane_is_the_servo_alone(seed):
     lane = st.simulate_many(model, command, outputs=tuple(ACCURATE), **asked)
     for name, most in ACCURATE.items():
         np.testing.assert_allclose(lane[name][0], one[name], rtol=0.0, atol=most)
-
-
-def test_warm_lanes_and_lanes_with_a_limit_go_by_series():
-    for more in (WARM, {"supply.current_limit": 2.0}):
-        model = st.DigitalServo(st.load_servo("feetech-sts3215-12v").replace(more))
-        load, nobody = st.loads.Inertia(1e-3) + st.loads.Constant(0.1), np.zeros(1, np.bool_)
-        (kind,) = forms.kinds_with(model.pack(load), NO_CHIP, 1, "float64", nobody, nobody, False, model.firmware())
-        assert kind.recipe == BY_SERIES
 
 
 @pytest.mark.long

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from servotwin.models.engine import controller
 from servotwin.models.engine.bus import bus_batch, bus_unit, event_log, event_queue
 from servotwin.models.engine.bus.bus_batch import Buses
-from servotwin.models.engine.bus.bus_inputs import Tables
 from servotwin.models.engine.bus.bus_records import ROOM, Mate, Seat, Shared, put_shared
 from servotwin.models.engine.bus.coupled_motion import at_start
-from servotwin.models.engine.bus.coupled_units import Coupling, Unit
 from servotwin.models.engine.bus.event_log import Tape
 from servotwin.models.engine.demands import demanded
-from servotwin.models.engine.lanes import Lanes
+from servotwin.models.engine.lanes import Lanes, Tables
+from servotwin.models.engine.legs.coupled_units import Coupling, Unit
 from servotwin.models.engine.log import Row
 from servotwin.models.engine.memory import Memories, Memory, forgotten, resumed
 from servotwin.models.engine.step import DIVERGED

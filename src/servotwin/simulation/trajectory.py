@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine.bus.shared_source import on_stiff_source
+from servotwin.models.engine.dynamics.bus_side import on_stiff_source
 from servotwin.models.engine.log import ALONE, DENSE, SERIES, Row
 from servotwin.models.engine.motions import motion
 from servotwin.models.engine.motions.motion import CREEP, Motion

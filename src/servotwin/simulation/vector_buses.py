@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine.bus.bus_batch import Buses
-from servotwin.models.engine.bus.bus_inputs import Tables
 from servotwin.models.engine.bus.coupled_motion import APART
-from servotwin.models.engine.lanes import Lanes
+from servotwin.models.engine.lanes import Lanes, Tables
 from servotwin.models.engine.memory import NONE_YET, Memories
 from servotwin.models.engine.step import COMPLETED
 from servotwin.simulation.bus_run import BUSES, room_of, shared_of, units_of

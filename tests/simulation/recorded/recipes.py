@@ -24,7 +24,7 @@ def in_any_order(recipe: Recipe) -> bool:
     work = Derivation(recipe)
     for entry in recipe.entries:
         work.function(*entry.split(":"))
-    return recipe.vector and bool(work.in_any_order)
+    return bool(work.in_any_order & work.vector)
 
 
 @contextmanager

@@ -1,4 +1,7 @@
-"""Lanes: what many servos are and are told, a column or an entry of each array for each."""
+"""Lanes: what many servos are and are told, a column or an entry of each array for each.
+
+In plain Python servos on a bus are told by a list of inputs, compiled by the arrays of all lanes.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +22,7 @@ if TYPE_CHECKING:
     Indices = NDArray[np.int64]
     Smalls = NDArray[np.int8]
 
+PLAIN = True  # the compiler takes it for False
 # Status of a lane that has gone on in this call already, side by side with others or by legs: for all of it, or not yet
 ARRIVED, UNDERWAY = -2, -1
 
@@ -61,6 +65,24 @@ class Outputs(NamedTuple):
     mesh: Smalls
 
 
+class Tables(NamedTuple):
+    """What lanes have besides their columns: rows of torque over time, and tables of their potentiometers."""
+
+    torques: Floats
+    torque_first: Indices
+    torque_count: Indices
+    curves: Floats
+    curve_first: Indices
+    curve_count: Indices
+
+
+class Told(NamedTuple):
+    """What all lanes are told, and what hangs on their shafts."""
+
+    lanes: Lanes
+    tables: Tables
+
+
 def numbers_of(lanes: Lanes, lane: int) -> Numbers:
     """Return the numbers of a lane."""
     return numbers_at(lanes.numbers[lane // TILE], lane % TILE)
@@ -82,3 +104,17 @@ def inputs_of(lanes: Lanes, curve: Floats, torque: Floats, lane: int) -> Inputs:
     period = 0.0 if own >= 0 else regular
     return Inputs(lanes.pieces[first:last], torque, lanes.torque[lane], period, edges, curve, lanes.seeds[lane],
                   lanes.accuracy, program)
+
+
+def inputs_at(told: Any, seat: Any) -> Inputs:
+    """Return what the servo in a seat is told, and what hangs on its shaft."""
+    if PLAIN:
+        inputs: Inputs = told[seat.place]
+        return inputs
+    return _by_tables(told.lanes, told.tables, seat.lane)
+
+
+def _by_tables(lanes: Lanes, tables: Tables, lane: int) -> Inputs:
+    first, start = tables.curve_first[lane], tables.torque_first[lane]
+    return inputs_of(lanes, tables.curves[first:first + tables.curve_count[lane]],
+                     tables.torques[start:start + tables.torque_count[lane]], lane)

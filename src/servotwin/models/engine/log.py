@@ -78,14 +78,16 @@ class Readings(NamedTuple):
 
     These are angle, speed, contact, drive, error, angle of the potentiometer, and what only few servos have: current,
     temperatures of winding and housing, angle and speed of the motor at the output shaft, place in the play and contact
-    of the motor there, silence of the chip; duty, goal, reference and trip of a program.
+    of the motor there, silence of the chip; duty, goal, reference and trip of a program. With `nearly`, a spring, a
+    pendulum and friction that fades count in a digital servo as if their torques stayed within a tick.
     """
 
     times: Any
     values: Any
+    nearly: bool
 
 
-NO_READINGS = Readings(0.0, 0.0)
+NO_READINGS = Readings(0.0, 0.0, False)
 NO_ROWS = 0.0  # in the place of rows that a log does not keep
 WITH_ROWS = ("ALL", "FEW")  # names of what a log with rows keeps
 

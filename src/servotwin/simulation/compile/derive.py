@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import ast
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib import import_module
 from types import FunctionType
@@ -54,6 +54,8 @@ class Derived:
         Functions that are called where others are inlined.
     entries : dict of str to str
         Names in the module, by those of the entries.
+    vector : frozenset of str
+        Functions in the vector form: all of them, or those of parts of the recipe.
     """
 
     recipe: Recipe
@@ -63,6 +65,7 @@ class Derived:
     in_any_order: frozenset[str]
     called: frozenset[str]
     entries: dict[str, str]
+    vector: frozenset[str] = frozenset()
 
     @cached_property
     def space(self) -> dict[str, Any]:
@@ -89,7 +92,8 @@ def derive(recipe: Recipe) -> Derived:
     lines += [f"{alias} = {text}" for alias, text in sorted(work.constants.items())]
     entries = dict(zip((entry.split(":")[1] for entry in recipe.entries), names, strict=True))
     return Derived(recipe, {name: work.functions[name] for name in work.order}, "\n".join([*lines, ""]),
-                   work.primitives, frozenset(work.in_any_order), frozenset(work.called), entries)
+                   work.primitives, frozenset(work.in_any_order), frozenset(work.called), entries,
+                   frozenset(work.vector))
 
 
 @dataclass
@@ -104,12 +108,26 @@ class Derivation:
     primitives: dict[str, str] = field(default_factory=dict)
     in_any_order: set[str] = field(default_factory=set)
     called: set[str] = field(default_factory=set)
+    vector: set[str] = field(default_factory=set)
+    part: str = ""
 
     def function(self, module: str, name: str) -> str:
         """Collect a function after those that it calls, and return its name in the derived module."""
-        flat = flat_name(module, name)
+        for part in self.recipe.parts:
+            if f"{module}:{name}" in part.entries:
+                whole = self.recipe
+                self.recipe, self.part = replace(part, never=(*part.never, *whole.never)), f"_{part.name}"
+                flat = self._function(module, name)
+                self.recipe, self.part = whole, ""
+                return flat
+        return self._function(module, name)
+
+    def _function(self, module: str, name: str) -> str:
+        flat = flat_name(module, name) + self.part
         if flat not in self.functions:
             self.functions[flat] = node = definition(module, name)  # marks a call of itself
+            if self.recipe.vector:
+                self.vector.add(flat)
             if name in getattr(import_module(module), "IN_ANY_ORDER", ()):
                 self.in_any_order.add(flat)
             if name in getattr(import_module(module), "CALLED", ()):
@@ -133,6 +151,7 @@ class Derivation:
         elif name == "SINGLE":
             self.constants[flat] = repr(self.recipe.single)
         elif self.recipe.excluded.issuperset(getattr(import_module(module), "ONLY_FOR", {}).get(name, ("",))):
+            flat += self.part  # where all is known it may be needed
             self.constants[flat] = "()"
         else:
             self.constants[flat] = self._constant(module, value)
@@ -150,8 +169,10 @@ class Derivation:
 
     def _generated(self, function: Any) -> str:
         """Collect a function of `engine.records`, which comes as text."""
-        flat = flat_name(function.__module__, function.__name__)
+        flat = flat_name(function.__module__, function.__name__) + self.part
         if flat not in self.functions:
+            if self.recipe.vector:
+                self.vector.add(flat)
             aliases = {name: self.value(kind.__module__, name, kind) for name, kind in function.kinds.items()}
             node = cast("ast.FunctionDef", ast.parse(function.text).body[0])
             for part in ast.walk(node):

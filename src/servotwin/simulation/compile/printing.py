@@ -41,7 +41,7 @@ class Printer:
         Their text.
     """
 
-    def __init__(self, vector: bool, in_any_order: frozenset[str], called: frozenset[str],
+    def __init__(self, vector: frozenset[str], in_any_order: frozenset[str], called: frozenset[str],
                  inlined: frozenset[str] = frozenset()) -> None:
         self.vector, self.in_any_order, self.called, self.inlined = vector, in_any_order, called, inlined
         self.types = Types()
@@ -62,8 +62,8 @@ class _Text(CallExpressions):
 
     def __init__(self, printer: Printer, own: Specialised) -> None:
         super().__init__(printer, own)
-        self._vector, self._in_any_order, self._called = printer.vector, printer.in_any_order, printer.called
-        self._inlined = printer.inlined
+        self._in_any_order, self._called = printer.in_any_order, printer.called
+        self._vector, self._inlined = own.node.name in printer.vector, printer.inlined
         self._variables = Variables(own)
 
     # --- the function -------------------------------------------------------------------------------------------------

@@ -33,7 +33,7 @@ def unread_numbers(recipe: Recipe, of: tuple[str, ...]) -> Iterator[str]:
     """Return the numbers that the general form reads and a recipe's kernels do not know, as `unread` keeps them."""
     never = {*in_general(recipe).never, *WITH_ROWS}
     general = _readers(replace(recipe, entries=_RUNS, vector=False, single=False, never=tuple(sorted(never))))
-    own = _readers(recipe if of else replace(recipe, never=(*recipe.never, "LEGS")), of)  # legs are asked apart
+    own = _readers(recipe, of)
     by_itself = set().union(*(own[name] for name in own.keys() - general.keys()))
     left_out = {path.split(".")[0] for path in ACTS} - {path.split(".")[0] for path in ACTS.keys() - recipe.absent}
     for path, record, number in paths():

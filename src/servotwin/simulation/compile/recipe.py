@@ -36,6 +36,9 @@ class Recipe:
     in_floats : bool
         Whether the text made of it will be C of floats throughout: what is compared with rounding is that of
         `IN_FLOATS` of its module, and exponentials and angles are those of C's library.
+    parts : tuple of Recipe
+        Of functions that are derived by recipes of their own, with all that they call: wherever one is called, what
+        that recipe says is so.
     """
 
     name: str
@@ -48,6 +51,7 @@ class Recipe:
     never: tuple[str, ...] = ()
     by_numbers: bool = False
     in_floats: bool = False
+    parts: tuple[Recipe, ...] = ()
 
     @cached_property
     def absent(self) -> frozenset[str]:

@@ -73,7 +73,7 @@ _SIGNATURES: Mapping[str, tuple[Kind, ...]] = {
     "run:go_on": (_PLANTS, _INPUTS, _MEMORIES, FLOAT64, BOOL, BOOL, _LOG),
     "at:at": (_PLANTS, FLOAT64, _LOG_ROWS, _FLOATS, _INDICES, _FLOATS, BOOL, _TABLE),
     "at:resolution": (_PLANTS, FLOAT64, _LOG_ROWS, _FLOATS, _TABLE),
-    "runs:start": (_LANES, _INDICES, _MEMORIES), "runs:go_on": (*_GOING, _FLOATS, _INDICES),
+    "runs:start": (_LANES, _INDICES, _MEMORIES),
     "runs:to_first_ticks": (*_GOING, _INDICES),
     "runs:ready": (_INDICES, _SMALLS, _FLOATS, _INDICES, _FLOATS, _INDICES),
     "runs:note_failures": (_INDICES, _INDICES, _FLOATS, _ROWS, _SMALLS, _FLOATS),
@@ -96,20 +96,20 @@ _SIGNATURES: Mapping[str, tuple[Kind, ...]] = {
 def _of_ticks() -> Mapping[str, tuple[Kind, ...]]:
     """Return what entries are called with that let digital servos go from tick to tick together."""
     from servotwin.models.engine.batch import digital_tiles
-    from servotwin.models.engine.bus.coupled_units import Coupling, Unit
+    from servotwin.models.engine.legs.coupled_units import Coupling, Unit
 
-    return {"digital_batch:go_on": (*_GOING, _records(digital_tiles.TILE_TYPE)), "leg_runs:go_on": _GOING,
-            "coupled_runs:go_on": (*_GOING, _records(record_of(Unit)), _records(record_of(Coupling)))}
+    return {"digital_batch:go_on": (*_GOING, _records(digital_tiles.TILE_TYPE)),
+            "runs:go_on": (*_GOING, BOOL, _FLOATS, _INDICES, _records(record_of(Unit)), _records(record_of(Coupling)))}
 
 
 @cache
 def _of_buses() -> Mapping[str, tuple[Kind, ...]]:
     """Return what entries are called with that move servos on a bus."""
     from servotwin.models.engine.bus.bus_batch import Buses
-    from servotwin.models.engine.bus.bus_inputs import Tables
     from servotwin.models.engine.bus.bus_records import Mate, Seat, Shared
-    from servotwin.models.engine.bus.coupled_units import Coupling, Unit
     from servotwin.models.engine.bus.event_log import Tape
+    from servotwin.models.engine.lanes import Tables
+    from servotwin.models.engine.legs.coupled_units import Coupling, Unit
 
     tables = _tuple(Tables, _INDICES, torques=_TABLE, curves=_TABLE)
     shared, room = _records(record_of(Shared)), (_records(record_of(Seat)), _records(record_of(Mate)))
@@ -125,9 +125,9 @@ def _of_buses() -> Mapping[str, tuple[Kind, ...]]:
 @cache
 def _of_the_bench() -> Mapping[str, tuple[Kind, ...]]:
     """Return what entries are called with that let servos go on at a bench that is looked at."""
-    from servotwin.models.engine.bus.bus_inputs import Tables
     from servotwin.models.engine.bus.bus_records import Mate, Seat, Shared
     from servotwin.models.engine.bus.event_log import Tape
+    from servotwin.models.engine.lanes import Tables
     from servotwin.models.engine.live.making import Weights
     from servotwin.models.engine.live.posts import Circuit, Post, Told
     from servotwin.models.engine.live.screen import Lines, Looks, Switch
@@ -157,8 +157,7 @@ def _of_the_bench() -> Mapping[str, tuple[Kind, ...]]:
 _OF_BENCH = ("make", "begin", "begin_at", "heed", "change", "take", "count", "draw", "look", "tune", "snapped",
              "next_edge", "advance", "advance_together")
 _ELSEWHERE: Mapping[str, Callable[[], Mapping[str, tuple[Kind, ...]]]] = {  # where kinds take more than lanes have
-    "digital_batch:go_on": _of_ticks, "leg_runs:go_on": _of_ticks,
-    "coupled_runs:go_on": _of_ticks, **{f"bench:{name}": _of_the_bench for name in _OF_BENCH},
+    "digital_batch:go_on": _of_ticks, "runs:go_on": _of_ticks, **{f"bench:{name}": _of_the_bench for name in _OF_BENCH},
     "stretch:shown": _of_the_bench,
     "bus_batch:go_on": _of_buses, "bus_batch:look": _of_buses, "bus_batch:voltages": _of_buses,
     "cosim_lanes:break_up": _of_buses}

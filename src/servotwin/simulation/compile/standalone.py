@@ -41,7 +41,7 @@ class Standalone:
 
     def __init__(self, public: Mapping[str, Kind], *, floats: bool = False) -> None:
         self._floats = floats
-        self._printer = Printer(False, frozenset(), frozenset(), _ONCE)
+        self._printer = Printer(frozenset(), frozenset(), frozenset(), _ONCE)
         for name, kind in public.items():
             self.types.call(kind, name)
         self._public = len(self.types.structs)

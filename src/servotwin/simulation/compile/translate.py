@@ -69,7 +69,7 @@ def translated(derived: Derived, signatures: Sequence[tuple[str, tuple[Kind, ...
         If a kernel contains what has no form in C; it names function and line, and says what to write instead.
     """
     module = Module(derived)
-    printer = Printer(derived.recipe.vector, derived.in_any_order, derived.called)
+    printer = Printer(derived.vector, derived.in_any_order, derived.called)
     entries, texts = [], []
     for name, kinds in signatures:
         function = module.specialised(derived.entries[name], kinds)

@@ -17,7 +17,8 @@ IN_GENERAL = "_in_general"
 @cache
 def in_general(recipe: Recipe) -> Recipe:
     """Return a recipe in which no way of going on is chosen by the numbers that it knows."""
-    return replace(recipe, name=recipe.name + IN_GENERAL, never=(*recipe.never, "LEGS"))
+    return replace(recipe, name=recipe.name + IN_GENERAL, parts=(),
+                   never=(*recipe.never, "LEGS", "SPRING_LEGS", "POWER_SERIES"))
 
 
 @cache

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from servotwin.models.engine.batch import digital_tiles, tiles
-from servotwin.models.engine.bus.coupled_units import Coupling, Unit
+from servotwin.models.engine.legs.coupled_units import Coupling, Unit
 from servotwin.models.engine.log import COUNTS, WITH_ROWS
 from servotwin.models.state.records import record_of
 from servotwin.models.terms.dependence import (
@@ -82,7 +82,6 @@ _BY_FORM = {getattr(tiles, form): _side(f"by_{form.lower()}", form) for form in 
 
 # --- Lanes one by one -------------------------------------------------------------------------------------------------
 
-ALL_RUNS = Recipe("runs", _ENTRIES, never=WITH_ROWS)  # they take hardly longer for what others lack
 _PLAIN = _EVERYWHERE | DROPS | SILENCE | FREE_RUNNING | STEPS | TABLE | ON_Q
 PLAIN = _PLAIN | PULSES | FOLLOWS | RECORDED
 """What servos may ask for that move by plain laws."""
@@ -93,26 +92,22 @@ CALM = Recipe("calm", ("servotwin.models.engine.batch.event_free:go",), knows=PL
 _TICKS = _PLAIN & ~ON_Q | _DIGITAL
 LEGS = _TICKS | PLAY | TWO_BODIES | BY_SHARE
 """What legs follow exactly."""
-BY_LEGS = Recipe("by_legs", ("servotwin.models.engine.legs.leg_runs:go_on",), vector=True,
-                 knows=LEGS | ON_Q | CURVED_Q | FADING, always=PROGRAM | PWM)
-"""Digital servos from tick to tick, one after the other; what is left of a call is for `ALL_RUNS`. A spring, a
-pendulum and friction that fades count as if their torques stayed within a tick: only where that is asked for."""
-BY_SERIES = Recipe("by_series", ("servotwin.models.engine.bus.coupled_runs:go_on",),
-                   knows=LEGS & ~TABLE | ON_HEAT | REGULATED, always=PROGRAM | PWM)
-"""The same whose windings get warm, or whose supply has a limit; what is left of a call is for `ALL_RUNS`."""
+_ALWAYS, _LEFT_TO_RUNS = PROGRAM | PWM, AT_STOPS | SHOWN | AT_COMMANDS
+_BY_TICKS_ALONE = (
+    # A spring, a pendulum and friction that fades count as if their torques stayed within a tick: where that is asked
+    Recipe("legs", ("servotwin.models.engine.legs.tick_legs:go_stiff",), vector=True,
+           knows=(LEGS | ON_Q | CURVED_Q | FADING) & ~_LEFT_TO_RUNS, leaves=_LEFT_TO_RUNS, always=_ALWAYS),
+    Recipe("series", ("servotwin.models.engine.legs.coupled_ticks:alone",),  # warm windings, a supply with a limit
+           knows=(LEGS & ~TABLE | ON_HEAT | REGULATED) & ~_LEFT_TO_RUNS, leaves=_LEFT_TO_RUNS, always=_ALWAYS))
+"""Digital servos from tick to tick."""
+ALL_RUNS = Recipe("runs", _ENTRIES, never=WITH_ROWS, parts=_BY_TICKS_ALONE)
+"""All lanes: digital ones from tick to tick where that leads on, else from step to step."""
 BY_TICKS = Recipe("by_ticks", ("servotwin.models.engine.batch.digital_batch:go_on",), vector=True,
-                  knows=_TICKS & ~DROPS,
-                  always=PROGRAM | PWM)
-"""Digital servos from tick to tick, side by side; what is left of a call is for `BY_LEGS`. Two to three times faster
+                  knows=_TICKS & ~DROPS, always=_ALWAYS)
+"""Digital servos from tick to tick, side by side; what is left of a call is for `ALL_RUNS`. Two to three times faster
 for four servos of the catalog."""
-# Not compiled for their own sake: what these call says which numbers are known where a program goes in one loop
-_LEFT_BY_LEGS = AT_STOPS | SHOWN | AT_COMMANDS
-_BY_LEGS = (replace(BY_LEGS, name="ticks_by_legs", knows=BY_LEGS.knows & ~_LEFT_BY_LEGS, leaves=_LEFT_BY_LEGS),
-            ("servotwin.models.engine.legs.tick_legs:go",))
-_BY_SERIES = (replace(BY_SERIES, name="ticks_by_series", knows=BY_SERIES.knows & ~_LEFT_BY_LEGS,
-                      leaves=_LEFT_BY_LEGS),
-              ("servotwin.models.engine.bus.coupled_ticks:serve", "servotwin.models.engine.bus.coupled_ticks:move"))
-_LEFT_BY_TICKS = _LEFT_BY_LEGS | BEYOND | ONE_WAY
+# Not compiled for its own sake: what these call says which numbers are known where a program goes in one loop
+_LEFT_BY_TICKS = _LEFT_TO_RUNS | BEYOND | ONE_WAY
 _BY_TICKS = (replace(BY_TICKS, name="ticks_by_loops", knows=BY_TICKS.knows & ~_LEFT_BY_TICKS, leaves=_LEFT_BY_TICKS),
              tuple(f"servotwin.models.engine.{name}" for name in (
                  "batch.digital_tiles:enter", "batch.digital_rounds:watch", "batch.digital_rounds:decide",
@@ -131,37 +126,25 @@ TICKS = Recipe("ticks", (
         "show_records", "read_clocks", "take_status", "note_lost_buses", "break_up"))))
 """Lanes of all forms between two calls: what is imposed on them, and the way from tiles to records and back."""
 ENDING = Recipe("ending", ("servotwin.models.engine.cosim.final_checks:look_at_lanes",), vector=True, knows=~_DIGITAL)
-_PARTS = {BY_TICKS: (_BY_TICKS, _BY_LEGS), BY_LEGS: (_BY_LEGS,),
-          BY_SERIES: (_BY_SERIES,)}
-IN_LEGS = (_BY_LEGS,)
-"""What follows programs within `ALL_RUNS` wherever legs lead on, as `parts_of` has it."""
-_CHAINS = {BY_TICKS: (BY_TICKS, BY_LEGS, ALL_RUNS), BY_LEGS: (BY_LEGS, ALL_RUNS), BY_SERIES: (BY_SERIES, ALL_RUNS)}
+_IN_RUNS = tuple((replace(part, entries=_ENTRIES, never=WITH_ROWS), part.entries) for part in ALL_RUNS.parts)
+_PARTS = {BY_TICKS: (_BY_TICKS, *_IN_RUNS), ALL_RUNS: _IN_RUNS}
 
 
 def last_of(recipe: Recipe) -> Recipe:
     """Return the kernels that finish every call of lanes of a form."""
-    return _CHAINS.get(recipe, (recipe,))[-1]
+    return ALL_RUNS if recipe == BY_TICKS else recipe
 
 
-def steps_of(recipe: Recipe, ended: Any) -> Iterator[tuple[Recipe, str, tuple[Any, ...]]]:
+def steps_of(recipe: Recipe, ended: Any, nearly: bool = False) -> Iterator[tuple[Recipe, str, tuple[Any, ...]]]:
     """Return the kernels by which lanes of a form go on one after the other, each with its entry.
 
-    All of them have the arguments of `runs.go_on`, with these in the place of the last one.
+    All of them have the arguments of `runs.go_on` up to the status, and these. `nearly` is as readings have it.
     """
-    *ahead, last = _CHAINS.get(recipe, (recipe,))
-    counts = np.zeros(COUNTS, np.int64)
-    if ahead:
+    counts, last = np.zeros(COUNTS, np.int64), last_of(recipe)
+    if recipe != last:
         yield last, "to_first_ticks", (counts,)
-    for one in ahead:
-        yield one, one.entries[0].partition(":")[2], _room_of(one)
-    yield last, "go_on", (ended, counts)
-
-
-def _room_of(recipe: Recipe) -> tuple[Any, ...]:
-    """Return what kernels need beside the arguments of `runs.go_on`."""
-    if recipe == BY_SERIES:
-        return np.zeros(2, record_of(Unit)), np.zeros(2, record_of(Coupling))
-    return (digital_tiles.tile_room(),) if recipe == BY_TICKS else ()
+        yield recipe, "go_on", (digital_tiles.tile_room(),)
+    yield last, "go_on", (nearly, ended, counts, np.zeros(2, record_of(Unit)), np.zeros(2, record_of(Coupling)))
 
 
 def parts_of(recipe: Recipe) -> Parts:
@@ -177,7 +160,6 @@ def side_by_side(form: int, dtype: str) -> Recipe:
     return _BY_FORMULA[dtype] if form == tiles.ONE_FORMULA else _BY_FORM[form]
 
 
-KERNELS = tuple(sorted((*(one.name for one in (ALL_RUNS, BY_LEGS, BY_SERIES, BY_TICKS,
-                                               *_BY_FORMULA.values(), *_BY_FORM.values())),
+KERNELS = tuple(sorted((*(one.name for one in (ALL_RUNS, BY_TICKS, *_BY_FORMULA.values(), *_BY_FORM.values())),
                         ALL_RUNS.name + IN_GENERAL)))
 """Names of all kernels in which lanes run."""

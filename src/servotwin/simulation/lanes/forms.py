@@ -109,35 +109,38 @@ class SideBySide(NamedTuple):
 
 
 class OneByOne(NamedTuple):
-    """Lanes that run one by one, by a form that leaves out what they lack; whether some may go on calmly."""
+    """Lanes that run one by one, by a form that leaves out what they lack.
+
+    Some may go on calmly, or all of them go quickly.
+    """
 
     which: Indices
     recipe: Recipe
     calm: bool = False
+    quick: bool = False
 
 
-def kinds_of(packed: Packed, dtype: str, nearly: bool = False, watched: bool = False) -> list[SideBySide | OneByOne]:
+def kinds_of(packed: Packed, dtype: str, watched: bool = False) -> list[SideBySide | OneByOne]:
     """Return how lanes run; `dtype` is that of those that may be of either, all else as of `kinds_with`."""
     own, recorded = packed.lanes, packed.torque.count > 0
     return kinds_with(own.numbers, own.chips, packed.size, dtype, swept(own), recorded, packed.curve.size > 0,
-                      own.firmware or NO_FIRMWARE, nearly, watched)
+                      own.firmware or NO_FIRMWARE, watched)
 
 
 def kinds_with(numbers: Numbers, chip: Chip, lanes: int, dtype: str, sweeps: Mask, recorded: Mask,
-               curved: bool, firmware: Firmware = NO_FIRMWARE, nearly: bool = False,
+               curved: bool, firmware: Firmware = NO_FIRMWARE,
                watched: bool = False) -> list[SideBySide | OneByOne]:
     """Return how lanes run, whose numbers are numbers or arrays (lanes,).
 
     `sweeps` is whose command has a chirp, `recorded` whose load is recorded over time, `curved` whether the
-    potentiometers have a table. With `nearly`, what bends the motion within a tick may count by its mean. Supplies of
-    lanes that are `watched` are followed from event to event.
+    potentiometers have a table. Supplies of lanes that are `watched` are followed from event to event.
     """
     inputs = recorded * RECORDED if recorded.any() else 0
     terms = Terms(numbers, chip, firmware, sweeps.any() and sweeps, inputs | TABLE * curved)
     left = np.ones(lanes, np.bool_)
     found: Iterator[SideBySide | OneByOne] = (
         _at_last(terms, left) if watched
-        else _alone(terms, left, nearly) if np.any(terms.ask(SPRING | PWM)) else _of_analog(terms, left, dtype))
+        else _alone(terms, left) if np.any(terms.ask(SPRING | PWM)) else _of_analog(terms, left, dtype))
     return [kind for kind in found if len(kind.which)]
 
 
@@ -155,15 +158,14 @@ def _of_analog(terms: Terms, left: Mask, dtype: str) -> Iterator[SideBySide | On
     yield from _at_last(terms, left)
 
 
-def _alone(terms: Terms, left: Mask, nearly: bool) -> Iterator[OneByOne]:
+def _alone(terms: Terms, left: Mask) -> Iterator[OneByOne]:
     """Return how lanes run of which some have a spring between two bodies, or a program."""
     digital, sprung = np.any(terms.ask(PWM)), left & terms.ask(SPRING)
     left &= ~sprung
     yield from _at_last(terms, sprung)
     if digital and not is_plain():
-        yield OneByOne(_take(terms, left, recipes.BY_TICKS), recipes.BY_TICKS)
-        yield OneByOne(_take(terms, left, recipes.BY_LEGS, nearly or terms.suit(recipes.LEGS)), recipes.BY_LEGS)
-        yield OneByOne(_take(terms, left, recipes.BY_SERIES), recipes.BY_SERIES)
+        yield OneByOne(_take(terms, left, recipes.BY_TICKS), recipes.BY_TICKS, quick=True)
+        yield OneByOne(_take(terms, left, recipes.ALL_RUNS, terms.suit(recipes.LEGS)), recipes.ALL_RUNS, quick=True)
     yield from _at_last(terms, left)
 
 
@@ -172,8 +174,8 @@ def _at_last(terms: Terms, left: Mask) -> Iterator[OneByOne]:
     if is_plain():  # a fast form has no worth there, nor to ask for it
         yield OneByOne(np.flatnonzero(left), recipes.ALL_RUNS)
         return
-    in_legs = terms.known_to(recipes.IN_LEGS) if np.any(left & terms.ask(PWM)) else True
-    yield OneByOne(_take(terms, left, recipes.ALL_RUNS, in_legs), recipes.ALL_RUNS)
+    known = terms.known_to(recipes.parts_of(recipes.ALL_RUNS)) if np.any(left & terms.ask(PWM)) else True
+    yield OneByOne(_take(terms, left, recipes.ALL_RUNS, known), recipes.ALL_RUNS)
     yield OneByOne(np.flatnonzero(left), in_general(recipes.ALL_RUNS))
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cached_property
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from servotwin.models.engine.cosim.cosim_calls import INERTIA, SLACK, VOLTAGE
 from servotwin.models.engine.lanes import Lanes
 from servotwin.models.engine.memory import Memories, put_started
 from servotwin.models.state.modes import INSIDE, NOWHERE, RIGID, Vector
-from servotwin.models.state.records import columns_of, fields_of
+from servotwin.models.state.records import TILE, columns_of, fields_of
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.elastic import Elastic
 from servotwin.models.terms.firmware import Firmware
@@ -28,11 +29,13 @@ from servotwin.simulation.bus_supply import Supplies, check_rigid
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.lanes.form_recipes import TICKS
 from servotwin.simulation.lanes.inputs import LaneInputs, lanes_of
+from servotwin.simulation.lanes.load_columns import LOAD_NAMES
 from servotwin.simulation.lanes.memories import nothing_yet, taken
 from servotwin.simulation.lanes.packed import Packed, Torques
 from servotwin.simulation.lanes.packing import Chunk, Commands, flat, groups
 from servotwin.simulation.lanes.tick_room import asked
 from servotwin.simulation.lanes.translator import Translator
+from servotwin.units import is_finite
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -42,6 +45,12 @@ TUNED = frozenset(f"firmware.{name}" for name in (
     "current_limit", "speed_limit", "acceleration_limit", "minimum_speed", "overload_duty", "overload_time",
     "overload_output", "stall_travel", "trip_current", "trip_time", "trip_temperature", "undervoltage"))
 """Numbers of a program that its ticks read, and nothing else."""
+
+
+def _in_rows(tiles: Any) -> Array:
+    """Return tiles as numbers, shape (tiles, numbers of a lane, TILE)."""
+    found: Array = tiles.view(np.float64).reshape(len(tiles), -1, TILE)
+    return found
 
 
 class Imposed(NamedTuple):
@@ -80,9 +89,6 @@ class LaneNumbers:
         self.available = inputs.model.signals_with(*inputs.loads)
         nothing = np.full(self.count, math.nan)
         self.imposed = Imposed(nothing, nothing.copy())
-        commands = Commands(inputs)
-        self.chunks = [Chunk(own, commands, part) for which in groups(inputs, commands)
-                       for own, part in supplies.parts(inputs, which)]
         self.neutral = np.empty(self.count)
         self._given = self._joined()
         law, _, self.curve, self.torque = self._given
@@ -105,6 +111,13 @@ class LaneNumbers:
                 self.impose(hung, imposed.load_inertia[hung], None)
             if len(fed):
                 self.impose(fed, None, imposed.bus_voltage[fed])
+
+    @cached_property
+    def chunks(self) -> list[Chunk]:
+        """The lanes in groups of one structure."""
+        commands = Commands(self.inputs)
+        return [Chunk(own, commands, part) for which in groups(self.inputs, commands)
+                for own, part in self.supplies.parts(self.inputs, which)]
 
     def _joined(self) -> Packed:
         """Return all lanes, which are told one thing for ever."""
@@ -182,7 +195,7 @@ class LaneNumbers:
             if given.dtype.kind not in "iuf" or given.shape not in ((), which.shape):
                 return False
             values[name] = np.broadcast_to(given.astype(np.float64), which.shape)
-            numbers[name] = numbers[name].copy() if name in numbers else np.full(self.count, self._shared(name))
+            numbers[name] = numbers[name].copy() if name in numbers else np.full(self.count, self._now(name))
             numbers[name][which] = values[name]
         models = dict[int, Any]()
         for k, lane in enumerate(which.tolist()):
@@ -213,13 +226,62 @@ class LaneNumbers:
         inputs = lanes_of(inputs.model, inputs.commands[0], loads, {**known, **merged}, None, inputs.seeds)
         return LaneNumbers(inputs, self.accuracy, self.supplies, self.imposed)
 
+    def repacked(self, which: Indices, parameters: Mapping[str, Any]) -> LaneNumbers | None:
+        """Return some lanes with other parameters, packed by themselves; None where they need more than their places.
+
+        Nothing is said of what is not possible: `changed` does.
+        """
+        inputs = self.inputs
+        known = {**inputs.numbers, **inputs.words}
+        if np.any(self.supplies.bus_of[which] >= 0) or not isinstance(parameters, Mapping):
+            return None
+        for name, value in parameters.items():
+            shared = name in inputs.numbers or name in LOAD_NAMES or is_finite(inputs.model.servo.get(name))
+            if not shared or np.shape(value) not in ((), which.shape) or np.asarray(value).dtype.kind not in "iuf":
+                return None
+        values = {name: column[which] for name, column in known.items()} | dict(parameters)
+        loads = [inputs.loads[k] for k in inputs.load_of[which].tolist()]
+        try:
+            own = lanes_of(inputs.model, inputs.commands[0], loads, values, None, inputs.seeds[which])
+            part = LaneNumbers(own, self.accuracy, Supplies((), (), len(which)))
+        except InputError:
+            return None
+        fits = (part.available == self.available and np.array_equal(part.curve, self.curve)
+                and np.array_equal(part.frame_period, self.frame_period[which]))
+        return part if fits else None
+
+    def take(self, which: Indices, part: LaneNumbers, names: Iterable[str]) -> None:
+        """Put lanes into their places that were packed by themselves with other numbers of these names."""
+        numbers = dict(self.inputs.numbers)
+        for name in names:
+            column = numbers[name].copy() if name in numbers else np.full(self.count, self._now(name))
+            column[which] = part.inputs.numbers[name] if name in part.inputs.numbers else part._now(name)
+            numbers[name] = column
+        self.inputs = replace(self.inputs, numbers=numbers)
+        if 0 in which:
+            self.inputs = replace(self.inputs, model=self.inputs.lane_model(0))
+        for kept in ("chunks", "translate"):
+            self.__dict__.pop(kept, None)
+        own, theirs, every = self.columns, part.columns, np.arange(part.count)
+        for there, here in ((theirs.numbers, own.numbers), (theirs.numbers, self.given), (theirs.chips, own.chips)):
+            _in_rows(here)[which // TILE, :, which % TILE] = _in_rows(there)[every // TILE, :, every % TILE]
+        if self.digital:
+            own.firmware[which] = theirs.firmware
+        own.torque[which] = theirs.torque
+        for name in ("load_total", "reduction", "V_oc", "neutral"):
+            getattr(self, name)[which] = getattr(part, name)
+        for k, values in enumerate(self.imposed):
+            again = which[~np.isnan(values[which])]
+            if len(again):
+                self.impose(again, values[again] if k == 0 else None, values[again] if k == 1 else None)
+
     def _merged(self, name: str, value: Any, which: Indices) -> Any:
         """Return a parameter of all lanes, of which some have new values."""
         if len(which) == self.count:
             return value
         now = {**self.inputs.numbers, **self.inputs.words}.get(name)
         if now is None:
-            now = self._shared(name)
+            now = self._now(name)
         if isinstance(now, np.ndarray):
             column = now.astype(object) if now.dtype.kind == "U" else now.copy()
         else:
@@ -231,13 +293,13 @@ class LaneNumbers:
         column[which] = given
         return column.tolist() if column.dtype == object else column
 
-    def _shared(self, name: str) -> Any:
+    def _now(self, name: str) -> Any:
+        """Return a parameter that is no column as it stands: of loads, that of each lane where they differ."""
         group, _, key = name.partition(".")
         if group == "load":
-            load: Any = self.inputs.loads[0]
-            for part in key.split("."):
-                load = getattr(load, part)
-            return load
+            read = attrgetter(key)
+            values = [read(load) for load in self.inputs.loads]
+            return values[0] if len(values) == 1 else np.array(values, np.float64)[self.inputs.load_of]
         value = self.inputs.model.servo.get(name)
         if value is None:
             raise InputError(f"parameters: {name}", got="a value for some lanes only",

@@ -38,7 +38,6 @@ Indices = NDArray[np.int64]
 SHAFT = {"output_angle": "q", "output_speed": "w"}  # where tiles and records have them
 _WORD = 8  # bytes
 _WORTH = 64  # tiles for a thread: fewer cost more in waking it
-_QUICK = (form_recipes.BY_TICKS, form_recipes.BY_LEGS)
 _WORTH_QUICK, _WORTH_SLOW = 64, 4  # lanes for a thread that go on one by one, by kernels that take so long
 
 
@@ -104,6 +103,12 @@ class Tiles:
 
         return Chain([advance], given_up)
 
+    def runs(self, kind: SideBySide | OneByOne) -> bool:
+        """Tell whether lanes of a kind may stand here."""
+        own = self._kind
+        return (isinstance(kind, SideBySide) and (kind.form, kind.dtype) == (own.form, own.dtype)
+                and (own.slack or not kind.slack))
+
     def put(self, places: Indices, memories: Memories, numbers: LaneNumbers) -> None:
         """Put what lanes remember into their places."""
         kernels(TICKS).to_tiles(places, self.which[places], memories, numbers.frame_period, self.rows)
@@ -161,10 +166,11 @@ class Records:
 
     def __init__(self, kind: OneByOne, columns: Lanes, threads: int) -> None:
         self.which, self._recipe, self._calms, self.kernel = kind.which, kind.recipe, kind.calm, kind.recipe.name
+        self._way = kind[1:]
         self.memories = nothing_yet(len(self.which))
         self.rows = self.memories.rows
         kernels(form_recipes.last_of(kind.recipe)).start(columns, self.which, self.memories)
-        quick = kind.calm or kind.recipe in _QUICK
+        quick = kind.calm or kind.quick
         self._workers = min(threads, len(self.which) // (_WORTH_QUICK if quick else _WORTH_SLOW))
         self._chains: list[Chain] = []
         self._look: Call | None = None
@@ -184,6 +190,10 @@ class Records:
         ready = call_of(form_recipes.last_of(self._recipe), "ready", going.which, store.status, store.now, done,
                         going.durations, going.status, returns=True)
         return Chain([*calm, ready, *_one_by_one(self._recipe, store, going)])
+
+    def runs(self, kind: SideBySide | OneByOne) -> bool:
+        """Tell whether lanes of a kind may stand here."""
+        return isinstance(kind, OneByOne) and kind[1:] == self._way
 
     def put(self, places: Indices, memories: Memories, numbers: LaneNumbers) -> None:
         """Put what lanes remember into their places."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -116,6 +116,21 @@ class Store:
         self.hang(self.torque)
         self._go_on_from(memories, which, common)
 
+    def takes(self, part: LaneNumbers, which: Indices, names: Iterable[str]) -> bool:
+        """Take other numbers of some lanes in place, if they run in the same way as before; memories go on."""
+        for kind in kinds_of(part.packed(), self._dtype, watched=self.watched):
+            for k in np.unique(self._set_of[which[kind.which]]).tolist():
+                if not self.sets[k].runs(kind):
+                    return False
+        self.numbers.take(which, part, names)
+        self.base[which] = self.numbers.columns.torque[which]
+        self.hang(self.torque)
+        for some, places, of in self._parts(which):
+            if isinstance(some, Records):
+                some.rows["point"][places] = self._meshed(some.rows["point"][places], which[of])
+            some.refit(self.columns, which[of], places)
+        return True
+
     def save(self) -> VectorMemory:
         """Return all that the lanes remember, as it is now."""
         return VectorMemory(type(self.numbers.model).__name__, *self.memories(), self.command.copy(),
@@ -144,15 +159,9 @@ class Store:
 
     def _go_on_from(self, memories: Memories, others: Indices, common: Common | None) -> None:
         """Take the memories of all lanes, of which some have other numbers than when they were made."""
-        play, sprung = self.numbers.now(Play).half > 0.0, self.numbers.now(Elastic).k > 0.0
         point = memories.rows["point"]
         point["anchor_time"][others] = math.inf
-        mesh = point["mode"]["mesh"]
-        point["mode"]["mesh"] = np.where(
-            play, np.where((mesh == RIGID) | (mesh > ON_BACKWARD), INSIDE, mesh), np.where(sprung, mesh, RIGID))
-        rigid = ~(play | sprung)
-        y = point["y"]
-        y["q_m"][rigid], y["w_m"][rigid] = y["q"][rigid], y["w"][rigid]
+        point[:] = self._meshed(point, np.arange(len(point)))
         anchors = point["anchor_time"].copy()
         if common is not None:
             point["anchor_time"][common.joined >= 0] = math.inf  # unless their bus is the same as then
@@ -164,6 +173,16 @@ class Store:
             shared = {k: record for k, record in common.shared.items() if k not in touched}
             for some in self._buses:
                 some.set_common(common.joined, shared, anchors)
+
+    def _meshed(self, point: Any, which: Indices) -> Any:
+        """Return where lanes are, with their gears as these are now: with play, a spring, or neither."""
+        play, sprung = self.numbers.now(Play, which).half > 0.0, self.numbers.now(Elastic, which).k > 0.0
+        mesh = point["mode"]["mesh"]
+        point["mode"]["mesh"] = np.where(
+            play, np.where((mesh == RIGID) | (mesh > ON_BACKWARD), INSIDE, mesh), np.where(sprung, mesh, RIGID))
+        rigid, y = ~(play | sprung), point["y"]
+        y["q_m"][rigid], y["w_m"][rigid] = y["q"][rigid], y["w"][rigid]
+        return point
 
     def start(self, which: Indices, memories: Memories) -> None:
         """Put lanes where they start; their noise goes on."""

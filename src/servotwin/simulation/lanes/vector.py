@@ -319,8 +319,10 @@ class VectorSimulator:
         if angle is not None:
             self._numbers.check_angles(angle, which)
         anew = bool(parameters) and not self._numbers.retuned(which, parameters or {})
-        if anew:
-            self._store.renew(self._numbers.changed(which, parameters or {}), which)
+        if anew and parameters:
+            part = self._numbers.repacked(which, parameters)
+            if part is None or not self._store.takes(part, which, parameters):
+                self._store.renew(self._numbers.changed(which, parameters), which)
         otherwise = False
         if inertia is not None or bus is not None:
             otherwise = self._numbers.impose(which, inertia, bus)

@@ -36,7 +36,7 @@ def run(work: Work) -> Raw:
     """Run all lanes of a chunk: side by side where that is possible, one after the other where not."""
     raw, packed, asked = empty_raw(work), work.packed, work.asked
     lanes = packed.columns()
-    for kind in kinds_of(packed, asked.dtype, asked.nearly, asked.watched):
+    for kind in kinds_of(packed, asked.dtype, asked.watched):
         raw.kernel[kind.which] = KERNELS.index(kind.recipe.name)
         if isinstance(kind, OneByOne):
             run_one_by_one(work, lanes, kind.which, raw, kind.recipe)
@@ -119,7 +119,7 @@ def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: 
         part, own, ended = which[some], first[some], np.zeros(len(which[some]))
         going = Going.of(part, taken(memories, some), times)
         going.durations[:], going.first_output[:] = durations[some], own
-        for one, entry, more in steps_of(recipe, ended):
+        for one, entry, more in steps_of(recipe, ended, work.asked.nearly):
             getattr(kernels(one), entry)(lanes, *inputs, *going, *more)
         bad, found = going.status != 0, going.outputs
         raw.status[part], raw.ended[part] = going.status, np.where(bad, ended, work.asked.duration)

@@ -13,9 +13,8 @@ import numpy as np
 
 from servotwin.errors import InputError
 from servotwin.models.engine.bus import event_log
-from servotwin.models.engine.bus.bus_inputs import Tables
 from servotwin.models.engine.bus.bus_records import ROOM, Mate, Seat, Shared
-from servotwin.models.engine.lanes import Lanes
+from servotwin.models.engine.lanes import Lanes, Tables
 from servotwin.models.engine.live import stretch
 from servotwin.models.engine.live.making import Weights
 from servotwin.models.engine.live.posts import Circuit, Post

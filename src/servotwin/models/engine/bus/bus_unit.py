@@ -11,7 +11,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from servotwin.models.engine import controller, step
-from servotwin.models.engine.bus import coupled_motion, event_log, shared_source
+from servotwin.models.engine.bus import coupled_motion, event_log
 from servotwin.models.engine.bus.bus_records import (
     Track,
     decided_of,
@@ -29,6 +29,7 @@ from servotwin.models.engine.bus.bus_records import (
     put_track,
     vector_of,
 )
+from servotwin.models.engine.dynamics import bus_side
 from servotwin.models.engine.memory import NOT_ASKED, Inputs, Memory, Point, put_vector, since
 from servotwin.models.engine.motions import choice, motion
 from servotwin.models.engine.motions.motion import Motion
@@ -259,10 +260,10 @@ def take_part(seat: Any, unit: int, mate: Any, start: Any, y: Any) -> None:
     """Let a servo that is connected to the bus take part in a common motion from a start, where it stands at y."""
     drive, now, numbers = drive_of(seat), vector_of(y), numbers_now(seat)
     returns = drive == 0.0
-    put_numbers(mate.numbers, shared_source.on_stiff_source(numbers, returns))
+    put_numbers(mate.numbers, bus_side.on_stiff_source(numbers, returns))
     put_mode(mate.mode, mode_of(seat.point.mode))
     put_piece(mate.tau, tau_by(seat, seat.origin + seat.late))
     mate.unit, mate.returns = unit, 1 if returns else 0
-    mate.sign = shared_source.part_on_bus(drive, numbers.bridge, seat.shown.duty, vector_of(start))
+    mate.sign = bus_side.part_on_bus(drive, numbers.bridge, seat.shown.duty, vector_of(start))
     put_vector(mate.start, vector_of(start))
     put_vector(mate.y, now)

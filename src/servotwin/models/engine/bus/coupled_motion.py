@@ -19,7 +19,7 @@ from servotwin.models.engine.bus.bus_records import (
     vector_of,
 )
 from servotwin.models.engine.bus.coupled_step import turns
-from servotwin.models.engine.dynamics import contacts, guards
+from servotwin.models.engine.dynamics import bus_side, contacts, guards
 from servotwin.models.engine.events import crossings
 from servotwin.models.engine.memory import FIRST_STEP, FLAT, NOT_ASKED, Lowest, put_vector
 from servotwin.models.engine.motions import stribeck
@@ -363,7 +363,7 @@ def arrive(shared: Any, mates: Any) -> Mode:
     mate = mates[whose]
     numbers = numbers_of(mate.numbers)
     if mate.returns > 0 and mate.mode.zone == NO_CURRENT:  # teeth that meet would part by a torque that there is not
-        numbers = shared_source.blocked(numbers)
+        numbers = bus_side.blocked(numbers)
     mode, y = crossings.cross(numbers, mode_of(mate.mode), kind, shared_source.behind(mate, V),
                            piece_value(piece_of(mate.tau), shared.end), vector_of(mate.y))
     put_vector(mate.y, y)

@@ -11,7 +11,6 @@ from typing import Any
 
 from servotwin.models.engine import controller, step
 from servotwin.models.engine.bus import bus_unit, coupled_motion, event_log, shared_source
-from servotwin.models.engine.bus.bus_inputs import inputs_at
 from servotwin.models.engine.bus.bus_records import (
     chip_of,
     decided_of,
@@ -29,7 +28,8 @@ from servotwin.models.engine.bus.bus_records import (
 )
 from servotwin.models.engine.bus.coupled_motion import APART, ENDED, TOGETHER
 from servotwin.models.engine.bus.event_log import Tape
-from servotwin.models.engine.dynamics import currents
+from servotwin.models.engine.dynamics import bus_side, currents
+from servotwin.models.engine.lanes import inputs_at
 from servotwin.models.engine.memory import (
     FRAMES,
     SAME,
@@ -311,8 +311,8 @@ def _currents(j: int, count: int, shared: Any, seats: Any, mates: Any, y: Vector
         V_bus = _alone_on_bus(seats[last], bus_unit.numbers_now(seats[last]), there.y)[2]
     else:
         V_bus = bus_voltage(count, shared, seats, mates, time)
-    stiff = warm(shared_source.on_stiff_source(own, False), y)
-    u = shared_source.part_on_bus(drive, own.bridge, seat.shown.duty, y) * V_bus if drive != 0.0 else 0.0
+    stiff = warm(bus_side.on_stiff_source(own, False), y)
+    u = bus_side.part_on_bus(drive, own.bridge, seat.shown.duty, y) * V_bus if drive != 0.0 else 0.0
     zone = currents.zone_of(stiff, u, 0.0, y.q, y.w_m, y.i)
     i = y.i if inductive(stiff.motor) else currents.current(stiff, zone, u, y.q, y.w_m)
     return i, terminal_voltage(stiff.bridge, stiff.source, stiff.motor, u, y.w_m, i, V_bus), V_bus

@@ -39,7 +39,8 @@ if TYPE_CHECKING:
 
 # Seldom: with copies, or what goes by its address here would go through memory everywhere
 CALLED = ("gone_on", "show", "with_laws")
-LEGS, STEPS = 0, 1  # from tick to tick: in this loop, or from event to event
+# From tick to tick: in this loop, or by power series (`coupled_ticks`); or from event to event
+LEGS, SPRING_LEGS, POWER_SERIES, STEPS = range(4)
 _NO_LAWS = Apart(0.0, 0.0, 0.0, 0.0)
 _GIVEN = Piece()  # what a servo follows that a program drives
 
@@ -89,7 +90,15 @@ def possible(numbers: Numbers, inputs: Inputs, nearly: bool) -> bool:
 
 def way_of(numbers: Numbers, inputs: Inputs, left: float, nearly: bool) -> int:
     """Return which way a servo goes for the time that is left [s]: from tick to tick if that is one at least."""
-    return LEGS if left >= inputs.firmware[0].T_c * (1.0 - SAME) and possible(numbers, inputs, nearly) else STEPS
+    if left < inputs.firmware[0].T_c * (1.0 - SAME) or not possible(numbers, inputs, nearly):
+        return STEPS
+    return SPRING_LEGS if elastic.present(numbers.elastic) else LEGS
+
+
+def go_stiff(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Floats, done: int,
+             outputs: Floats) -> Gone:
+    """Go on as `go` does without a spring between motor and output: compiled, without what only those need."""
+    return go(numbers, inputs, memory, until, times, done, outputs)
 
 
 def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Floats, done: int,

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from servotwin.models.engine import controller
-from servotwin.models.engine.bus import bus_inputs, bus_unit
-from servotwin.models.engine.bus.bus_inputs import Tables
+from servotwin.models.engine.bus import bus_unit
 from servotwin.models.engine.bus.bus_records import put_shared
 from servotwin.models.engine.bus.coupled_motion import at_start
 from servotwin.models.engine.bus.event_log import Tape
-from servotwin.models.engine.lanes import Lanes
+from servotwin.models.engine.lanes import Lanes, Tables, inputs_at
+from servotwin.models.engine.lanes import Told as ToldAll
 from servotwin.models.engine.live import making, stretch, together
 from servotwin.models.engine.live import posts as those
 from servotwin.models.engine.live import sender as transmitter
@@ -137,13 +137,13 @@ def advance_together(posts: Any, told: Told, programs: Any, memories: Memories, 
         end = _end_of_part(now, until, rate, len(rows[0]))
         those.hear(now, posts, told, pulses, used, end)
         looks = Looks(used[NEXT], rate, end, 1 if end == transmitter.snapped(now, until) else 0, switches)
-        _take_seats(posts, told, memories, lanes, bus_inputs.Told(lanes, tables), shared[0], seats)
-        status = together.go_on(bus_inputs.Told(lanes, tables), posts, memories.firms, shared[0], seats, mates, looks,
+        _take_seats(posts, told, memories, lanes, ToldAll(lanes, tables), shared[0], seats)
+        status = together.go_on(ToldAll(lanes, tables), posts, memories.firms, shared[0], seats, mates, looks,
                                 tape, rows, events, used)
         for n in range(len(posts)):
             memory = bus_unit.memory_in(seats[n], memories.firms)
             if duty.present(posts[n].numbers.bridge):
-                controller.pause(bus_inputs.inputs_at(bus_inputs.Told(lanes, tables), seats[n]), memory)
+                controller.pause(inputs_at(ToldAll(lanes, tables), seats[n]), memory)
             put_memory(memories.rows[n], memory)
         if status == COMPLETED:
             now.time = end
@@ -184,7 +184,7 @@ def _take_seats(posts: Any, told: Told, memories: Memories, lanes: Lanes, on_bus
         seats[n].place, seats[n].lane = n, n
         others = others or post.changed == 1
     for n in range(len(posts)):
-        post, seat, inputs = posts[n], seats[n], bus_inputs.inputs_at(on_bus, seats[n])
+        post, seat, inputs = posts[n], seats[n], inputs_at(on_bus, seats[n])
         memory = memory_at(memories, n)
         if duty.present(post.numbers.bridge):
             beat = memory.beat

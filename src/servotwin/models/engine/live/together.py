@@ -6,10 +6,11 @@ import math
 from typing import Any
 
 from servotwin.models.engine.bus import event_log, event_queue, shared_source
-from servotwin.models.engine.bus.bus_inputs import inputs_at
 from servotwin.models.engine.bus.bus_records import numbers_of, put_numbers, source_of
 from servotwin.models.engine.bus.event_log import Tape
+from servotwin.models.engine.dynamics import bus_side
 from servotwin.models.engine.events import kinds
+from servotwin.models.engine.lanes import inputs_at
 from servotwin.models.engine.live.posts import lines_of, low_of, put_low, put_said, said_of
 from servotwin.models.engine.live.screen import (
     LEFT,
@@ -237,11 +238,11 @@ def _voltage(posts: Any, shared: Any, seats: Any, mates: Any, written: Tape, tim
         row, numbers = row_at(written.motions, posts[j].row), numbers_of(seats[j].numbers)
         said, y = _said_in(posts[j], row, earlier), _state_in(numbers, row, written.numbers, seats[j].accuracy, time)
         numbers = _now(numbers, said)
-        if shared_source.is_connected(numbers, said.drive, y):
+        if bus_side.is_connected(numbers, said.drive, y):
             mate = mates[count + connected]
-            put_numbers(mate.numbers, shared_source.on_stiff_source(numbers, said.drive == 0.0))
+            put_numbers(mate.numbers, bus_side.on_stiff_source(numbers, said.drive == 0.0))
             put_vector(mate.y, y)
-            mate.sign = shared_source.part_on_bus(said.drive, numbers.bridge, said.duty, y)
+            mate.sign = bus_side.part_on_bus(said.drive, numbers.bridge, said.duty, y)
             mate.returns = 1 if said.drive == 0.0 else 0
             connected += 1
     return shared_source.put_in_zones(supply, mates[count:], connected, supply.V)[1]

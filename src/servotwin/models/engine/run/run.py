@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from servotwin.models.engine import controller
 from servotwin.models.engine.events import kinds
 from servotwin.models.engine.legs import legs, tick_legs
-from servotwin.models.engine.legs.tick_legs import LEGS
+from servotwin.models.engine.legs.tick_legs import LEGS, SPRING_LEGS
 from servotwin.models.engine.log import (
     ALL,
     BEGUN,
@@ -131,10 +131,15 @@ def from_step_to_step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memo
             memory = counted_anew(memory)
             end = instant(pulsed, inputs, memory, end - (origin_of(memory) - origin))
             origin = origin_of(memory)
-        if log.counts[KEEPS] == READINGS and firmware.present(inputs.firmware[0]) and not asked(
-                memory.lowest) and tick_legs.way_of(numbers, inputs, end - memory.point.time, False) == LEGS:
-            gone = tick_legs.go(numbers, inputs, memory, end, readings.times, log.counts[READ], readings.values)
-            memory, log.counts[READ] = tick_legs.as_gone(memory, gone), gone.done
+        if log.counts[KEEPS] == READINGS and firmware.present(inputs.firmware[0]) and not asked(memory.lowest):
+            way = tick_legs.way_of(numbers, inputs, end - memory.point.time, readings.nearly)
+            if way == LEGS:
+                gone = tick_legs.go_stiff(numbers, inputs, memory, end, readings.times, log.counts[READ],
+                                          readings.values)
+                memory, log.counts[READ] = tick_legs.as_gone(memory, gone), gone.done
+            if way == SPRING_LEGS:
+                gone = tick_legs.go(numbers, inputs, memory, end, readings.times, log.counts[READ], readings.values)
+                memory, log.counts[READ] = tick_legs.as_gone(memory, gone), gone.done
             if memory.point.time >= end or due(memory):
                 continue
         before = memory

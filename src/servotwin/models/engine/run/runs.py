@@ -5,24 +5,30 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from servotwin.models.engine import controller
-from servotwin.models.engine.lanes import ARRIVED, UNDERWAY, chip_of, inputs_of, numbers_of
+from servotwin.models.engine.lanes import ARRIVED, UNDERWAY, Tables, Told, chip_of, inputs_of, numbers_of
+from servotwin.models.engine.legs import coupled_ticks, tick_legs
+from servotwin.models.engine.legs.coupled_units import put_unit_numbers
+from servotwin.models.engine.legs.tick_legs import POWER_SERIES, STEPS
 from servotwin.models.engine.log import IDLE, KEEPS, NO_ROWS, READ, READINGS, SHORT, Log, Readings
 from servotwin.models.engine.memory import (
     Inputs,
     Memory,
+    counted_anew,
+    due,
     instant,
     memory_at,
+    origin_of,
     put_memory,
     put_started,
     put_vector,
     resumed,
     time_of,
 )
+from servotwin.models.engine.run.lowest import asked
 from servotwin.models.engine.run.run import from_step_to_step
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.state.modes import INSIDE, LOST, RIGID, Vector
 from servotwin.models.terms import firmware, play
-from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.chip import present as pulsed_chip
 from servotwin.models.terms.numbers import Numbers
 
@@ -43,13 +49,15 @@ def start(lanes: Lanes, which: Indices, memories: Memories) -> None:
 
 def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, torque_count: Indices,
           which: Indices, durations: Floats, times: Floats, first_output: Indices, outputs: Floats, memories: Memories,
-          status: Indices, ended: Floats, counts: Indices) -> None:
+          status: Indices, nearly: bool, ended: Floats, counts: Indices, units: Any, common: Any) -> None:
     """Let the lanes named in `which`, whose memories are given, go on for durations of their own [s].
 
     `outputs` has the shape (n, 18, T), a table of `Readings` for each, and gets what stands at `times` from the one
-    numbered `first_output` on; `counts` are those of a log. A lane whose status is `UNDERWAY` may be in the middle of a
-    tick, one that has `ARRIVED` stays.
+    numbered `first_output` on, `nearly` as those have it; `counts` are those of a log, and `units` and `common` room
+    for a servo that goes by power series. A lane whose status is `UNDERWAY` may be in the middle of a tick, one that
+    has `ARRIVED` stays.
     """
+    told = Told(lanes, Tables(torques, torque_first, torque_count, curve, torque_first, torque_count))
     for k in range(which.size):
         lane = which[k]
         if status[k] == ARRIVED:
@@ -57,8 +65,15 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
             status[k], ended[k] = COMPLETED, row.frames * row.beat + row.point.time
             continue
         inputs = inputs_of(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
-        memory, how = run(numbers_of(lanes, lane), chip_of(lanes, lane), inputs, memory_at(memories, k),
-                          durations[k], status[k] == UNDERWAY, Readings(times, outputs[k]), first_output[k], counts)
+        numbers, readings = numbers_of(lanes, lane), Readings(times, outputs[k], nearly)
+        memory, end = ready_to(inputs, memory_at(memories, k), pulsed_chip(chip_of(lanes, lane)), durations[k],
+                               status[k] == UNDERWAY)
+        counts[READ] = first_output[k]
+        if way_of(numbers, inputs, memory, durations[k], nearly) == POWER_SERIES:
+            units[0].place, units[0].lane = k, lane
+            memory, end = by_series(told, numbers, inputs, memory, memories.firms, end, readings, counts, units, common)
+        log = log_of(counts)
+        memory, how = from_step_to_step(numbers, chip_of(lanes, lane), inputs, memory, end, log, readings)
         status[k] = how
         ended[k] = time_of(memory)
         if how == COMPLETED:
@@ -96,8 +111,10 @@ def to_first_ticks(lanes: Lanes, curve: Floats, torques: Floats, torque_first: I
         while seen < times.size and times[seen] < phase:
             seen += 1
         inputs = inputs_of(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
-        memory, how = run(numbers_of(lanes, lane), chip_of(lanes, lane), inputs, memory_at(memories, k), phase, False,
-                          Readings(times[:seen], outputs[k]), 0, counts)
+        memory, end = ready_to(inputs, memory_at(memories, k), False, phase, False)
+        counts[READ], log = 0, log_of(counts)
+        memory, how = from_step_to_step(numbers_of(lanes, lane), chip_of(lanes, lane), inputs, memory, end, log,
+                                        Readings(times[:seen], outputs[k], False))
         if how == COMPLETED:
             put_memory(memories.rows[k], memory)
             durations[k], first_output[k] = durations[k] - phase, seen
@@ -111,16 +128,44 @@ def note_failures(lanes: Indices, how: Indices, at: Floats, records: Any, status
             put_vector(records[k].point.y, LOST)
 
 
-def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: float, underway: bool,
-        readings: Readings, done: int, counts: Indices) -> tuple[Memory, int]:
-    """Go on for a duration [s]; return the memory, of before what went wrong, and a status.
+def ready_to(inputs: Inputs, memory: Memory, pulsed: bool, duration: float, underway: bool) -> tuple[Memory, float]:
+    """Return a memory that can go on for a duration [s], and to when by its own clock [s].
 
-    `underway` is whether a program knows its next tick and pulse. Readings are taken from the one numbered `done` on.
+    `underway` is whether a program knows its next tick and pulse.
     """
-    pulsed = pulsed_chip(chip)
     memory = resumed(pulsed, inputs, memory, False)
     if firmware.present(inputs.firmware[0]) and not underway:
         controller.resume(inputs, memory)
-    counts[KEEPS], counts[IDLE], counts[SHORT], counts[READ] = READINGS, 0, 0, done
-    end = instant(pulsed, inputs, memory, memory.point.time + duration)
-    return from_step_to_step(numbers, chip, inputs, memory, end, Log(NO_ROWS, NO_ROWS, NO_ROWS, counts), readings)
+    return memory, instant(pulsed, inputs, memory, memory.point.time + duration)
+
+
+def log_of(counts: Indices) -> Log:
+    """Return a log that keeps readings alone."""
+    counts[KEEPS], counts[IDLE], counts[SHORT] = READINGS, 0, 0
+    return Log(NO_ROWS, NO_ROWS, NO_ROWS, counts)
+
+
+def way_of(numbers: Numbers, inputs: Inputs, memory: Memory, left: float, nearly: bool) -> int:
+    """Return which way a servo goes for the time that is left [s]; power series tell no least voltage."""
+    if not firmware.present(inputs.firmware[0]) or asked(memory.lowest):
+        return STEPS
+    way = tick_legs.way_of(numbers, inputs, left, nearly)
+    return coupled_ticks.way_of(numbers, inputs, left) if way == STEPS else way
+
+
+def by_series(told: Told, numbers: Numbers, inputs: Inputs, memory: Memory, firms: Any, end: float, readings: Readings,
+              counts: Indices, units: Any, common: Any) -> tuple[Memory, float]:
+    """Go on by power series as far as these lead; return the memory, and the end [s] by its clock."""
+    put_unit_numbers(units[0].given, numbers)
+    coupled_ticks.put_source(common[0], numbers.source)
+    goes = True
+    while goes:
+        if due(memory):
+            later = counted_anew(memory)
+            end = instant(False, inputs, later, end - (origin_of(later) - origin_of(memory)))
+            memory = later
+        gone = coupled_ticks.alone(told, inputs, memory, firms, end, readings.times, counts[READ], readings.values,
+                                   units, common)
+        memory, counts[READ] = tick_legs.as_gone(memory, gone), gone.done
+        goes = gone.anew and gone.time < end and due(memory)
+    return memory, end

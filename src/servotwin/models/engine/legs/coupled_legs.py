@@ -10,11 +10,14 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from servotwin.models.engine.bus import coupled_series
-from servotwin.models.engine.bus.coupled_events import first_end
-from servotwin.models.engine.bus.coupled_laws import follow, put_law_of
-from servotwin.models.engine.bus.coupled_series import put_after, voltage_at
-from servotwin.models.engine.bus.coupled_units import (
+from servotwin.models.engine.dynamics import contacts, currents, guards
+from servotwin.models.engine.dynamics.bus_side import driven, part_on_bus
+from servotwin.models.engine.events import crossings
+from servotwin.models.engine.legs import coupled_series, legs
+from servotwin.models.engine.legs.coupled_events import first_end
+from servotwin.models.engine.legs.coupled_laws import follow, put_law_of
+from servotwin.models.engine.legs.coupled_series import put_after, voltage_at
+from servotwin.models.engine.legs.coupled_units import (
     put_unit_mode,
     put_unit_numbers,
     put_unit_state,
@@ -22,10 +25,6 @@ from servotwin.models.engine.bus.coupled_units import (
     unit_numbers,
     unit_state,
 )
-from servotwin.models.engine.bus.shared_source import driven, part_on_bus
-from servotwin.models.engine.dynamics import contacts, currents, guards
-from servotwin.models.engine.events import crossings
-from servotwin.models.engine.legs import legs
 from servotwin.models.engine.legs.legs import MOST_SHORT, SHORT
 from servotwin.models.state.modes import (
     BACKWARD,

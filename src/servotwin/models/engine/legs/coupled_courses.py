@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from servotwin.models.engine.bus.coupled_units import unit_numbers
 from servotwin.models.engine.dynamics import guards
+from servotwin.models.engine.legs.coupled_units import unit_numbers
 from servotwin.models.state.modes import FORWARD, INSIDE
 from servotwin.models.terms.friction import core_speed
 

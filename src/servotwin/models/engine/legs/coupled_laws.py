@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from servotwin.models.engine.bus.coupled_units import (
+from servotwin.models.engine.dynamics import contacts, currents, guards
+from servotwin.models.engine.legs import legs
+from servotwin.models.engine.legs.coupled_units import (
     Law,
     put_unit_law,
     put_unit_state,
@@ -12,8 +14,6 @@ from servotwin.models.engine.bus.coupled_units import (
     unit_numbers,
     unit_state,
 )
-from servotwin.models.engine.dynamics import contacts, currents, guards
-from servotwin.models.engine.legs import legs
 from servotwin.models.state.modes import (
     FORWARD,
     INSIDE,

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from servotwin.models.engine.bus.coupled_units import TERMS, put_unit_state, unit_state
+from servotwin.models.engine.legs.coupled_units import TERMS, put_unit_state, unit_state
 from servotwin.models.state.modes import INSIDE, Vector
 from servotwin.physics.thermal import heat_flow
 

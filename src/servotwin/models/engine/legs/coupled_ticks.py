@@ -1,6 +1,7 @@
 """Digital servos on one supply, from tick to tick of all of them: programs decide, and legs lead to the next instant.
 
-A tick at which neither a duty nor a mode changes costs its program and, of a servo at rest, a comparison.
+A tick at which neither a duty nor a mode changes costs its program and, of a servo at rest, a comparison. A servo that
+is the only one on its supply goes so where its winding gets warm, or the supply may be at its limit.
 """
 
 from __future__ import annotations
@@ -9,10 +10,11 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from servotwin.models.engine import controller
-from servotwin.models.engine.bus import coupled_legs
-from servotwin.models.engine.bus.bus_inputs import inputs_at
-from servotwin.models.engine.bus.coupled_legs import DONE, LEFT, current_of, is_plain, put_duty, settle
-from servotwin.models.engine.bus.coupled_units import put_unit_state, unit_numbers, unit_state
+from servotwin.models.engine.lanes import inputs_at
+from servotwin.models.engine.legs import coupled_legs
+from servotwin.models.engine.legs.coupled_legs import DONE, LEFT, current_of, is_plain, put_duty, settle
+from servotwin.models.engine.legs.coupled_units import put_unit_state, unit_mode, unit_numbers, unit_state
+from servotwin.models.engine.legs.tick_legs import POWER_SERIES, STEPS, Gone, show_one
 from servotwin.models.engine.memory import FRAMES, SAME, Inputs, Memory, origin_of
 from servotwin.models.engine.motions.choice import may_depend
 from servotwin.models.terms import control, duty, elastic, firmware, sensor
@@ -22,6 +24,7 @@ from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.physics.pieces import Piece
 
 if TYPE_CHECKING:
+    from servotwin.models.engine.lanes import Floats
     from servotwin.models.terms.source import Source
 
 _FOLLOWED = TWO_BODIES | BY_SHARE | ON_HEAT
@@ -35,6 +38,48 @@ def possible(numbers: Numbers, inputs: Inputs) -> bool:
     if sensor.slack(numbers.sensor) or len(inputs.torque) > 0:
         return False
     return may_depend(numbers, _GIVEN) & ~_FOLLOWED == 0
+
+
+def way_of(numbers: Numbers, inputs: Inputs, left: float) -> int:
+    """Return which way a servo that is alone goes for the time that is left [s], where its tick has no closed form."""
+    if left < inputs.firmware[0].T_c * (1.0 - SAME) or len(inputs.curve) > 0 or not possible(numbers, inputs):
+        return STEPS
+    return POWER_SERIES
+
+
+def alone(told: Any, inputs: Inputs, memory: Memory, firms: Any, until: float, times: Floats, done: int,
+          outputs: Floats, units: Any, common: Any) -> Gone:
+    """Let the one servo of `units` go on as far as this way leads, and at most to `until` [s]; write its outputs.
+
+    Both `units` and `common` have room for a second one.
+    """
+    unit, serves = units[0], False
+    sit(unit, inputs, memory, until)
+    begin(told, firms, 1, units)
+    while is_underway(units, 1):
+        serves = True
+        if serve(told, firms, 1, units, common[0]) == LEFT:
+            break
+        time = to_next(units, 1)
+        if done < times.size:
+            done = _show(units, common, unit.time + time, until, times, done, outputs, firms)
+        if move(units, 1, common[0], time) == LEFT:
+            break
+    return Gone(unit.time, unit_state(unit.y), unit.mesh, done, serves)
+
+
+def _show(units: Any, common: Any, end: float, until: float, times: Floats, done: int, outputs: Floats,
+          firms: Any) -> int:
+    """Write the outputs on the way to `end` [s], found by going there in the second room; return how many are done."""
+    t, slack, origin = units[0].time, units[0].slack, units[0].origin
+    while done < times.size and (times[done] - origin < end - slack or end >= until - slack):
+        units[1], common[1] = units[0], common[0]
+        wanted = min(max(times[done] - origin - t, 0.0), end - t)
+        if coupled_legs.go(units[1:2], 1, common[1], wanted) < wanted:
+            return done
+        show_one(outputs, done, unit_state(units[1].y), unit_mode(units[1].mode), firms[units[0].place])
+        done += 1
+    return done
 
 
 def put_source(common: Any, source: Source) -> None:

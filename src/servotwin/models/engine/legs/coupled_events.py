@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from servotwin.models.engine.bus.coupled_courses import BY_PLACE, first_below
-from servotwin.models.engine.bus.coupled_series import state_at, voltage_at
-from servotwin.models.engine.bus.coupled_units import unit_mode, unit_numbers
 from servotwin.models.engine.dynamics import guards
+from servotwin.models.engine.legs.coupled_courses import BY_PLACE, first_below
+from servotwin.models.engine.legs.coupled_series import state_at, voltage_at
+from servotwin.models.engine.legs.coupled_units import unit_mode, unit_numbers
 from servotwin.models.state.modes import Vector
 
 _HALVINGS = 200
