@@ -12,7 +12,7 @@ from servotwin.models.engine.live.posts import NONE_BEFORE, NOTHING_SAID, Follow
 from servotwin.models.engine.live.screen import NO_LOW
 from servotwin.models.engine.memory import ACCURACY
 from servotwin.models.switched import SwitchedServo
-from servotwin.models.terms.chip import NO_CHIP
+from servotwin.models.terms.frame import NO_CHIP
 from servotwin.signals.signal import KINDS as KINDS_OF_UNITS
 from servotwin.units import factor
 from servotwin.web.live.lines import lines_of

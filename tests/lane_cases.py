@@ -8,7 +8,7 @@ import numpy as np
 from servotwin.models.engine.lanes import Lanes
 from servotwin.models.engine.memory import ACCURACY
 from servotwin.models.terms.bridge import Bridge, Off
-from servotwin.models.terms.chip import NO_CHIP
+from servotwin.models.terms.frame import NO_CHIP
 from servotwin.models.terms.friction import NO_FRICTION
 from servotwin.models.terms.load import NO_LOAD
 from servotwin.models.terms.motor import Motor

@@ -39,7 +39,7 @@ from planted import CAUSES, HEALTHY, SHOWS, Case, base, healthy, planted, quietl
 import servotwin as st
 from servotwin.logs import Log
 from servotwin.models import DigitalServo, default_model, mid_travel
-from servotwin.simulation.arrival import resolution
+from servotwin.simulation.metrics import resolution
 
 TICK, LOOK = 0.01, 0.5e-3  # s: of the controller; between two looks at the truth, shorter than a bridge's pulses
 HALF_SECOND = 0.5  # s: what stands still for less is no rest

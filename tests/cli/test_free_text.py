@@ -102,7 +102,7 @@ WRITERS = {
     "identification/report/validation.py", "identification/sheets/sheet_file.py", "logs/csv_logs.py",
     "logs/json_file.py", "look/files.py", "paper/report.py", "parameters/output_file.py", "parameters/servo_file.py",
     "plotting/files.py", "plotting/formula.py", "simulation/compile/building.py", "simulation/compile/storage.py",
-    "simulation/files.py", "simulation/lanes/c_entry.py", "studies/folder.py", "tables/columns.py",
+    "simulation/result.py", "simulation/lanes/c_entry.py", "studies/folder.py", "tables/columns.py",
     "web/alone/kernel.py", "web/server/own/reading.py", "web/server/own/work.py", "wire/keeping.py", "wire/traffic.py",
 }
 

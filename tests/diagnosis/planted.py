@@ -18,7 +18,7 @@ import servotwin as st
 from servotwin.datasheet import thermal_masses
 from servotwin.loads import Constant, Inertia, Load
 from servotwin.models import Model, default_model, mid_travel
-from servotwin.simulation.arrival import resolution
+from servotwin.simulation.metrics import resolution
 
 ANALOG = ("hitec-hs-422", "hitec-hs-755hb", "hitec-hs-485hb", "futaba-s3003", "towerpro-sg90", "hitec-hs-645mg",
           "futaba-s3305")

@@ -14,7 +14,7 @@ from export.structures import HEAT, INDUCTANCE, STRUCTURES, commands, model_of
 from servotwin import export
 from servotwin.errors import InputError, OutputError, OutputExistsError
 from servotwin.export.c_code import table_for
-from servotwin.models.engine.events.kinds import NAMES
+from servotwin.models.engine.events.crossings import NAMES
 from servotwin.models.terms.given import given_of
 
 COMPILERS = [compiler for compiler in ("gcc", "clang") if shutil.which(compiler)]

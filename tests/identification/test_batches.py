@@ -12,7 +12,7 @@ from servotwin.identification.fitting.batches import Bundle, Running, batches
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.point import DELAY_SCALE, Point
-from servotwin.simulation.workers import Crew
+from servotwin.simulation.progress import Crew
 
 FREE = ("output_inertia", "electronics.stretcher_gain")
 FAST, SLOW = 1e-5, 1e-2  # s that a second of a lane takes: of closed form, and of what is integrated in every frame

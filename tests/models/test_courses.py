@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from servotwin.models.engine.motions.relative_motion import Course, alike, lead_at, leaves
+from servotwin.models.engine.motions.first_order import Course, alike, lead_at, leaves
 
 
 def looked_for(one, other, low, high, s0, s1):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from servotwin.models.engine.batch import tiles
-from servotwin.models.engine.cosim.layout_convert import put_beside, remembered
+from servotwin.models.engine.cosim import put_beside, remembered
 from servotwin.models.engine.memory import time_of
 from servotwin.models.state.modes import ON_BACKWARD, RIGID
 from servotwin.models.state.records import room

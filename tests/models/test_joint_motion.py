@@ -6,9 +6,9 @@ import pytest
 
 import servotwin as st
 from servotwin.loads import Constant, Inertia, as_load
-from servotwin.models.engine.bus import coupled_step, shared_source
+from servotwin.models.engine.bus import coupled_step
 from servotwin.models.engine.bus.bus_records import Mate
-from servotwin.models.engine.dynamics import bus_side
+from servotwin.models.engine.dynamics import currents
 from servotwin.models.state.modes import (
     BACKWARD,
     CURRENT_BACKWARD,
@@ -24,7 +24,7 @@ from servotwin.models.terms.source import Source
 from servotwin.physics.pieces import Piece
 
 SOURCE = Source(6.0, 0.4, 1.5)
-STATES = (shared_source.FOLLOWING, shared_source.LIMITED, shared_source.BROKEN_DOWN, shared_source.KEEPING)
+STATES = (coupled_step.FOLLOWING, coupled_step.LIMITED, coupled_step.BROKEN_DOWN, coupled_step.KEEPING)
 
 
 def mates(stiffness=0.0):
@@ -32,7 +32,7 @@ def mates(stiffness=0.0):
     model = st.PulseServo(st.load_servo("hitec-hs-755hb"))
     found = []
     for k, (sign, contact, zone) in enumerate([(1.0, FORWARD, CURRENT_FORWARD), (-1.0, BACKWARD, CURRENT_BACKWARD)]):
-        numbers = bus_side.on_stiff_source(model.pack(as_load(Inertia(1e-3 * (k + 1)) + Constant(0.1))), False)
+        numbers = currents.on_stiff_source(model.pack(as_load(Inertia(1e-3 * (k + 1)) + Constant(0.1))), False)
         mate, w = object_of(Mate), sign * (1.0 + k)
         mate.numbers = numbers._replace(load=numbers.load._replace(stiffness=stiffness))
         mate.mode, mate.sign, mate.tau = Mode(zone, contact, RIGID, FREE, 0), sign, Piece(value=0.1)
@@ -70,4 +70,4 @@ def test_a_step_that_cannot_be_made_says_so():
     found = mates()
     for mate in found:
         mate.start = mate.start._replace(w=math.nan)
-    assert coupled_step.joint_step(SOURCE, shared_source.FOLLOWING, found, 2, 0.0, 1e-3).length < 0.0
+    assert coupled_step.joint_step(SOURCE, coupled_step.FOLLOWING, found, 2, 0.0, 1e-3).length < 0.0

@@ -9,14 +9,13 @@ import servotwin as st
 from servotwin.loads import as_load
 from servotwin.models.columns import LaneServo
 from servotwin.models.state.records import numbers_in
-from servotwin.models.terms.given import given_of
-from servotwin.models.terms.hung import hung_of
+from servotwin.models.terms.given import given_of, hung_of
 from servotwin.simulation.compile import Recipe, kernels
 
 _TERMS = "servotwin.models.terms."
 RECIPE = Recipe("numbers", tuple(f"{_TERMS}packing:{name}" for name in ("pulsed", "digital", "bounded", "averaged")))
 PROGRAM, CHIP = Recipe("numbers_of_program", (f"{_TERMS}firmware:pack",)), Recipe("numbers_of_chip",
-                                                                                 (f"{_TERMS}chip:pack",))
+                                                                                 (f"{_TERMS}frame:pack",))
 WORN = {"gear.backlash": 0.01, "gear.output_inertia": 1e-4, "friction.breakaway_ratio": 1.3,
         "friction.stribeck_speed": 2.0, "electronics.off_state": "coast", "supply.internal_resistance": 0.3,
         "supply.current_limit": 1.0, "electronics.pulse_timeout": 0.06, "friction.load_friction": 0.1,

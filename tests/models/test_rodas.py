@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from servotwin.models.engine.dynamics.rates import jacobian, rates_of
+from servotwin.models.engine.dynamics.coefficients import jacobian, rates_of
 from servotwin.models.engine.motions import rodas
 from servotwin.models.state.modes import FREE, LINEAR, RIGID, Mode, Vector
 from servotwin.models.terms.load import NO_LOAD

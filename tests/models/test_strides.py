@@ -12,7 +12,7 @@ from scipy.linalg import expm
 
 import servotwin as st
 from lane_cases import replaced
-from servotwin.models.engine.batch import rk_batch, rk_slots, rk_steps, tiles
+from servotwin.models.engine.batch import rk_batch, rk_steps, tiles
 from servotwin.models.engine.batch.rk_steps import Aim, State
 from servotwin.models.engine.memory import FIRST_STEP
 from servotwin.models.state.records import fill, room
@@ -71,14 +71,14 @@ def take(numbers, u, tau, state, aims):
     """Let a shaft take a stride to each of up to eight aims; return for each where it has led, and its time."""
     room_ = tiles.plan_room("float64", tiles.STRIDES)[0].of.slots
     mode, stride, after = rk_steps.entered(numbers, u, tau, state), room_.stride, room_.after
-    for k, aim in zip(range(rk_slots.SLOTS), cycle(aims), strict=False):
-        rk_slots.put_numbers_in(room_.own, k, numbers)
-        rk_slots.put_before_in(room_.before, k, state)
+    for k, aim in zip(range(rk_steps.SLOTS), cycle(aims), strict=False):
+        rk_steps.put_numbers_in(room_.own, k, numbers)
+        rk_steps.put_before_in(room_.before, k, state)
         stride.u[k], stride.tau[k], stride.tolerance[k], stride.left[k] = u, tau, 1.0, 1.0
         stride.reach[k], stride.origin[k], stride.rise[k] = aim
         stride.curved[k], room_.busy.tries[k] = numbers.friction.varies, 1
         room_.busy.zone[k], room_.busy.contact[k], room_.busy.share[k] = mode.zone, mode.contact, mode.share
-    rk_slots.step(room_)
+    rk_steps.step(room_)
     return [(State(after.q[k], after.w[k], after.T_w[k], after.T_h[k]), after.t[k]) for k in range(len(aims))]
 
 

@@ -7,12 +7,12 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import servotwin as st
-from servotwin.models.engine.batch import warm_backlash, warm_segments
+from servotwin.models.engine.batch import backlash_batch, warm_segments
 from servotwin.models.engine.batch.rk_steps import State
 from servotwin.models.engine.dynamics import coefficients, guards
-from servotwin.models.engine.dynamics.rates import rates_of
+from servotwin.models.engine.dynamics.coefficients import rates_of
 from servotwin.models.engine.legs import legs
-from servotwin.models.engine.motions import warm_exponential, warm_law, warm_linear
+from servotwin.models.engine.motions import warm_exponential, warm_linear
 from servotwin.models.state.modes import (
     BACKWARD,
     CONDUCTING,
@@ -105,7 +105,7 @@ def test_a_step_of_shaft_and_current_follows_the_law(servo, name, tolerance, off
     want = followed(numbers, mode, u, y, 0.012)
     left = 0.012
     for _ in range(60):
-        law = warm_law.law_of(numbers, mode, u, TORQUE, y)
+        law = warm_linear.law_of(numbers, mode, u, TORQUE, y)
         h, found = warm_linear.follow(law, numbers.heat, y, left, tolerance)
         assert 0.0 < h <= left
         assert found.error <= tolerance * (1.0 + abs(y.w_m))
@@ -122,7 +122,7 @@ def test_a_step_without_inductance_is_the_limit_of_a_small_one(servo):
     ends = []
     for kind, L in ((st.PulseServo, 1e-9), (st.PulseServoInductive, 1e-9), (st.PulseServoInductive, 1e-7)):
         numbers = numbers_of(servo, kind, **{"motor.armature_inductance": L})
-        law = warm_law.law_of(numbers, mode, 6.0, TORQUE, y)
+        law = warm_linear.law_of(numbers, mode, 6.0, TORQUE, y)
         ends.append(warm_linear.state(numbers, mode, y, (0.0, 0.0), warm_linear.step(law, numbers.heat, y, 5e-3).dense,
                                       5e-3,
                                       5e-3).w)
@@ -147,7 +147,7 @@ def test_legs_with_play_end_where_those_of_a_cold_servo_do(servo, u):
     large = {"thermal.winding_capacity": 1e12, "thermal.housing_capacity": 1e12, "thermal.magnet_coefficient": 0.0}
     numbers = numbers_of(servo, **GAP, **large)
     y = Vector(0.5, -0.4, 0.0, 298.15, 298.15, 0.498, 1.2)
-    hot = warm_backlash.go(numbers, TORQUE, u, y, INSIDE, 0.5, 0.015, 1e-11)
+    hot = backlash_batch.go(numbers, TORQUE, u, y, INSIDE, 0.5, 0.015, 1e-11)
     cold = numbers._replace(heat=numbers.heat._replace(C_w=0.0))
     want = legs.go(cold, TORQUE, u, y, legs.mode_from(cold, TORQUE, u, y, INSIDE), 0.5, 0.015)
     assert hot.done == want.done == 1.0

@@ -130,11 +130,11 @@ def on_a_bus(st, model, command, load, how):
 def without_compiler():
     """Let batches run the derived text as it is, in the forms that compiled ones take."""
     from servotwin.simulation.compile import calls
-    from servotwin.simulation.compile.plain import plain_module
-    from servotwin.simulation.lanes import lane_sets, memories, whole_runs
+    from servotwin.simulation.compile.backend import plain_module
+    from servotwin.simulation.lanes import store, whole_runs
 
     kernels = cache(plain_module)
-    for module in (whole_runs, lane_sets, memories, calls):
+    for module in (whole_runs, store, calls):
         module.kernels = kernels
     calls.is_plain = lambda: True
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import servotwin as st
-from servotwin.models.engine.bus import event_log
-from servotwin.models.engine.bus.event_log import Tape
+from servotwin.models.engine.bus import bus_records
+from servotwin.models.engine.bus.bus_records import Tape
 from servotwin.simulation import bus_run
 from servotwin.simulation.compile import Recipe, is_compiled
 
@@ -65,7 +65,7 @@ def test_a_run_that_fills_many_tapes_is_the_same(servo, monkeypatch, name):
     rows = 60
     monkeypatch.setattr(bus_run, "tape_of", lambda _, plain: Tape(
         [None] * rows if plain else np.empty(rows, bus_run.ROW),
-        np.empty((rows, event_log.EVENT)), np.empty(60 * rows), np.zeros(3, np.int64)))
+        np.empty((rows, bus_records.EVENT)), np.empty(60 * rows), np.zeros(3, np.int64)))
     same(fleet_of(servo, name), usual, 1e-10)
 
 

@@ -16,13 +16,13 @@ from servotwin.models.engine.memory import NOT_ASKED
 from servotwin.models.engine.motions.choice import may_depend
 from servotwin.models.engine.run import runs
 from servotwin.models.state.records import mapped
-from servotwin.models.terms.chip import NO_CHIP
 from servotwin.models.terms.dependence import RECORDED, TABLE
 from servotwin.models.terms.firmware import NO_FIRMWARE
+from servotwin.models.terms.frame import NO_CHIP
 from servotwin.physics.pieces import Piece
 from servotwin.simulation.lanes import forms
-from servotwin.simulation.lanes.divided import by_groups
-from servotwin.simulation.lanes.form_recipes import ALL_RUNS
+from servotwin.simulation.lanes.forms import ALL_RUNS
+from servotwin.simulation.lanes.packed import by_groups
 
 NOBODY = np.zeros(1, np.bool_)
 PULSED = (st.PulseServo, st.PulseServoInductive)

@@ -13,10 +13,10 @@ from servotwin.models.engine.batch.linear_segments import ArcNumbers
 from servotwin.models.state.noise import gaussian
 from servotwin.simulation.compile import Recipe, kernels
 from servotwin.simulation.compile.building import printed
-from servotwin.simulation.compile.compilers import compilers
 from servotwin.simulation.compile.derive import derive
+from servotwin.simulation.compile.finding import compilers
 from servotwin.simulation.compile.translate import header
-from servotwin.simulation.lanes.form_recipes import _BY_FORMULA, ALL_RUNS, CALM
+from servotwin.simulation.lanes.forms import _BY_FORMULA, ALL_RUNS, CALM
 
 SLIDE = Recipe("slide", ("servotwin.models.engine.batch.linear_segments:slide",), vector=True)
 NUMBERS = ArcNumbers(60.0, 60.0, 0.2, 1 / 60.0, 1 / 60.0, 5.0, 330.0, 20.0, 5.0, 6.0, 0.4, 0.1, 33.0, 40.0, 5.0, 1.0,

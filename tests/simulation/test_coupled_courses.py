@@ -7,9 +7,8 @@ import pytest
 
 import servotwin as st
 from servotwin.models.engine.dynamics import contacts, currents, guards
-from servotwin.models.engine.legs.coupled_courses import first_below
-from servotwin.models.engine.legs.coupled_laws import pressing_of, share_of
-from servotwin.models.engine.legs.coupled_units import Unit
+from servotwin.models.engine.legs.coupled_legs import first_below
+from servotwin.models.engine.legs.coupled_units import Unit, pressing_of, share_of
 from servotwin.models.state.modes import (
     BACKWARD,
     CURRENT_BACKWARD,

@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 import servotwin as st
 from leg_draws import drawn, goals, spread
-from servotwin.models.engine.legs import coupled_legs, coupled_series, coupled_ticks
+from servotwin.models.engine.legs import coupled_legs, coupled_ticks, coupled_units
 from servotwin.models.engine.legs.coupled_units import Coupling, Unit, put_unit_numbers
 from servotwin.models.state.modes import BACKWARD, FORWARD
 from servotwin.models.state.records import object_of
@@ -163,14 +163,14 @@ def test_how_much_a_series_bends_is_bounded_by_its_coefficients():
         unit.torque, unit.y.T_w, unit.y.T_h = 0.0, 298.15, 298.15
         coupled_legs.put_duty(unit, own)
     assert coupled_legs.settle(units, 2, common) == coupled_legs.DONE
-    coupled_series.work_out(units, 2, common, h)
+    coupled_units.work_out(units, 2, common, h)
     times = np.linspace(0.0, h, 9)
     step = times[1]
     for unit in units:
-        w = np.array([coupled_series.state_at(unit, common.terms, t).w for t in times])
+        w = np.array([coupled_units.state_at(unit, common.terms, t).w for t in times])
         most = h**2 * np.abs(np.diff(w, 2)).max() / step**2
         assert 0.0 < most <= unit.bend <= 3.0 * most
-    V = np.array([coupled_series.voltage_at(common, t) for t in times])
+    V = np.array([coupled_units.voltage_at(common, t) for t in times])
     most = h**2 * np.abs(np.diff(V, 2)).max() / step**2
     assert 0.0 < most <= common.bend <= 3.0 * most
     # so that a speed that ends as it began, with room for a turn between, does not surely keep its way

@@ -6,11 +6,11 @@ import pytest
 
 from servotwin.simulation import bus_run
 from servotwin.simulation.compile.derive import derive
-from servotwin.simulation.lanes import form_recipes
+from servotwin.simulation.lanes import forms
 
-RECIPES = (bus_run.BUSES, form_recipes.ALL_RUNS,
-           form_recipes.CALM, form_recipes.LOOK, form_recipes.BY_TICKS,
-           form_recipes.TICKS)
+RECIPES = (bus_run.BUSES, forms.ALL_RUNS,
+           forms.CALM, forms.LOOK, forms.BY_TICKS,
+           forms.TICKS)
 
 
 @pytest.fixture(scope="module", params=RECIPES, ids=lambda recipe: recipe.name)

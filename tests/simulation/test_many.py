@@ -12,10 +12,9 @@ import pytest
 import servotwin as st
 from absent_values import ABSENT, HEAT, TABLES
 from servotwin import loads, signals
-from servotwin.simulation import files
+from servotwin.simulation import result as results_of
 from servotwin.simulation.lanes import many
-from servotwin.simulation.lanes.inputs import lanes_of
-from servotwin.simulation.lanes.load_columns import LOAD_NAMES, with_numbers
+from servotwin.simulation.lanes.inputs import LOAD_NAMES, lanes_of, with_numbers
 from servotwin.simulation.lanes.packing import Commands
 from servotwin.simulation.lanes.whole_runs import run as run_lanes
 from servotwin.tables import read_columns
@@ -308,7 +307,7 @@ def test_pandas(batch):
 def test_files_have_a_row_for_each_lane_and_time(batch, tmp_path, monkeypatch, ending):
     if ending == "parquet":
         pytest.importorskip("pyarrow")
-    monkeypatch.setattr(files, "_ROWS", 10)  # one lane at a time
+    monkeypatch.setattr(results_of, "_ROWS", 10)  # one lane at a time
     batch.save(tmp_path / f"a.{ending}")
     found = read_columns(tmp_path / f"a.{ending}")
     assert list(found) == ["lane", "load.inertia", "time_s", "output_angle_deg", "drive"]

@@ -8,7 +8,7 @@ from servotwin import loads, signals
 from servotwin.models.columns import LanePieces
 from servotwin.models.state.records import mapped
 from servotwin.physics.pieces import Piece, Pieces
-from servotwin.simulation.lanes.load_columns import column_load, structure
+from servotwin.simulation.lanes.inputs import column_load, structure
 
 TABLES = [
     Pieces((Piece(value=1.0),)),

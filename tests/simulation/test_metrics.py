@@ -12,7 +12,7 @@ from servotwin import loads
 from servotwin.errors import InputError, SimulationError
 from servotwin.models import mid_travel
 from servotwin.models.default import default_model
-from servotwin.simulation.status import Status
+from servotwin.simulation.start import Status
 
 
 @pytest.fixture(scope="module")

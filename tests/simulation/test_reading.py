@@ -5,9 +5,9 @@ import json
 import pytest
 
 from servotwin.models.engine.batch import tiles
-from servotwin.models.terms.rooms import ACTS
+from servotwin.models.terms.numbers import ACTS
 from servotwin.simulation.compile import reading, unread
-from servotwin.simulation.lanes.form_recipes import ALL_RUNS, side_by_side
+from servotwin.simulation.lanes.forms import ALL_RUNS, side_by_side
 
 pytestmark = pytest.mark.long
 

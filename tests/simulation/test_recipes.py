@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from servotwin.simulation.lanes.form_recipes import parts_of
+from servotwin.simulation.lanes.forms import parts_of
 from servotwin.simulation.recipes import all_recipes
 
 pytestmark = pytest.mark.long

@@ -12,8 +12,7 @@ from servotwin.datasheet.choice import candidate
 from servotwin.errors import InputError
 from servotwin.models.switched import SwitchedServo
 from servotwin.parameters import catalog_names, operating_voltages, printed_points
-from servotwin.simulation.remarks import BELOW_CHIP, BELOW_REGISTER, HELD_BACK
-from servotwin.simulation.sag import floor_of
+from servotwin.simulation.remarks import BELOW_CHIP, BELOW_REGISTER, HELD_BACK, floor_of
 
 STEP = 2e-5  # s
 FALLING = {name: one for name, one in kept_runs.every().items() if isinstance(one.model, SwitchedServo) and (

@@ -13,11 +13,10 @@ from servotwin.models.state import modes
 from servotwin.models.state.modes import Mode, Vector
 from servotwin.models.state.records import mapped
 from servotwin.models.terms import dependence
-from servotwin.models.terms.chip import NO_CHIP
 from servotwin.models.terms.dependence import RECORDED
 from servotwin.models.terms.firmware import NO_FIRMWARE
-from servotwin.models.terms.numbers import NEUTRAL, Numbers
-from servotwin.models.terms.rooms import ACTS, NOTHING, ROOMS, moved, paths
+from servotwin.models.terms.frame import NO_CHIP
+from servotwin.models.terms.numbers import ACTS, NEUTRAL, NOTHING, ROOMS, Numbers, moved, paths
 from servotwin.physics.pieces import Piece
 
 PACKAGE = Path(st.__file__).parent
@@ -35,7 +34,7 @@ OTHERS = {
     ("simulation/remarks.py", "heat"): "what a servo trips by, as people read it",
     ("simulation/vector_buses.py", "source"): "a field of what servos on a bus share",
     ("simulation/lanes/store.py", "chip"): "a field of a memory",
-    ("models/engine/batch/digital_tiles.py", "sensor"): "a field of a tile",
+    ("models/engine/batch/digital_batch.py", "sensor"): "a field of a tile",
     ("models/engine/batch/tiles.py", "chip"): "a field of a tile",
 }
 

@@ -9,7 +9,7 @@ from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 import pytest
 
 from servotwin.errors import InputError, ParameterError
-from servotwin.simulation.workers import Crew, Here
+from servotwin.simulation.progress import Crew, Here
 
 SPAWN = multiprocessing.get_context("spawn")
 

@@ -8,7 +8,7 @@ import pytest
 import servotwin as st
 from servotwin.errors import InputError, ParameterError, UnitError, UnknownNameError
 from servotwin.loads import Load
-from servotwin.simulation.lanes.load_columns import LOAD_NAMES
+from servotwin.simulation.lanes.inputs import LOAD_NAMES
 from servotwin.studies import distributions as d
 from servotwin.studies.draws import SAMPLINGS, checked_table, distributions_of, drawn, noise_seeds
 from servotwin.studies.names import dimension_of, parameter

@@ -11,7 +11,7 @@ import pytest
 
 import servotwin as st
 from servotwin.errors import InputError, MissingExtraError, OutputError
-from servotwin.simulation.workers import Here
+from servotwin.simulation.progress import Here
 from servotwin.tables import read_columns
 
 STEP = st.signals.step(0.0, 60.0, at=0.1, unit="deg")

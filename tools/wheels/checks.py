@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 import servotwin as st
-from servotwin.simulation.compile.compilers import compilers, levels
-from servotwin.simulation.compile.finding import built, shipped_folder
+from servotwin.simulation.compile.finding import built, compilers, levels, shipped_folder
 from servotwin.simulation.compile.library import loaded
 from servotwin.simulation.recipes import all_recipes
 

@@ -23,11 +23,10 @@ from targets import TARGETS, Target, host
 
 from servotwin.simulation.compile import Recipe, source_key
 from servotwin.simulation.compile.building import index, printed
-from servotwin.simulation.compile.compilers import Compiler, compilers
-from servotwin.simulation.compile.finding import index_name, shipped_folder
+from servotwin.simulation.compile.finding import Compiler, compilers, index_name, shipped_folder
 from servotwin.simulation.compile.storage import cache_folder
 from servotwin.simulation.compile.unread import unread
-from servotwin.simulation.lanes.form_recipes import parts_of
+from servotwin.simulation.lanes.forms import parts_of
 from servotwin.simulation.recipes import all_recipes
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -7,7 +7,7 @@ import sysconfig
 from dataclasses import dataclass, replace
 
 from servotwin.simulation.compile import Recipe
-from servotwin.simulation.compile.compilers import level, system
+from servotwin.simulation.compile.finding import level, system
 
 X86_LEVELS = ("x86-64-v2", "x86-64-v3", "x86-64-v4")
 _FOR_LANES = "x86-64-v4"  # twice as many lanes in a vector; one lane after the other is as fast at the level below

@@ -13,7 +13,7 @@ import tempfile
 import venv
 from pathlib import Path
 
-from servotwin.simulation.compile.compilers import levels
+from servotwin.simulation.compile.finding import levels
 
 ROOT = Path(__file__).resolve().parents[2]
 COMPILING = ("ziglang", "numba", "llvmlite")

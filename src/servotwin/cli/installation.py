@@ -32,14 +32,14 @@ def facts() -> dict[str, Any]:
     ('0.1.0', True, True)
     """
     from servotwin import __version__
-    from servotwin.simulation.compile import backend, compilers, finding
+    from servotwin.simulation.compile import backend, finding
 
-    found = [compiler.command for compiler in compilers.compilers()]
+    found = [compiler.command for compiler in finding.compilers()]
     shipped = [*finding.shipped_folder().glob("*")]
     plain = backend.is_plain() or not (found or shipped)
     return {
         "servotwin": __version__, "python": platform.python_version(), "system": platform.platform(),
-        "processors": os.cpu_count(), "level": compilers.level(),
+        "processors": os.cpu_count(), "level": finding.level(),
         "packages": {name: _version(name) for name in ("numpy", "scipy", "matplotlib", "control")},
         "backend": "plain" if plain else "c", "compilers": [" ".join(command) for command in found],
         "shipped_kernels": len(shipped), "cache": _cache(), "extras": _extras(),

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from servotwin.models import Model
     from servotwin.parameters.quantity import Quantity
     from servotwin.simulation import Result
-    from servotwin.simulation.sag import Sag
+    from servotwin.simulation.remarks import Sag
 
 NONE = "-"
 _LAST = 0.5  # s, or half of a shorter run: over which the speed of a servo that turns endlessly is meant

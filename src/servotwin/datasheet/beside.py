@@ -18,7 +18,7 @@ from servotwin.errors import InputError
 from servotwin.models import default_model, mid_travel
 from servotwin.parameters import printed_fact, printed_points
 from servotwin.parameters.sheet_table import ELSE, POINT
-from servotwin.simulation.servo_run import simulate
+from servotwin.simulation.simulator import simulate
 
 if TYPE_CHECKING:
     from servotwin.models import Model

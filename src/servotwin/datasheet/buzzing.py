@@ -12,9 +12,9 @@ from servotwin.errors import InputError
 from servotwin.loads import Coulomb, as_load
 from servotwin.models import BoundedServo, DigitalServo, PulseServo, PulseServoInductive, mid_travel
 from servotwin.physics.gear import output_torque
-from servotwin.simulation.arrival import resolution
+from servotwin.simulation.metrics import resolution
 from servotwin.simulation.rest import rest_of
-from servotwin.simulation.servo_run import simulate
+from servotwin.simulation.simulator import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
     from servotwin.loads import Part
     from servotwin.models import Model
-    from servotwin.models.samples import Samples
+    from servotwin.models.columns import Samples
 
 _LONGEST_SWING = 30.0  # s; what takes longer creeps
 

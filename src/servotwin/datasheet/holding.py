@@ -12,7 +12,7 @@ from servotwin.datasheet.conditions import changed
 from servotwin.datasheet.guesses import Span, spans
 from servotwin.models import DigitalServo, mid_travel
 from servotwin.models.outputs import warm_plant
-from servotwin.simulation.servo_run import simulate
+from servotwin.simulation.simulator import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from servotwin.models import Model
-    from servotwin.models.samples import Samples
+    from servotwin.models.columns import Samples
     from servotwin.simulation import Result
 
 SETTLE, LOOK = 1.5, 0.5  # s: what is told of standing holds for the mean of the last half second of two, or more

@@ -13,7 +13,7 @@ from servotwin.errors import InputError
 from servotwin.loads import Load, Part
 from servotwin.models import DigitalServo, Model
 from servotwin.models.switched import SwitchedServo
-from servotwin.simulation.servo_run import simulate
+from servotwin.simulation.simulator import simulate
 
 Array = NDArray[np.float64]
 _ERRORS = np.concatenate([np.geomspace(1e-6, 1.2e-4, 28), np.geomspace(1.4e-4, 6e-4, 8)])  # s from the neutral pulse

@@ -21,7 +21,7 @@ from servotwin.loads import as_load
 from servotwin.models import BoundedServo, DigitalServo, PulseServo, PulseServoInductive, default_model, mid_travel
 from servotwin.parameters import Servo
 from servotwin.simulation import Simulator
-from servotwin.simulation.servo_run import simulated
+from servotwin.simulation.simulator import simulated
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:

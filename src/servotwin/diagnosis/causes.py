@@ -20,7 +20,7 @@ from servotwin.diagnosis.numbers import (
 )
 from servotwin.models import BoundedServo, DigitalServo
 from servotwin.parameters import printed_fact
-from servotwin.simulation.arrival import resolution
+from servotwin.simulation.metrics import resolution
 
 if TYPE_CHECKING:
     from collections.abc import Callable

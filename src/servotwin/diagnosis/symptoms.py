@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from servotwin.datasheet.warming import HOT_WINDING
 from servotwin.physics import Temperatures
-from servotwin.simulation.arrival import tolerance
+from servotwin.simulation.metrics import tolerance
 
 if TYPE_CHECKING:
     from collections.abc import Callable

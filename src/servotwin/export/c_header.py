@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from string import Template
 
-from servotwin.models.engine.events.kinds import NAMES
+from servotwin.models.engine.events.crossings import NAMES
 
 HEADER = Template('''/* $title
  *

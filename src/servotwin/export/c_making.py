@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING, Any
 from servotwin.export.features import APART
 from servotwin.models import AveragedServo, AveragedServoInductive, BoundedServo, DigitalServo
 from servotwin.models.terms.firmware import Firmware
-from servotwin.models.terms.given import Given
-from servotwin.models.terms.hung import Hung, hung_of
-from servotwin.models.terms.numbers import Numbers
-from servotwin.models.terms.rooms import NOTHING
+from servotwin.models.terms.given import Given, Hung, hung_of
+from servotwin.models.terms.numbers import NOTHING, Numbers
 from servotwin.simulation.compile import Recipe
 from servotwin.simulation.compile.c_types import identifier
 from servotwin.simulation.compile.kinds import FLOAT64, Kind
@@ -24,7 +22,7 @@ if TYPE_CHECKING:
     from servotwin.models.engine.run.alone import Alone
     from servotwin.simulation.compile.standalone import Standalone
 
-_KERNELS = "servotwin.models.engine.run.alone_making"
+_KERNELS = "servotwin.models.engine.run.alone"
 _ENTRIES = ((BoundedServo, "bounded"), (AveragedServo, "averaged"), (AveragedServoInductive, "averaged"),
             (DigitalServo, "digital"))
 _MAKING = Template('''

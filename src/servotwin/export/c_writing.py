@@ -27,10 +27,9 @@ from servotwin.models.outputs import SIGNALS
 from servotwin.models.state.modes import Mode, Vector
 from servotwin.models.state.records import numbers_in, record_of
 from servotwin.models.terms import wiring
-from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.control import Firm
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
-from servotwin.models.terms.frame import Decision, Frame
+from servotwin.models.terms.frame import NO_CHIP, Chip, Decision, Frame
 from servotwin.models.terms.given import Given
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import table_of

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import reduce
 
 from servotwin.models.engine.demands import demanded
-from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.dependence import (
     AT_COMMANDS,
     AT_STOPS,
@@ -33,8 +32,8 @@ from servotwin.models.terms.dependence import (
 )
 from servotwin.models.terms.firmware import Firmware
 from servotwin.models.terms.firmware import present as programmed
-from servotwin.models.terms.numbers import Numbers
-from servotwin.models.terms.rooms import ACTS, NOTHING
+from servotwin.models.terms.frame import Chip
+from servotwin.models.terms.numbers import ACTS, NOTHING, Numbers
 from servotwin.physics.pieces import Piece
 from servotwin.simulation.compile import Recipe
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from servotwin.errors import InputError
-from servotwin.simulation.compile.compilers import compilers
+from servotwin.simulation.compile.finding import compilers
 
 _FLAGS = ("-std=c99", "-O2", "-shared", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno",
           "-fno-trapping-math", "-s")

@@ -7,7 +7,7 @@ from servotwin.models.default import default_class, default_model
 from servotwin.models.digital import DigitalServo
 from servotwin.models.motors import DCMotor, GearedMotor
 from servotwin.models.pulse import PulseServo, PulseServoInductive
-from servotwin.models.travel import mid_travel
+from servotwin.models.standing import mid_travel
 
 MODELS: dict[str, type[Model]] = {
     "dc-motor": DCMotor,

@@ -13,8 +13,7 @@ from servotwin.models import outputs
 from servotwin.models.columns import LanePieces, LaneServo, LaneSignal
 from servotwin.models.state.modes import Vector
 from servotwin.models.terms import wiring
-from servotwin.models.terms.given import Given, given_of
-from servotwin.models.terms.hung import Hung, hung_of
+from servotwin.models.terms.given import Given, Hung, given_of, hung_of
 from servotwin.models.terms.wiring import PULSE_RANGE, TRAVEL_SLACK, Line
 from servotwin.parameters import Servo
 from servotwin.physics.laws import array_form
@@ -25,9 +24,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from servotwin.loads import Load
-    from servotwin.models.samples import Samples
-    from servotwin.models.terms.chip import Chip
+    from servotwin.models.columns import Samples
     from servotwin.models.terms.firmware import Firmware
+    from servotwin.models.terms.frame import Chip
     from servotwin.models.terms.numbers import Numbers
     from servotwin.physics.pieces import Pieces
     from servotwin.signals import Signal

@@ -21,8 +21,8 @@ from servotwin.physics.laws import array_form
 
 if TYPE_CHECKING:
     from servotwin.loads import Load
+    from servotwin.models.columns import Samples
     from servotwin.models.engine.observe import Electrical, Torques
-    from servotwin.models.samples import Samples
     from servotwin.models.terms.numbers import Numbers
     from servotwin.physics.pieces import Pieces
 

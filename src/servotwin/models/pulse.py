@@ -11,8 +11,8 @@ from servotwin.loads import Inertia, as_load
 from servotwin.models.bounded import BoundedServo
 from servotwin.models.engine.dynamics.currents import stall_current
 from servotwin.models.switched import HIDDEN, MOTOR, SHAFT, SwitchedServo
-from servotwin.models.terms import bridge, chip, elastic, friction, heat, packing, play, sensor, source, stops
-from servotwin.models.terms.chip import Chip
+from servotwin.models.terms import bridge, elastic, frame, friction, heat, packing, play, sensor, source, stops
+from servotwin.models.terms.frame import Chip
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ class _Pulsed(SwitchedServo):
 
     numbers = staticmethod(packing.pulsed)
     optional = (
-        "gear.output_inertia", *elastic.READS, *play.READS, *friction.READS, *chip.READS, *bridge.READS,
+        "gear.output_inertia", *elastic.READS, *play.READS, *friction.READS, *frame.READS, *bridge.READS,
         *sensor.READS, *source.READS, *stops.READS, *heat.READS, "electronics.voltage_to_pulse_gain",
         "electronics.command_pulse_offset",
     )
@@ -40,7 +40,7 @@ class _Pulsed(SwitchedServo):
 
     def chip(self, signal: Signal | None = None) -> Chip:
         """Return the numbers of the frame logic; the frame period is that of the command where it gives one."""
-        return cast("Chip", self.made_of(chip.pack, self._period(signal)))
+        return cast("Chip", self.made_of(frame.pack, self._period(signal)))
 
     def check_mean(self, what: str, more: tuple[str, ...] = ()) -> None:
         """Say in one line where pulses have no mean that grows with the error; `what` is it that would need one.

@@ -13,16 +13,15 @@ from servotwin import physics
 from servotwin.errors import CommandError, InputError
 from servotwin.models.base import Model, Place, check_travel, check_widths, clipped, solved
 from servotwin.models.terms import elastic, play, sensor, wiring
-from servotwin.models.terms.chip import FRAME
-from servotwin.models.terms.hung import inertia_on
+from servotwin.models.terms.frame import FRAME
+from servotwin.models.terms.given import inertia_on
 from servotwin.models.terms.wiring import Line
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from servotwin.loads import Load
-    from servotwin.models.terms.given import Given
-    from servotwin.models.terms.hung import Hung
+    from servotwin.models.terms.given import Given, Hung
     from servotwin.models.terms.numbers import Numbers
     from servotwin.physics.pieces import Pieces
     from servotwin.signals import Signal

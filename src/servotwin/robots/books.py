@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.robots.crews import Instance
+from servotwin.robots.joints_layout import BOOKS, KEPT, ROW
 from servotwin.robots.places import load_mujoco
-from servotwin.simulation.compile.joints_layout import BOOKS, KEPT, ROW
 
 _SAME = 1e-6  # of a tick: within it one instant is another
 _WORK = KEPT.index("joint_work")

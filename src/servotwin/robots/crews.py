@@ -14,11 +14,11 @@ from servotwin.datasheet.turning import is_pulsed
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models import Model
 from servotwin.parameters.groups import Supply
+from servotwin.robots.joints_layout import BOOKS, GROUP, INSTANCE, RECORD, ROOM
 from servotwin.robots.mount import Joint
 from servotwin.robots.told import told
 from servotwin.robots.unlike import OF_THE_BUS, differing, of_one_form
 from servotwin.simulation import VectorSimulator
-from servotwin.simulation.compile.joints_layout import BOOKS, GROUP, INSTANCE, RECORD, ROOM
 from servotwin.simulation.lanes.c_entry import CEntry
 
 Array = NDArray[np.float64]

@@ -19,6 +19,7 @@ from servotwin.robots.command_map import CommandMap
 from servotwin.robots.crews import Instance, crews_of
 from servotwin.robots.harbour import Harbour, goals_in
 from servotwin.robots.heat import heat_notes, warm_mounts
+from servotwin.robots.joints_layout import BLOCK, FAILED, FOREIGN, INSTANCE, MESSAGES, RECORD, WELL
 from servotwin.robots.mount import Mount, joints_of, treat_friction
 from servotwin.robots.places import load_mujoco, places
 from servotwin.robots.record import Record
@@ -28,8 +29,7 @@ from servotwin.robots.told import told
 from servotwin.robots.wiring import arrays_of, check_options, maps_of, put_into_model, words_of
 from servotwin.simulation import VectorSimulator
 from servotwin.simulation.compile.calls import joint_addresses
-from servotwin.simulation.compile.joints_layout import BLOCK, FAILED, FOREIGN, INSTANCE, MESSAGES, RECORD, WELL
-from servotwin.simulation.status import Status
+from servotwin.simulation.start import Status
 
 Array = NDArray[np.float64]
 _FIRST_ROWS = 4096  # of a record

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.robots.crews import Crew, Instance
+from servotwin.robots.joints_layout import ASK_NEW, ASK_RESET, BLOCK, INSTANCE, OF_EACH, RECORD
 from servotwin.robots.mount import Joint
-from servotwin.simulation.compile.joints_layout import ASK_NEW, ASK_RESET, BLOCK, INSTANCE, OF_EACH, RECORD
 
 _MOST = 4096  # of MuJoCo's data at once
 _FIRST_ROWS = 4096  # of a record

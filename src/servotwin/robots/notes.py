@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from servotwin.robots.model_file import joint_ranges
-from servotwin.simulation.remarks import NOT_AT_REST, held_back
-from servotwin.simulation.sag import floor_of, watches_its_supply
+from servotwin.simulation.remarks import NOT_AT_REST, floor_of, held_back, watches_its_supply
 
 if TYPE_CHECKING:
     from servotwin.parameters.groups import Supply
     from servotwin.robots.run import RobotRun
-    from servotwin.simulation.sag import Sag
+    from servotwin.simulation.remarks import Sag
 
 _SLACK = math.radians(0.5)  # rad, of ends that goals are rounded to
 

@@ -27,7 +27,7 @@ from servotwin.robots.recipe_twin import (
     inertia_under,
     without_ends,
 )
-from servotwin.simulation.servo_run import simulate
+from servotwin.simulation.simulator import simulate
 
 if TYPE_CHECKING:
     from servotwin.robots.recipe import Recipe

@@ -14,7 +14,7 @@ from servotwin.datasheet.full_drive import FullDrive
 from servotwin.datasheet.lift import GRAVITY
 from servotwin.errors import InputError
 from servotwin.models import AveragedServo, BoundedServo, mid_travel
-from servotwin.simulation.servo_run import simulate
+from servotwin.simulation.simulator import simulate
 
 if TYPE_CHECKING:
     from servotwin.models import Model

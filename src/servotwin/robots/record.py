@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from servotwin.errors import MissingExtraError, UnknownNameError
 from servotwin.models.engine.observe import Observed
 from servotwin.models.outputs import SIGNALS
+from servotwin.robots.joints_layout import KEPT, ROW
 from servotwin.robots.mount import Mount
 from servotwin.robots.solver import SolverNote
 from servotwin.robots.told import Told, told
-from servotwin.simulation import files
-from servotwin.simulation.compile.joints_layout import KEPT, ROW
+from servotwin.simulation import result
 from servotwin.simulation.lanes.vector import AT_MOTOR
 from servotwin.simulation.remarks import NOT_AT_REST, TRIPS, Remark
 from servotwin.simulation.rest import LEAST_REST, look_period, looks_at, swing_of
@@ -349,7 +349,7 @@ class Record(Mapping[str, ServoRecord]):
             for name in servo.names[1:]:
                 if name in SIGNALS:
                     signals[f"{joint}.{name}"], units[f"{joint}.{name}"] = servo[name][::every], SIGNALS[name].unit
-        files.save_csv(path, signals, units, overwrite=overwrite)
+        result.save_csv(path, signals, units, overwrite=overwrite)
 
 
 def _still_since(time: Array, commands: list[Array]) -> float:

@@ -31,7 +31,7 @@ from servotwin.robots.registers import as_motion_says
 from servotwin.robots.sizing import supplied
 from servotwin.robots.tracking import Tracking, tracking_of
 from servotwin.simulation.progress import Progress, shown
-from servotwin.simulation.sag import Sag, may_fall, sag_in
+from servotwin.simulation.remarks import Sag, may_fall, sag_in
 from servotwin.units import is_finite
 
 Array = NDArray[np.float64]

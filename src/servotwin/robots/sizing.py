@@ -22,8 +22,7 @@ from servotwin.errors import InputError
 from servotwin.models import AveragedServo, BoundedServo
 from servotwin.physics.thermal import REFERENCE_TEMPERATURE, Temperatures
 from servotwin.robots.heat import Heating, heating, lasting_torque, mean_heat
-from servotwin.simulation.remarks import Remark
-from servotwin.simulation.sag import LOW
+from servotwin.simulation.remarks import LOW, Remark
 
 if TYPE_CHECKING:
     from servotwin.models import Model

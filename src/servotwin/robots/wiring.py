@@ -14,10 +14,10 @@ from servotwin.errors import InputError, UnknownNameError
 from servotwin.robots.command_map import CommandMap, own_map
 from servotwin.robots.coupling import silence
 from servotwin.robots.crews import Berth
+from servotwin.robots.joints_layout import ARRAYS, DRIVE
 from servotwin.robots.mount import Joint
 from servotwin.robots.places import Places
 from servotwin.robots.told import told
-from servotwin.simulation.compile.joints_layout import ARRAYS, DRIVE
 
 Arrays = dict[str, NDArray[Any]]
 

@@ -1,4 +1,4 @@
-"""Run several servos on one supply and keep what they leave behind; compiled where that is worth while."""
+"""Run several servos on one supply, at once or step by step, and keep the rows that they leave behind."""
 
 from __future__ import annotations
 
@@ -9,41 +9,60 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.errors import InputError
+from servotwin.models.columns import Samples
 from servotwin.models.engine import controller
-from servotwin.models.engine.bus import bus_batch, bus_unit, event_log, event_queue
+from servotwin.models.engine.bus import bus_batch, bus_records, bus_unit, event_queue
 from servotwin.models.engine.bus.bus_batch import Buses
-from servotwin.models.engine.bus.bus_records import ROOM, Mate, Seat, Shared, put_shared
+from servotwin.models.engine.bus.bus_records import (
+    DRIVES,
+    REFUSED,
+    ROOM,
+    SILENCE,
+    TRIPS,
+    Mate,
+    Seat,
+    Shared,
+    Tape,
+    put_shared,
+)
 from servotwin.models.engine.bus.coupled_motion import at_start
-from servotwin.models.engine.bus.event_log import Tape
 from servotwin.models.engine.demands import demanded
+from servotwin.models.engine.dynamics import guards
 from servotwin.models.engine.lanes import Lanes, Tables
 from servotwin.models.engine.legs.coupled_units import Coupling, Unit
+from servotwin.models.engine.live import together
+from servotwin.models.engine.live.posts import put_low
+from servotwin.models.engine.live.screen import NEXT, NO_LOW, USED, Looks
 from servotwin.models.engine.log import Row
 from servotwin.models.engine.memory import Memories, Memory, forgotten, resumed
-from servotwin.models.engine.step import DIVERGED
-from servotwin.models.samples import Samples
+from servotwin.models.engine.step import COMPLETED, DIVERGED
+from servotwin.models.state.modes import Mode
 from servotwin.models.state.records import TILE, numbers_in, object_of, put_fields, record_of, room, rows_of
 from servotwin.models.terms import control
-from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.dependence import SPRING
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
+from servotwin.models.terms.frame import NO_CHIP, Chip
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.source import Source
 from servotwin.physics.pieces import Piece
 from servotwin.simulation.compile import Recipe, is_compiled, is_plain, kernels
-from servotwin.simulation.engine import Plan, State
-from servotwin.simulation.lanes.form_recipes import PLAIN
-from servotwin.simulation.lanes.memories import nothing_yet
+from servotwin.simulation.engine import TRIPS as TRIP_NAMES
+from servotwin.simulation.engine import Event, Part, Plan, State, event_name, failure
+from servotwin.simulation.lanes.forms import PLAIN
 from servotwin.simulation.lanes.packed import programs_of
+from servotwin.simulation.lanes.whole_runs import nothing_yet
+from servotwin.simulation.start import Status
+from servotwin.simulation.trajectory import Motions
+
+# --- Run several servos on one supply and keep what they leave behind; compiled where that is worth while -------------
 
 Array = NDArray[np.float64]
-
 _ENTRIES = tuple(f"servotwin.models.engine.bus.bus_batch:{name}" for name in ("go_on", "look", "voltages"))
 BUSES = Recipe("buses", _ENTRIES, knows=~SPRING)
 """All servos but those with a spring between two bodies; they take hardly longer for what others lack."""
 SHARED, SEAT, MATE, ROW = record_of(Shared), record_of(Seat), record_of(Mate), record_of(Row)
 UNIT, COUPLING = record_of(Unit), record_of(Coupling)
-
 LOADS_FROM, COMPILES_FROM = 1e2, 1.5e4  # frames of servos in one process: what it takes, and more, in plain Python
 _AS_FRAMES = 0.05  # of its frames a servo's share in finding the voltage at an instant takes as long
 _INTEGRATED = 8  # a servo that does not move by plain laws takes so many times as long
@@ -120,7 +139,7 @@ def taped(way: _Compiled | Plainly, until: float, written: Tape,
 def tape_of(servos: int, plain: bool) -> Tape:
     """Return a tape with room for what so many servos do, compiled or in plain Python."""
     rows = max(_ROWS, 64 * servos)
-    return Tape([None] * rows if plain else np.empty(rows, ROW), np.empty((rows, event_log.EVENT)),
+    return Tape([None] * rows if plain else np.empty(rows, ROW), np.empty((rows, bus_records.EVENT)),
                 np.empty(max(_NUMBERS, 64 * servos * ROOM)), np.zeros(3, np.int64))
 
 
@@ -301,3 +320,123 @@ def _records_of(memories: Sequence[Memory]) -> Memories:
         put_fields(firm, own if hasattr(own, "_fields") else control.frozen(own))
     return found
 
+# --- The rows that a run of servos on a bus leaves behind, as motions and events of each ------------------------------
+
+_WORDS = {DRIVES + 1: "drive forward", DRIVES - 1: "drive backward", DRIVES: "drive ends",
+          SILENCE + 1: "silence begins", SILENCE: "silence ends", REFUSED: "pulse refused",
+          **{TRIPS + k: word for k, word in enumerate(TRIP_NAMES)}}
+
+
+def motions_of(plans: Sequence[Plan], rows: Rows) -> list[Motions]:
+    """Return the motions of each servo."""
+    units = rows.motions["unit"]
+    return [Motions([Part(plan, rows.motions[units == j])], rows.numbers) for j, plan in enumerate(plans)]
+
+
+def events_of(plans: Sequence[Plan], rows: Rows) -> list[tuple[Event, ...]]:
+    """Return the events of each servo."""
+    found: list[list[Event]] = [[] for _ in plans]
+    for unit, time, kind, zone, contact, angle in rows.events.tolist():
+        if kind in guards.KINKS:
+            continue
+        name = _WORDS.get(kind) or event_name(int(kind), Mode(int(zone), int(contact), 0, 0, 0))
+        found[int(unit)].append(Event(time, name, angle))
+    return [tuple(events) for events in found]
+
+# --- Servos on one supply that stop and go on, in plain Python, and are looked at on the way --------------------------
+
+class BusSteps:
+    """Servos on one supply that stop and go on.
+
+    Splitting an interval into several calls changes nothing beyond rounding.
+
+    Parameters
+    ----------
+    posts : sequence
+        What shows of each servo, as `models.engine.live.posts.Post` has it.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> from servotwin.simulation.bus import on_supply, source_of
+    >>> from servotwin.web.live.station import Endless, post_of
+    >>> supply = st.Supply(open_circuit_voltage=6.0, internal_resistance=0.5)
+    >>> sim = st.Simulator(on_supply(st.PulseServo(st.load_servo("hitec-hs-755hb")), supply))
+    >>> command = st.signals.step(0.0, 60.0, unit="deg")
+    >>> steps, states = BusSteps([post_of(sim.model), post_of(sim.model)]), [sim.initial(command), sim.initial(command)]
+    >>> for until in (0.1, 0.15, 0.2):
+    ...     shown = [Endless() for _ in states], [Endless() for _ in states]
+    ...     states = steps.go_on(source_of(supply), [sim.plan(command)] * 2, states, Looks(1, 1e3, until, 1, 0), *shown)
+    >>> fleet = st.simulate_bus({"a": (sim.model, command), "b": (sim.model, command)}, supply=supply, duration=0.2)
+    >>> abs(states[1]["output_angle"] - float(fleet["b"]["output_angle"][-1])) < 1e-12
+    True
+    """
+
+    def __init__(self, posts: Sequence[Any]) -> None:
+        self._posts = posts
+        self._way: Plainly | None = None
+        self._source: Source | None = None
+
+    def go_on(self, source: Source, plans: Sequence[Plan], states: Sequence[State], looks: Looks,
+              rows: Sequence[Any], events: Sequence[Any]) -> list[State]:
+        """Let all servos go on to the end of the looks; return their states there.
+
+        Parameters
+        ----------
+        source : Source
+            That they share.
+        plans, states : sequence of Plan, of State
+            Of the servos, always in the same order.
+        looks : Looks
+        rows, events : sequence
+            Room for what shows of each.
+
+        Raises
+        ------
+        SimulationError
+            If the run cannot go on.
+        """
+        way = self._begun(source, plans, states)
+        used = np.zeros(USED * len(plans), np.int64)
+        used[NEXT] = looks.next
+        put_low(self._posts[0].low, NO_LOW)
+        firms = way.seated()
+        try:
+            status = together.go_on(way.inputs, self._posts, firms, way.shared, way.seats, way.mates, looks, self._tape,
+                                    rows, events, used)
+        except InputError:
+            raise  # of whoever is told the time
+        except (ArithmeticError, ValueError):  # numbers beyond what a float holds
+            status = DIVERGED
+        for j, own in enumerate(rows):
+            own.cut(int(used[USED * j]))
+        way.risen(firms)
+        if status != COMPLETED:
+            raise failure(Status.of_code(status), max(seat.origin + seat.clock for seat in way.seats))
+        return self._states(way, plans, states, looks.until)
+
+    def _begun(self, source: Source, plans: Sequence[Plan], states: Sequence[State]) -> Plainly:
+        if self._way is None:
+            self._way, self._tape = Plainly(plans, states, source), tape_of(len(plans), True)
+        else:
+            self._way.begin(plans, states)
+            if source != self._source or self._are_others(self._way, plans, states):
+                self._way.break_up(source)
+        self._source = source
+        return self._way
+
+    @staticmethod
+    def _are_others(way: Plainly, plans: Sequence[Plan], states: Sequence[State]) -> bool:
+        """Tell whether numbers of a servo are others than before, or its clock is."""
+        return any(plan.numbers != state.numbers or memory.beat != state.memory.beat
+                   for plan, state, memory in zip(plans, states, way.memories, strict=True))
+
+    @staticmethod
+    def _states(way: Plainly, plans: Sequence[Plan], states: Sequence[State], until: float) -> list[State]:
+        found = []
+        for plan, state, memory in zip(plans, states, way.memories, strict=True):
+            if plan.digital:
+                controller.pause(plan.inputs, memory)
+                memory = memory._replace(firm=(control.frozen(memory.firm[0]),))
+            found.append(State(until, state.places, memory, plan.numbers, state.changes))
+        return found

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import SimulationError
 from servotwin.models.base import Place
-from servotwin.models.engine.events import kinds
+from servotwin.models.engine.events import crossings
 from servotwin.models.engine.log import ALL, COUNTS, EVENTS, FEW, KEEPS, LEFT, MOTIONS, PAUSED, Happened, Log, Row
 from servotwin.models.engine.memory import ACCURACY, Inputs, Memories, Memory, time_of
 from servotwin.models.engine.run import run as engine_run
@@ -29,13 +29,13 @@ from servotwin.models.engine.step import COMPLETED
 from servotwin.models.state.modes import Mode
 from servotwin.models.state.records import fields_of, record_of
 from servotwin.models.terms import control, duty, firmware
-from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.control import Firm
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
+from servotwin.models.terms.frame import NO_CHIP, Chip
 from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.pieces import Pieces
 from servotwin.simulation.compile import Recipe, is_compiled, is_plain, kernels
-from servotwin.simulation.status import Status
+from servotwin.simulation.start import Status
 
 ONE = Recipe("one", ("servotwin.models.engine.run.run:go_on", "servotwin.models.engine.run.at:at",
                      "servotwin.models.engine.run.at:resolution", "servotwin.models.engine.live.stretch:shown"),
@@ -258,7 +258,7 @@ class RunLog:
             self.parts.append(Part(plan, log.motions[:motions].copy()))
         if events:
             found = log.events[:events]
-            self.events += (Event(time, kinds.NAMES[kind], angle)
+            self.events += (Event(time, crossings.NAMES[kind], angle)
                             for time, angle, kind in (found if isinstance(found, list) else found.tolist()))
         log.counts[MOTIONS] = log.counts[EVENTS] = 0
 
@@ -409,7 +409,7 @@ def _make_beside() -> None:
                      kwargs={**quiet, "check": False, "start_new_session": True}, daemon=True).start()
 
 
-HELD = kinds.NAMES[kinds.HELD]
+HELD = crossings.NAMES[crossings.HELD]
 """What an event is called after which motor and output, that parted and met in no time, stay together for a while."""
 
 
@@ -430,9 +430,9 @@ def told_by(plan: Plan, memory: Memory) -> tuple[float, float, float, int]:
     return control.told_by(memory.firm[0])
 
 
-TRIPS = kinds.NAMES[kinds.TRIP_ENDS:]
+TRIPS = crossings.NAMES[crossings.TRIP_ENDS:]
 
 
 def event_name(kind: int, after: Mode) -> str:
     """Return what to call an event after which this mode holds."""
-    return kinds.NAMES[kinds.kind_of(kind, after)]
+    return crossings.NAMES[crossings.kind_of(kind, after)]

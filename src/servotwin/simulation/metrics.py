@@ -5,24 +5,94 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from servotwin import physics
 from servotwin.errors import InputError
 from servotwin.look import number, table
+from servotwin.models import BoundedServo, DigitalServo, PulseServo, PulseServoInductive
 from servotwin.models.engine.memory import FLAT
-from servotwin.simulation.arrival import arrival_band, resolution, tolerance
+from servotwin.models.engine.observe import stored_energy
+from servotwin.models.outputs import electrical_of, motor_speed_of, torques_of, warm_plant
+from servotwin.models.state.modes import Vector
+from servotwin.physics.electronics import control_voltage_from_pulse
+from servotwin.physics.potentiometer import angle_from_voltage
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from servotwin.models.samples import Samples
+    from servotwin.loads import Load
+    from servotwin.models import Model
+    from servotwin.models.columns import Samples
+    from servotwin.models.terms.numbers import Numbers
+    from servotwin.physics._typing import Real
+    from servotwin.physics.pieces import Pieces
     from servotwin.simulation.result import Result
     from servotwin.simulation.trajectory import Trajectory
 
-_LOOK = 0.1  # s, five usual frames
+# --- When a shaft has arrived where a step sends it -------------------------------------------------------------------
 
+_SHARE = 0.05  # of the step
+_STEPS = 2.0  # deadbands or counts, whichever is wider
+_NEAR = math.radians(1.0)  # a degree, as far as the step is long enough
+
+
+def resolution(model: Model) -> Any:
+    """Return within which angle a servo does not tell two apart: its deadband, of full width, or its count [rad].
+
+    Of a model whose numbers are columns of lanes it is one.
+    """
+    if isinstance(model, DigitalServo):
+        firmware = model.firmware()
+        return np.maximum(firmware.quantum, 2.0 * firmware.h)
+    p = model.value_or("potentiometer.feedback_gain", 0.0)
+    if isinstance(model, BoundedServo):
+        return angle_from_voltage(model.value_or("electronics.voltage_deadband", 0.0), p)
+    if isinstance(model, PulseServo | PulseServoInductive):
+        width = model.value_or("electronics.deadband", 0.0)
+        return angle_from_voltage(control_voltage_from_pulse(width, model.value("electronics.one_shot_slope")), p)
+    return 0.0
+
+
+def tolerance(way: Real, finest: Real) -> Real:
+    """Return how far from its target [rad] a shaft may end that has arrived.
+
+    Parameters
+    ----------
+    way : float or array
+        From where it stood to the target [rad].
+    finest : float or array
+        `resolution` of the servo [rad].
+
+    Returns
+    -------
+    float or array
+        5 % of the way, or two deadbands or counts where those are more.
+
+    Examples
+    --------
+    >>> float(tolerance(-1.0, 0.001)), float(tolerance(0.01, 0.001))
+    (0.05, 0.002)
+    """
+    return np.maximum(_SHARE * np.abs(way), _STEPS * finest)
+
+
+def arrival_band(way: float, finest: float) -> float:
+    """Return how near its target [rad] a shaft counts as being there: within 1°, or the tolerance of a small step.
+
+    It is never more than half of the way. Parameters are those of `tolerance`.
+
+    Examples
+    --------
+    >>> [round(math.degrees(arrival_band(math.radians(way), 0.0)), 3) for way in (90.0, 20.0, 3.0)]
+    [1.0, 1.0, 0.15]
+    """
+    return float(min(_NEAR, tolerance(way, finest), 0.5 * abs(way)))
+
+# --- Metrics of a step response, read from the continuous solution and not from samples -------------------------------
+_LOOK = 0.1  # s, five usual frames
 _UNITS = {"rise_time": "s", "settling_time": "s", "arrival_time": "s", "overshoot": "", "slew_rate": "rad/s",
           "peak_current": "A"}
 
@@ -281,3 +351,80 @@ def _bisected(trajectory: Trajectory, index: int, signal: Callable[[Samples], ND
             break
         a, b = (a, middle) if (at(middle) > 0.0) == rising else (middle, b)
     return 0.5 * (a + b)
+
+
+# --- Where the energy went: an integral of every power over the continuous solution -----------------------------------
+@dataclass(frozen=True)
+class Energy:
+    """Energy balance of a run [J]; supply = winding + bridge + brush + friction + stops + load + stored + residual.
+
+    Parameters
+    ----------
+    supply : float
+        Delivered by the supply: ∫ V_bus i dt of a pulse servo's bus, ∫ v_a i_a dt at the motor's terminals for models
+        with a mean voltage; negative when the motor feeds back.
+    winding : float
+        Heat in the armature resistance.
+    bridge, brush : float
+        Heat in the bridge and at the brushes; zero for models with a mean armature voltage.
+    conversion : float
+        Mechanical power that k_a ≠ k_b makes of electrical power; zero for an ideal motor.
+    friction : float
+        Heat in motor and gear, viscous and dry, and in the damper of an elastic gear.
+    stops : float
+        Lost in impacts, on the end stops and at the ends of the gear's play.
+    load : float
+        Given to the load: its damping, dry friction and external torque (its inertia counts as stored, and so does a
+        spring between shaft and load).
+    stored : float
+        Increase of kinetic and magnetic energy, and of that in a spring between two bodies.
+    residual : float
+        What does not balance; rounding and quadrature.
+    """
+
+    supply: float
+    winding: float
+    bridge: float
+    brush: float
+    conversion: float
+    friction: float
+    stops: float
+    load: float
+    stored: float
+    residual: float
+
+
+def energy_of(model: Model, trajectory: Trajectory, drive: Pieces, load: Load) -> Energy:
+    """Return the energy balance of a whole run."""
+    def powers(samples: Samples) -> NDArray[np.float64]:
+        plant = warm_plant(model, samples, load)
+        circuit = electrical_of(plant, samples, drive)
+        i, w_m = circuit.armature_current, motor_speed_of(plant, samples)
+        torques = torques_of(model, samples, drive, load)
+        converted = physics.back_emf(w_m, plant.motor.K_b) * i - torques.motor * w_m
+        return np.array(np.broadcast_arrays(
+            circuit.supply_power, physics.copper_loss(i, plant.motor.R), circuit.bridge_power, circuit.brush_power,
+            converted, torques.gear_loss, torques.load_power))
+
+    supply, winding, bridge, brush, conversion, friction, to_load = trajectory.integral(powers).tolist()
+    stored, stops = _kinetic(model.plant(load), trajectory)
+    return Energy(supply, winding, bridge, brush, conversion, friction, stops, to_load, stored,
+                  supply - winding - bridge - brush - conversion - friction - stops - to_load - stored)
+
+
+def _kinetic(plant: Numbers, trajectory: Trajectory) -> tuple[float, float]:
+    """Return the energy stored over the run, and what impacts took."""
+    own = trajectory.segments
+    if not len(own):
+        return 0.0, 0.0
+
+    def stored(index: Any, ages: Any, ends: bool) -> list[float]:
+        states = own.shown(np.asarray(index), np.asarray(ages), ends=ends)[:7].T.tolist()
+        return [stored_energy(plant, Vector(*y)) for y in states]
+
+    lengths = own.ends - own.anchors
+    met = np.flatnonzero(own.anchors[1:] == own.starts[1:])
+    lost = sum((before - after for before, after in zip(
+        stored(met, lengths[met], True), stored(met + 1, np.zeros(len(met)), False), strict=True)), 0.0)
+    last, first = stored([len(own) - 1, 0], [lengths[-1], own.starts[0] - own.anchors[0]], False)
+    return last - first, lost

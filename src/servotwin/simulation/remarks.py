@@ -6,31 +6,159 @@ A remark is no failure: the run reached its end, and `Status` says so. One look 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from servotwin.models import DigitalServo
-from servotwin.models.engine.cosim import final_checks
+from servotwin.models.engine import cosim
+from servotwin.models.engine.memory import FLAT
 from servotwin.models.standing import standing_current
 from servotwin.models.terms import heat
-from servotwin.models.terms.chip import NO_CHIP
+from servotwin.models.terms.frame import NO_CHIP
 from servotwin.models.terms.numbers import at_temperature
+from servotwin.parameters import printed_flags, sheet_voltages
+from servotwin.parameters.registers.held import registers_of
 from servotwin.physics.motor import electromagnetic_torque
 from servotwin.physics.pieces import piece_value
-from servotwin.simulation.sag import LOW, floor_of, watches_its_supply
+from servotwin.signals.signal import headers
+from servotwin.simulation.metrics import least
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
-    from servotwin.models.samples import Samples
+    from servotwin.models import Model
+    from servotwin.models.columns import Samples
     from servotwin.models.terms.firmware import Firmware
     from servotwin.models.terms.numbers import Numbers
+    from servotwin.parameters import Servo, Supply
+    from servotwin.signals import Signal
     from servotwin.simulation.rest import Rest
     from servotwin.simulation.result import Result
-    from servotwin.simulation.sag import Sag
+    from servotwin.simulation.trajectory import Trajectory
+
+# --- How far the supply falls -----------------------------------------------------------------------------------------
+
+Array = NDArray[np.float64]
+LOW = 0.8
+"""Of the supply's voltage: below it a servo has a fifth less torque and speed, `assumed` to be what people notice."""
+LONG = 0.02
+"""s, a frame of pulses: a supply that is low or at its limit for less holds nothing back, `assumed`."""
+ELECTRONICS = 3.0
+"""V, below which chips of analog servos stop, `assumed`: sheets print 4.8 V."""
+_SAME = 1e-6  # of the supply's voltage: what it falls by less is rounding
+
+
+class Sag(NamedTuple):
+    """How far a supply fell.
+
+    Parameters
+    ----------
+    voltage, time : float
+        Least voltage [V] and when it came first [s].
+    low, limited : float
+        For how long it was below 0.8 of its voltage without load, and at its limit of current [s].
+    limit : float
+        That limit, inf where it has none [A].
+    """
+
+    voltage: float
+    time: float
+    low: float
+    limited: float
+    limit: float
+
+    @property
+    def holds_back(self) -> bool:
+        """Whether it was low or at its limit for a frame or more."""
+        return self.low >= LONG or self.limited >= LONG
+
+
+def sag_of(trajectories: Sequence[Trajectory], voltage: Callable[[Samples], Array], supply: Supply) -> Sag | None:
+    """Return how far a supply fell that servos are on; None where it stayed as it is.
+
+    Parameters
+    ----------
+    trajectories : sequence of Trajectory
+        Of all servos on it.
+    voltage : callable
+        Of the supply [V], by samples of a trajectory.
+    supply : Supply
+    """
+    V = supply.open_circuit_voltage or math.nan
+    limit = math.inf if supply.current_limit is None else supply.current_limit
+    if not may_fall(supply):
+        return None
+    different = {one.segments.starts.tobytes(): one for one in reversed(trajectories)}
+    found = [least(one, voltage) for one in different.values() if one.segments]
+    if not found:  # a run that failed at once
+        return None
+    lowest = min(one.value for one in found)
+    first = min(one.time for one in found if one.value <= lowest + FLAT)
+    if not lowest < V * (1.0 - _SAME):
+        return None
+    ends = LOW * V, V * (1.0 - _SAME) - (supply.internal_resistance or 0.0) * limit  # at its limit it lies below
+
+    def below(samples: Samples) -> Array:
+        return (voltage(samples) < np.array(ends)[:, None]).astype(np.float64)
+
+    low, limited = trajectories[0].integral(below).tolist() if lowest < max(ends) else (0.0, 0.0)
+    return Sag(lowest, first, low, limited, limit)
+
+
+def may_fall(supply: Supply) -> bool:
+    """Tell whether the voltage of a supply may fall."""
+    return bool(supply.internal_resistance) or supply.current_limit is not None
+
+
+def sag_in(time: Array, voltage: Array, supply: Supply, lowest: tuple[float, float] | None = None) -> Sag | None:
+    """Return how far a supply fell, among samples that are evenly spaced: time [s] and voltage [V], shape (n,).
+
+    `lowest` is its least voltage [V] and when it came first [s] where these are known between samples too.
+    """
+    V, limit = supply.open_circuit_voltage or math.nan, supply.current_limit or math.inf
+    least = lowest[0] if lowest is not None else float(voltage.min()) if len(time) else math.nan
+    if not len(time) or not least < V * (1.0 - _SAME):
+        return None
+    step = float(time[1] - time[0]) if len(time) > 1 else 0.0
+    at_limit = V * (1.0 - _SAME) - (supply.internal_resistance or 0.0) * limit
+    low, limited = (step * float(np.count_nonzero(voltage < end)) for end in (LOW * V, at_limit))
+    when = lowest[1] if lowest is not None else float(time[np.argmax(voltage <= least + FLAT)])
+    return Sag(least, when, low, limited, limit)
+
+
+class Floor(NamedTuple):
+    """The voltage below which nobody knows what a servo does [V], and whether a register says so."""
+
+    voltage: float
+    of_register: bool
+
+
+def floor_of(servo: Servo) -> Floor:
+    """Return below which voltage nobody knows what a servo does.
+
+    That is Min_Voltage_Limit of a servo with registers, what its maker promises; else what chips need.
+
+    Examples
+    --------
+    >>> from servotwin.parameters import load_servo
+    >>> [floor_of(load_servo(name)).voltage for name in ("feetech-sts3215-12v", "towerpro-sg90")]
+    [4.0, 3.0]
+    """
+    held = registers_of(servo).get("Min_Voltage_Limit")
+    return Floor(ELECTRONICS, False) if held is None or not held.value else Floor(0.1 * held.value, True)
+
+
+def watches_its_supply(model: Model) -> bool:
+    """Tell whether a protection of the servo's program acts where its supply is low."""
+    return isinstance(model, DigitalServo) and model.servo.firmware.undervoltage is not None
+
+# --- What a completed run leaves to be said ---------------------------------------------------------------------------
 
 NOT_AT_REST, BUZZES = "does not come to rest", "buzzes at rest"
 HELD_BACK, BELOW_CHIP, BELOW_REGISTER = (
@@ -38,11 +166,11 @@ HELD_BACK, BELOW_CHIP, BELOW_REGISTER = (
 REFUSED, ON_STOP, CANNOT_HOLD = KINDS = ("pulses refused", "ended on a stop", "cannot hold")
 COLUMNS = {kind: kind.replace(" ", "_") for kind in KINDS}
 """Name of a table's column that holds the time of a kind."""
-
 TRIPS = ("overload", "current", "heat", "undervoltage")
 """What a digital servo trips by; the number of one in the signal `trip` is its place from 1 on."""
 STAYS_TRIPPED = "stays tripped"
 _TRIPPED = {f"tripped by {kind}": f"trips by {kind}" for kind in TRIPS}  # kinds, and the events that they are of
+
 
 def swing_words(swing: float, frequency: float) -> str:
     """Return a swing from end to end [rad] and its frequency [Hz] as people read them."""
@@ -87,9 +215,7 @@ _NUMBERS: dict[str, Callable[..., str]] = {
     BELOW_CHIP: _beyond_words("and below about {floor:g} V (assumed) such electronics stop: no model here knows that"),
     BELOW_REGISTER: _beyond_words("its protection does not watch the supply, and below {floor:g} V, its "
                                   "Min_Voltage_Limit, the maker promises nothing")}
-_MARKS = {ON_STOP: final_checks.ON_STOP, CANNOT_HOLD: final_checks.CANNOT_HOLD}
-
-
+_MARKS = {ON_STOP: cosim.ON_STOP, CANNOT_HOLD: cosim.CANNOT_HOLD}
 _AT_STOP = 1e-6  # rad, relative beyond 1 rad: as in `ending`
 _ROUNDING = 1e-9  # rad
 
@@ -204,15 +330,15 @@ def remarks_of(result: Result) -> tuple[Remark, ...]:
     own = model.edges(result.command) if pulsed else None
     edges, period = own or (), period if own is None else 0.0
     rows = result.drive.rows
-    refused = final_checks.refused_from(accepts, rows, period, edges, end) if pulsed else math.nan
-    tau = piece_value(final_checks.piece_before(load.torque_pieces.rows, end, False), end)
+    refused = cosim.refused_from(accepts, rows, period, edges, end) if pulsed else math.nan
+    tau = piece_value(cosim.piece_before(load.torque_pieces.rows, end, False), end)
     final = [float(values[0]) for values in (last.angle, last.speed, last.winding, last.housing)]
     if model.endless:  # it is told no angle
         marks = 0
     elif firmware is not None:
         marks = _program_marks(numbers, firmware, last, tau, final)
     else:
-        marks = final_checks.marks(pulsed, numbers, accepts, rows, tau, period, edges, end, numbers.source.V,
+        marks = cosim.marks(pulsed, numbers, accepts, rows, tau, period, edges, end, numbers.source.V,
                                    not math.isnan(refused), final)
     said = tuple(Remark(remark.kind, remark.time) for remark in lane_remarks([refused], [marks], end))
     trips = () if firmware is None else _trips(result, last)
@@ -268,7 +394,7 @@ def _program_marks(numbers: Numbers, firmware: Firmware, last: Samples, tau: flo
         return 0
     upper, lower = numbers.stops.upper, numbers.stops.lower
     at_stop = q >= upper - _AT_STOP * max(abs(upper), 1.0) or q <= lower + _AT_STOP * max(abs(lower), 1.0)
-    found = final_checks.ON_STOP if w == 0.0 and at_stop else 0
+    found = cosim.ON_STOP if w == 0.0 and at_stop else 0
     if abs(float(last.duty[0])) > 1.0 or trip > 1:  # without torque, as it is told
         return found
     if heat.present(numbers.heat):
@@ -276,8 +402,8 @@ def _program_marks(numbers: Numbers, firmware: Firmware, last: Samples, tau: flo
     most = min(firmware.torque_limit, firmware.duty_limit, firmware.overload_output if trip == 1 else 1.0)
     torque = electromagnetic_torque(standing_current(numbers, firmware, most), numbers.motor.K)
     forward, sent = goal > q, min(max(goal, lower), upper)
-    able = all(final_checks.starts(numbers, forward, torque, tau, at) for at in (q, sent))
-    return found if able else found + final_checks.CANNOT_HOLD
+    able = all(cosim.starts(numbers, forward, torque, tau, at) for at in (q, sent))
+    return found if able else found + cosim.CANNOT_HOLD
 
 
 def _trips(result: Result, last: Samples) -> tuple[Remark, ...]:
@@ -340,3 +466,51 @@ def of_columns(table: Mapping[str, NDArray[np.float64]]) -> tuple[LaneRemark, ..
     found = [LaneRemark(lane, kind, float(table[name][lane]))
              for kind, name in COLUMNS.items() for lane in np.flatnonzero(~np.isnan(table[name])).tolist()]
     return tuple(sorted(found, key=lambda remark: remark.lane))
+
+# --- What is possible but odd in what is to be simulated: one warning for each, before anything runs ------------------
+
+_TOO_MUCH = 2.0  # times the highest supply voltage of the sheet
+
+
+def warn_of(servo: Servo, commands: Sequence[Signal], duration: float, *, voltages: ArrayLike | None = None,
+            known: NDArray[Any] | None = None, stacklevel: int = 3) -> None:
+    """Warn of a servo whose sheet is impossible, of a supply that is far too high, and of commands that come too late.
+
+    Parameters
+    ----------
+    servo : Servo
+    commands : sequence of Signal
+    duration : float
+        Of the run [s].
+    voltages : array_like, optional
+        Of the supplies of all lanes [V]; the servo's own unless given.
+    known : ndarray, optional
+        `headers` of the commands, where the caller has them.
+    stacklevel : int
+        As in `warnings.warn`, counted from here; 3 is the caller of the caller.
+    """
+    known = headers(commands) if known is None else known
+    for text in (*_of_servo(servo, voltages), *_of_commands(commands, known, duration)):
+        warnings.warn(text, stacklevel=stacklevel)
+
+
+def _of_servo(servo: Servo, voltages: ArrayLike | None) -> Iterator[str]:
+    reason = next((flag for flag in printed_flags(servo) if flag.startswith("impossible")), None)
+    if reason is not None:
+        yield (f"{servo.name}: its data sheet contradicts itself ({reason}); no servo has all that it says, nor does "
+               "this one")
+    given = servo.supply.open_circuit_voltage if voltages is None else float(np.max(voltages))
+    rated = sheet_voltages(servo)
+    if given is not None and rated is not None and given > _TOO_MUCH * rated[1]:
+        yield f"{servo.name}: a supply of {given:g} V is more than twice the {rated[1]:g} V of its data sheet"
+
+
+def _of_commands(commands: Sequence[Signal], known: NDArray[Any], duration: float) -> Iterator[str]:
+    starts = known["first_change"]
+    late = np.flatnonzero(starts >= duration)
+    if late.size:
+        k, start = int(late[0]), float(starts[late[0]])
+        which = "the command" if len(commands) == 1 else f"command {k}"
+        more = f" (and those of {len(late) - 1} more)" if len(late) > 1 else ""
+        what = "the first pulse" if commands[k].edges is not None else "the first change"
+        yield f"{what} of {which}{more} comes at {start:g} s, when the run of {duration:g} s is over"

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models import DigitalServo, PulseServo, PulseServoInductive
-from servotwin.models.engine.cosim.final_checks import piece_before, starts
+from servotwin.models.engine.cosim import piece_before, starts
 from servotwin.models.switched import SwitchedServo
 from servotwin.physics.pieces import piece_value
 from servotwin.simulation.metrics import mean_current

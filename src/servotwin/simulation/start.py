@@ -1,8 +1,9 @@
-"""Where a servo starts: its state at t = 0 from an angle and from what else is given, one servo or many lanes."""
+"""Where a servo starts, its state at t = 0 from what is given, one servo or many lanes; and how a simulation ended."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from enum import Enum
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,10 @@ from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.thermal import COPPER_COEFFICIENT, REFERENCE_TEMPERATURE
 from servotwin.units import is_finite
 
+# --- Where a servo starts ---------------------------------------------------------------------------------------------
+
 _SLACK = 1e-12  # rad
 COLDEST_WINDING = REFERENCE_TEMPERATURE - 1.0 / COPPER_COEFFICIENT  # K
-
 _FINEST, _COARSEST = 1e-13, 1e-4  # rad: finer than rounding, or coarser than what a step could tell of
 
 
@@ -72,3 +74,35 @@ def check_start(places: Sequence[Place], plant: Numbers, y: Vector) -> None:
         raise InputError("initial motor_angle", got=N * y.q_m,
                          allowed=f"{N * (y.q - plant.play.half):.6g} to {N * (y.q + plant.play.half):.6g} rad, "
                          "within the play of the gear")
+
+# --- How a simulation ended -------------------------------------------------------------------------------------------
+
+class Status(Enum):
+    """How a simulation ended; each member carries its message.
+
+    Examples
+    --------
+    >>> Status.COMPLETED.ok, Status.DIVERGED.message
+    (True, 'the state is no longer finite')
+    """
+
+    COMPLETED = 0, "reached the end"
+    DIVERGED = 1, "the state is no longer finite"
+    STEP_TOO_SMALL = 2, "no step is short enough for the tolerance"
+    CHATTER = 3, "events follow each other without time going on"
+    TOO_FAST = 4, "it oscillates too fast to be followed"
+    CROWDED = 5, "frames follow each other faster than the chip decides: a third decision would have to wait"
+
+    def __init__(self, code: int, message: str) -> None:
+        self.code = code
+        self.message = message
+
+    @classmethod
+    def of_code(cls, code: int) -> Status:
+        """Return the member with this code."""
+        return next(status for status in cls if status.code == code)
+
+    @property
+    def ok(self) -> bool:
+        """Whether the whole time was simulated."""
+        return self is Status.COMPLETED

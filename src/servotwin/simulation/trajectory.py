@@ -11,19 +11,19 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine.dynamics.bus_side import on_stiff_source
+from servotwin.models.columns import Samples
+from servotwin.models.engine.dynamics.currents import on_stiff_source
 from servotwin.models.engine.log import ALONE, DENSE, SERIES, Row
 from servotwin.models.engine.motions import motion
 from servotwin.models.engine.motions.motion import CREEP, Motion
 from servotwin.models.engine.run import at as engine_at
 from servotwin.models.engine.run.at import SHOWN
 from servotwin.models.engine.run.run import Plant
-from servotwin.models.samples import Samples
 from servotwin.models.state.records import record_of
 from servotwin.simulation.engine import Part, Plan, kernels_of_one, named
 
 if TYPE_CHECKING:
-    from servotwin.simulation.sag import Sag
+    from servotwin.simulation.remarks import Sag
 
 Array = NDArray[np.float64]
 _ROW = record_of(Row)

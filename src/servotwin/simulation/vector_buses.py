@@ -14,14 +14,13 @@ from servotwin.models.engine.bus.coupled_motion import APART
 from servotwin.models.engine.lanes import Lanes, Tables
 from servotwin.models.engine.memory import NONE_YET, Memories
 from servotwin.models.engine.step import COMPLETED
+from servotwin.simulation.bus import Supplies, source_of
 from servotwin.simulation.bus_run import BUSES, room_of, shared_of, units_of
-from servotwin.simulation.bus_supply import Supplies, source_of
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.compile.calls import Call, Now, call_of
-from servotwin.simulation.lanes.form_recipes import TICKS
-from servotwin.simulation.lanes.memories import nothing_yet, put_back, taken
-from servotwin.simulation.lanes.saved import Piece, piece_of
+from servotwin.simulation.lanes.forms import TICKS
 from servotwin.simulation.lanes.tick_room import NO_TAPE, calls_on_buses
+from servotwin.simulation.lanes.whole_runs import Piece, nothing_yet, piece_of, put_back, taken
 
 if TYPE_CHECKING:
     from servotwin.simulation.lanes.lane_numbers import LaneNumbers

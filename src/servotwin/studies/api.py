@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from servotwin.errors import InputError
-from servotwin.simulation.oddities import warn_of
-from servotwin.simulation.progress import Progress, shown
-from servotwin.simulation.workers import Crew
+from servotwin.simulation.progress import Crew, Progress, shown
+from servotwin.simulation.remarks import warn_of
 from servotwin.studies.folder import Folder
 from servotwin.studies.jobs import run_chunk
 from servotwin.studies.kinds import Distribution

@@ -13,12 +13,12 @@ from servotwin.loads import Load
 from servotwin.models import Model
 from servotwin.models.columns import LaneServo
 from servotwin.signals import Signal
-from servotwin.simulation.arrival import resolution
 from servotwin.simulation.lanes.inputs import lanes_of
 from servotwin.simulation.lanes.many import simulate_lanes
+from servotwin.simulation.metrics import resolution
+from servotwin.simulation.progress import HERE
 from servotwin.simulation.remarks import columns
 from servotwin.simulation.rest import look_period, still_since
-from servotwin.simulation.workers import HERE
 from servotwin.studies.metrics import Judged, lane_metrics, signals_of
 
 _AT_ONCE = 2**17  # numbers of one signal: they stay in a core's cache

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, UnknownNameError
-from servotwin.simulation.arrival import tolerance
+from servotwin.simulation.metrics import tolerance
 from servotwin.simulation.rest import AT_REST, LEAST_REST, looks_at, swing_of
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ class Judged(NamedTuple):
     Parameters
     ----------
     finest : float or ndarray, shape (n,)
-        `arrival.resolution` of each lane [rad].
+        `simulation.metrics.resolution` of each lane [rad].
     still : float
         From when on neither command nor load change; inf where they do to the end [s].
     look : float

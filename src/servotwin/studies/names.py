@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from servotwin import parameters
 from servotwin.errors import ParameterError, UnknownNameError
 from servotwin.parameters.group import AT_LEAST_ONE, FRACTION, NOT_NEGATIVE, POSITIVE
-from servotwin.simulation.lanes.inputs import check_name
-from servotwin.simulation.lanes.load_columns import _PARTS, LOAD_NAMES
+from servotwin.simulation.lanes.inputs import _PARTS, LOAD_NAMES, check_name
 from servotwin.studies.joint import DIMENSIONS, TINY
 from servotwin.studies.stated import Together
 from servotwin.units import si_unit

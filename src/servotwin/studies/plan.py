@@ -16,7 +16,7 @@ from servotwin.errors import InputError
 from servotwin.loads import Load, as_load
 from servotwin.simulation.lanes.inputs import lanes_of
 from servotwin.simulation.lanes.packing import Chunk, Commands, groups
-from servotwin.simulation.workers import memory_limit
+from servotwin.simulation.progress import memory_limit
 from servotwin.studies.draws import (
     SAMPLINGS,
     check_ranges,

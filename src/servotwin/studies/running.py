@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.simulation.progress import Crew
 from servotwin.simulation.remarks import COLUMNS
-from servotwin.simulation.status import Status
-from servotwin.simulation.workers import Crew
+from servotwin.simulation.start import Status
 from servotwin.studies.jobs import run_chunk
 
 if TYPE_CHECKING:

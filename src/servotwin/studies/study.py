@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, MissingExtraError, UnknownNameError
 from servotwin.simulation.remarks import KINDS, LaneRemark, of_columns
-from servotwin.simulation.status import Status
+from servotwin.simulation.start import Status
 from servotwin.studies.folder import Folder
 from servotwin.studies.tornado import Tornado, bar_of, tornado_of, variance_share
 from servotwin.units import is_finite

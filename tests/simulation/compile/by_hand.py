@@ -9,8 +9,8 @@ import subprocess
 import numpy as np
 import pytest
 
-from servotwin.simulation.compile.compilers import compilers
 from servotwin.simulation.compile.derive import Derived, Recipe
+from servotwin.simulation.compile.finding import compilers
 from servotwin.simulation.compile.kinds import BOOL, FLOAT32, FLOAT64, INT8, INT32, INT64, Array, Record
 from servotwin.simulation.compile.library import Function
 from servotwin.simulation.compile.translate import translated

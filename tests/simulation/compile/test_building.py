@@ -15,8 +15,8 @@ import pytest
 
 import servotwin
 from servotwin.models.state.noise import gaussian
-from servotwin.simulation.compile import Recipe, building, compilers, finding, kernels, library
-from servotwin.simulation.compile.compilers import compilers as at_hand
+from servotwin.simulation.compile import Recipe, building, finding, kernels, library
+from servotwin.simulation.compile.finding import compilers as at_hand
 
 RECIPE = Recipe("noise", ("servotwin.models.state.noise:gaussian",))
 SCRIPT = """
@@ -183,7 +183,7 @@ def here(folder, monkeypatch):
     """Return that cache, for this process."""
     monkeypatch.setenv("SERVOTWIN_CACHE_DIR", str(folder))
     for module in (building, finding):
-        monkeypatch.setattr(module, "compilers", lambda: tuple(filter(None, [compilers._program("cc")])))
+        monkeypatch.setattr(module, "compilers", lambda: tuple(filter(None, [finding._program("cc")])))
     building._tell.cache_clear()
     return folder
 
@@ -425,15 +425,15 @@ def test_a_library_for_another_processor_is_not_loaded(tmp_path, monkeypatch):
     names = set()
     try:
         for features in ({}, {"AVX2": True, "FMA3": True, "F16C": True}):
-            monkeypatch.setattr(compilers, "features", lambda features=features: features)
-            compilers.level.cache_clear()
+            monkeypatch.setattr(finding, "features", lambda features=features: features)
+            finding.level.cache_clear()
             assert not finding.is_ready(RECIPE)
             (made, *_) = finding.built(RECIPE)
             assert finding.is_ready(RECIPE)
             names.add(made.path.name)
-        assert len(names) == (2 if compilers.levels()[0].startswith("x86") else 1)
+        assert len(names) == (2 if finding.levels()[0].startswith("x86") else 1)
     finally:
-        compilers.level.cache_clear()
+        finding.level.cache_clear()
 
 
 def test_a_library_for_a_newer_c_library_is_made_anew(here, monkeypatch):

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import servotwin as st
-from servotwin.simulation.compile import compilers
+from servotwin.simulation.compile import finding
 from servotwin.simulation.compile.building import printed
 from servotwin.simulation.compile.kinds import Array, Tuple, words_of
 from servotwin.simulation.compile.library import Function
-from servotwin.simulation.lanes import form_recipes, whole_runs
+from servotwin.simulation.lanes import forms, whole_runs
 
 HARNESS = Path(__file__).with_name("harness")
 TARGETS = ("wasm32-wasi", "x86_64-linux-musl")
@@ -52,7 +52,7 @@ def calls():
     """Return calls of `runs` in a run of a few servos: name, what goes in, what comes out of this process."""
     found, call = [], Function.__call__
     names = {}
-    kernels = whole_runs.kernels(form_recipes.ALL_RUNS)
+    kernels = whole_runs.kernels(forms.ALL_RUNS)
     for name in ("start", "go_on"):
         for function in getattr(kernels, name).functions:
             names[function] = name
@@ -80,7 +80,7 @@ def calls():
 def programs(tmp_path_factory):
     """Return a program for each target and entry."""
     folder = tmp_path_factory.mktemp("programs")
-    (folder / "kernels.c").write_text(printed(form_recipes.ALL_RUNS).text)
+    (folder / "kernels.c").write_text(printed(forms.ALL_RUNS).text)
     found = {}
     for target in TARGETS:
         for name in ("start", "go_on"):
@@ -89,7 +89,7 @@ def programs(tmp_path_factory):
                        "-ffp-contract=off", "-fwrapv", "-fno-strict-aliasing", "-fno-sanitize=undefined",
                        f"-DKERNEL=servotwin_{name}", "-o", str(program), str(folder / "kernels.c"),
                        str(HARNESS / "replay.c"), "-lm"]
-            subprocess.run(command, check=True, env=compilers.Compiler((), "").environment(folder))
+            subprocess.run(command, check=True, env=finding.Compiler((), "").environment(folder))
     return found
 
 

@@ -15,8 +15,8 @@ from servotwin.models.terms.wiring import PULSE_RANGE
 from servotwin.physics.pieces import Piece, Pieces
 from servotwin.signals import Signal
 from servotwin.simulation import Simulator, State
-from servotwin.simulation.servo_run import simulated
-from servotwin.simulation.times import times_asked
+from servotwin.simulation.frames import times_asked
+from servotwin.simulation.simulator import simulated
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:

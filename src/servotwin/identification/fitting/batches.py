@@ -19,7 +19,7 @@ from servotwin.models import Model
 from servotwin.signals import Signal
 from servotwin.simulation.lanes.inputs import lanes_of
 from servotwin.simulation.lanes.many import simulate_lanes
-from servotwin.simulation.workers import HERE, Crew
+from servotwin.simulation.progress import HERE, Crew
 
 Array = NDArray[np.float64]
 

@@ -19,7 +19,7 @@ from servotwin.identification.fitting.loop_gain import with_loop_gain
 from servotwin.logs.log import Log
 from servotwin.models import BoundedServo, DigitalServo, Model, PulseServo, PulseServoInductive, default_model
 from servotwin.parameters import Servo
-from servotwin.simulation.lanes.load_columns import LOAD_NAMES
+from servotwin.simulation.lanes.inputs import LOAD_NAMES
 from servotwin.simulation.progress import duration_left, lines, on_terminal
 from servotwin.units import is_finite
 

@@ -17,7 +17,7 @@ from servotwin.parameters import GROUPS, Servo
 from servotwin.parameters.firmware import MOST_WAITING
 from servotwin.parameters.output_side import OUTPUT_SIDE, N, motor_side, output_value
 from servotwin.parameters.servo import check_name, unit_of
-from servotwin.simulation.lanes.load_columns import LOAD_NAMES
+from servotwin.simulation.lanes.inputs import LOAD_NAMES
 from servotwin.units import is_finite, si_unit
 
 Array = NDArray[np.float64]

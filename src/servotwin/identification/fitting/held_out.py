@@ -16,7 +16,7 @@ from servotwin.identification.fitting.phases import PulseChoice, Scan, settled
 from servotwin.identification.fitting.point import DELAY_SCALE, STEP, LogPart, Point
 from servotwin.identification.fitting.scatter import by_sensor
 from servotwin.logs.log import ANGLES
-from servotwin.simulation.lanes.load_columns import LOAD_NAMES
+from servotwin.simulation.lanes.inputs import LOAD_NAMES
 
 Array = NDArray[np.float64]
 

@@ -42,8 +42,8 @@ from servotwin.identification.fitting.yielding import Dropped, Widened, Yielded,
 from servotwin.logs.log import Log
 from servotwin.models import DigitalServo, Model
 from servotwin.parameters import Servo
+from servotwin.simulation.progress import Crew
 from servotwin.simulation.start import accuracy_of
-from servotwin.simulation.workers import Crew
 
 Array = NDArray[np.float64]
 _VALLEYS = 3  # that a fit goes on to, at most

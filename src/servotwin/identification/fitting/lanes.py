@@ -21,7 +21,7 @@ from servotwin.identification.fitting.point import (
     LogPart,
     Point,
 )
-from servotwin.simulation.lanes.load_columns import LOAD_NAMES
+from servotwin.simulation.lanes.inputs import LOAD_NAMES
 
 if TYPE_CHECKING:
     from servotwin.identification.fitting.forecast import Forecast

@@ -18,7 +18,7 @@ from servotwin.logs.log import Log
 from servotwin.parameters import Servo
 from servotwin.parameters.output_side import N
 from servotwin.parameters.quantity import Quantity
-from servotwin.simulation.lanes.load_columns import LOAD_NAMES
+from servotwin.simulation.lanes.inputs import LOAD_NAMES
 
 if TYPE_CHECKING:
     from servotwin.identification.fitting.doubts import Doubts

@@ -23,7 +23,7 @@ from servotwin.loads import Flexible, Load
 from servotwin.logs.log import Log
 from servotwin.models import DigitalServo, Model, PulseServo, PulseServoInductive
 from servotwin.parameters import Servo
-from servotwin.simulation.lanes.load_columns import LOAD_NAMES
+from servotwin.simulation.lanes.inputs import LOAD_NAMES
 
 KINDS = ("analog", "digital")
 BRIDGES: dict[str, tuple[str, ...]] = {"analog": ("brake", "coast"), "digital": ("brake", "diode")}

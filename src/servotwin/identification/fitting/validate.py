@@ -30,7 +30,7 @@ from servotwin.logs.log import Log
 from servotwin.models import MODELS, Model
 from servotwin.models.engine.memory import ACCURACY
 from servotwin.parameters import Servo
-from servotwin.simulation.lanes.load_columns import LOAD_NAMES
+from servotwin.simulation.lanes.inputs import LOAD_NAMES
 from servotwin.units import is_finite
 
 Array = NDArray[np.float64]

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from servotwin.models.engine.motions.choice import may_depend
-from servotwin.models.terms import bridge, chip, elastic, firmware, motor, play, sensor, source
-from servotwin.models.terms.chip import Chip
+from servotwin.models.terms import bridge, elastic, firmware, frame, motor, play, sensor, source
 from servotwin.models.terms.dependence import (
     CURVED_Q,
     CURVED_T,
@@ -24,8 +23,8 @@ from servotwin.models.terms.dependence import (
     TWO_BODIES,
 )
 from servotwin.models.terms.firmware import Firmware
-from servotwin.models.terms.numbers import Numbers
-from servotwin.models.terms.rooms import ACTS, moved
+from servotwin.models.terms.frame import Chip
+from servotwin.models.terms.numbers import ACTS, Numbers, moved
 from servotwin.physics.pieces import Piece
 
 _COMES_UP: dict[str, tuple[int, ...]] = {
@@ -48,7 +47,7 @@ def needed(numbers: Numbers, own_chip: Chip, program: Firmware) -> int:
     """Return what a servo asks of whoever follows it, beside what its acceleration may depend on."""
     return (motor.needs(numbers.motor) | bridge.needs(numbers.bridge, numbers.source) | source.needs(numbers.source)
             | play.needs(numbers.play) | sensor.needs(numbers.sensor) | elastic.needs(numbers.elastic)
-            | chip.needs(own_chip) | firmware.needs(program))
+            | frame.needs(own_chip) | firmware.needs(program))
 
 
 def demanded(numbers: Numbers, own_chip: Chip, program: Firmware, u: Piece) -> int:

@@ -12,7 +12,7 @@ import numpy as np
 from servotwin.models.engine.memory import Inputs
 from servotwin.models.state.records import TILE, reader
 from servotwin.models.terms import firmware
-from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.frame import Chip
 from servotwin.models.terms.numbers import Numbers
 
 if TYPE_CHECKING:

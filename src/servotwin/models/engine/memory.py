@@ -10,9 +10,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.models.state.modes import INSIDE, ON_BACKWARD, RIGID, Mode, Vector, one_body
+from servotwin.models.state.modes import INSIDE, ON_BACKWARD, RIGID, UNIT, Mode, Vector, one_body
 from servotwin.models.state.records import record_reader, record_writer
-from servotwin.models.state.rounding import UNIT
 from servotwin.models.terms import control, firmware, frame
 from servotwin.models.terms.control import Firm, Programs
 from servotwin.models.terms.firmware import Firmware

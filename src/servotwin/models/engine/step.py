@@ -15,13 +15,11 @@ from servotwin.models.engine.events import crossings, first_event
 from servotwin.models.engine.memory import SAME, Inputs, Memory, Point, edge_of, in_force, origin_of, since
 from servotwin.models.engine.motions import choice, motion
 from servotwin.models.engine.motions.motion import Motion
-from servotwin.models.state.modes import CORE, Vector
-from servotwin.models.state.rounding import UNIT
+from servotwin.models.state.modes import CORE, UNIT, Vector
 from servotwin.models.terms import bridge, duty, firmware, frame
-from servotwin.models.terms.chip import Chip
-from servotwin.models.terms.chip import present as chip_present
 from servotwin.models.terms.elastic import turning
-from servotwin.models.terms.frame import Frame
+from servotwin.models.terms.frame import Chip, Frame
+from servotwin.models.terms.frame import present as chip_present
 from servotwin.models.terms.friction import smoothed
 from servotwin.models.terms.load import swings
 from servotwin.models.terms.motor import inductive

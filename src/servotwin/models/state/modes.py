@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+# --- The modes that a servo can be in, and its state ------------------------------------------------------------------
 
 class Mode(NamedTuple):
     """Zone of the voltage law, contact of the shaft, place in the play, contact of the motor inside the play, share.
@@ -59,9 +60,7 @@ SATURATED_BACKWARD, LINEAR_BACKWARD, DEAD, LINEAR, SATURATED = -2, -1, 0, 1, 2
 # Limited: the regulator gives its most. Short: even at no bus voltage more flows.
 CONDUCTING, SHORT_BACKWARD, LIMITED_BACKWARD, CURRENT_BACKWARD, NO_CURRENT = 3, 4, 5, 6, 7
 CURRENT_FORWARD, LIMITED_FORWARD, SHORT_FORWARD = 8, 9, 10
-
 FREE, FORWARD, BACKWARD, CORE, STUCK, ON_LOWER, ON_UPPER = range(7)
-
 RIGID, INSIDE, ON_FORWARD, ON_BACKWARD = range(4)  # forward: where the motor pushes the output forward
 # A spring behind the shaft, or in the gear; with play it is loose, pushes, or trails behind an output that runs away.
 BEHIND, SPRUNG, LOOSE, PUSH_FORWARD, PUSH_BACKWARD, TRAIL_FORWARD, TRAIL_BACKWARD = range(4, 11)
@@ -97,3 +96,9 @@ def constant_current(zone: int) -> bool:
 def in_linear_zone(zone: int) -> bool:
     """Tell whether the armature voltage follows the error in this zone."""
     return zone == LINEAR or zone == LINEAR_BACKWARD
+
+# --- What rounding leaves of a number ---------------------------------------------------------------------------------
+
+UNIT = 2e-16  # relative to it
+IN_FLOATS = {"UNIT": 1.2e-7}
+"""The same where numbers have 32 bits, in C of floats; other modules say so of theirs under this name."""

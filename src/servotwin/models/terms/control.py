@@ -10,11 +10,11 @@ from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any, NamedTuple, cast
 
-from servotwin.models.terms import profile, trips
 from servotwin.models.terms.duty import BRAKED, OPEN
 from servotwin.models.terms.firmware import FAILSAFE, LIMP, Firmware
 from servotwin.physics.firmware import (
     NEARLY,
+    braking_distance,
     counted,
     cut,
     duty_for_bus_current,
@@ -26,11 +26,116 @@ from servotwin.physics.firmware import (
     started_duty,
 )
 
+# --- The profile of a digital servo -----------------------------------------------------------------------------------
+
+def present(firmware: Firmware) -> bool:
+    """Tell whether the reference takes time to get to a goal."""
+    return firmware.v < math.inf or firmware.a < math.inf
+
+
+def follow(firmware: Firmware, firm: Any) -> None:
+    """Let the reference go on by a tick."""
+    if not present(firmware):
+        firm.r, firm.rate = firm.goal, 0.0
+        return
+    T_c, rest = firmware.T_c, firm.goal - firm.r
+    way = math.copysign(1.0, rest)
+    speed, change = abs(firm.rate), firmware.a * T_c
+    S = braking_distance(speed, firmware.a, T_c)
+    if firm.on_course == 0 and way * firm.rate >= 0.0 and S <= abs(rest) * (1.0 + NEARLY):
+        firm.on_course = 1
+    if firm.on_course == 0:  # it brakes, goes too far, and comes back
+        speed = speed - change if speed - change > firmware.v_0 + NEARLY * change else 0.0
+        firm.rate = math.copysign(speed, firm.rate)
+        firm.r += firm.rate * T_c
+        return
+    speed = max(speed - change, 0.0) if S >= abs(rest) * (1.0 - NEARLY) else min(speed + change, firmware.v)
+    speed = max(speed, firmware.v_0)
+    if speed * T_c >= abs(rest) * (1.0 - NEARLY):
+        firm.r, firm.rate = firm.goal, 0.0
+    else:
+        firm.rate = way * speed
+        firm.r += firm.rate * T_c
+
+# --- The protections of a digital servo: overload, current, heat, supply; what they leave of the duty -----------------
+
+NONE, OVERLOAD, CURRENT, HEAT, UNDERVOLTAGE = range(5)  # as `trip` shows them
+OFF = -1.0  # of a clock that does not run
+COOLER = 5.0  # K below its trip it goes on again
+
+
+def acting(firm: Any) -> int:
+    """Return which protection acts; of several the one that comes last in the list."""
+    if firm.starved != 0:
+        return UNDERVOLTAGE
+    if firm.hot != 0:
+        return HEAT
+    if firm.tripped != 0:
+        return CURRENT
+    return OVERLOAD if firm.overloaded != 0 else NONE
+
+
+def stop(firm: Any) -> bool:
+    """Tell whether heat or supply stop it: no duty, and the shaft is where it shall be."""
+    return bool(firm.hot != 0 or firm.starved != 0)
+
+
+def allowed(firmware: Firmware, firm: Any) -> float:
+    """Return how much duty the protections leave."""
+    if stop(firm):
+        return 0.0
+    return firmware.overload_output if firm.overloaded != 0 else math.inf
+
+
+def judge(firmware: Firmware, firm: Any, w: float, limp: bool, i: float, V_bus: float, T_h: float) -> None:
+    """Look, after the loop has asked for a duty w, at all that is protected: duty, current, voltage, temperature."""
+    if firmware.overload_duty < math.inf:
+        _judge_overload(firmware, firm, w, limp)
+    _judge_current(firmware, firm, i)
+    if T_h > firmware.trip_temperature:
+        firm.hot = 1
+    elif T_h <= firmware.trip_temperature - COOLER:
+        firm.hot = 0
+    firm.starved = 1 if V_bus < firmware.undervoltage else 0
+
+
+def _judge_current(firmware: Firmware, firm: Any, i: float) -> None:
+    """Too much current for too long makes it limp until the next goal."""
+    if not abs(i) >= firmware.trip_current:
+        firm.current_clock = OFF
+        return
+    firm.current_clock = 0.0 if firm.current_clock < 0.0 else firm.current_clock + firmware.T_c
+    if firm.current_clock >= firmware.trip_time - NEARLY * firmware.T_c:
+        firm.tripped, firm.current_clock = 1, OFF
+
+
+def _judge_overload(firmware: Firmware, firm: Any, w: float, limp: bool) -> None:
+    """Too much duty for too long, at a standstill, and there is less of it until less is asked for."""
+    eased = w * firm.overload_sign < firmware.overload_output * (1.0 - NEARLY)
+    if firm.overloaded != 0:
+        if firmware.latches > 0.0 or not (eased or firm.torque == 0):
+            return
+        firm.overloaded = 0
+    if firm.overload_clock >= 0.0:
+        firm.overload_clock += firmware.T_c
+        if eased or limp:
+            firm.overload_clock = OFF
+        elif abs(firm.y - firm.overload_y) > firmware.stall_travel * (1.0 + NEARLY):
+            _start(firm, w)
+    if firm.overload_clock < 0.0 and abs(w) > firmware.overload_duty * (1.0 + NEARLY):
+        _start(firm, w)
+    if firm.overload_clock >= firmware.overload_time - NEARLY * firmware.T_c:
+        firm.overloaded, firm.overload_clock = 1, OFF
+
+
+def _start(firm: Any, w: float) -> None:
+    firm.overload_clock, firm.overload_y, firm.overload_sign = 0.0, firm.y, 1.0 if w > 0.0 else -1.0
+
+# --- One tick of a digital servo: measure, follow the profile, compute the law, limit, protect ------------------------
+
 WAITING = 16  # duties that may wait, see `parameters.firmware.MOST_WAITING`
 Duties = tuple[float, float, float, float, float, float, float, float, float, float, float, float, float, float, float,
                float]
-
-
 NOWHERE = math.inf  # where no goal has been given
 
 
@@ -85,10 +190,8 @@ AT_START = Firm(
     torque=1, tick=0, draws=0, waiting=0, head=0, duties=_NONE, duty=0.0, decided=0.0, frame=0, falls=math.inf,
     width=0.0, hears=-math.inf, heard=-math.inf, coming=_NONE, known=0, first=0, written=NOWHERE, goal=NOWHERE,
     y=0.0, age=0, x=0.0, y_then=0.0, resting=0, D=0.0, J=0.0, excess=0.0, r=0.0, rate=0.0, on_course=0,
-    overload_clock=trips.OFF, overload_y=0.0, overload_sign=0.0, overloaded=0, current_clock=trips.OFF, lost=0,
-    tripped=0, hot=0, starved=0, restart=0.0, soft=trips.OFF, trip=trips.NONE)
-
-
+    overload_clock=OFF, overload_y=0.0, overload_sign=0.0, overloaded=0, current_clock=OFF, lost=0,
+    tripped=0, hot=0, starved=0, restart=0.0, soft=OFF, trip=NONE)
 Programs = Sequence[Firm]
 NOT_STARTED: Programs = (AT_START,)
 ABSENT: Any = 0  # in its place where there is no program
@@ -136,15 +239,15 @@ def tick(firmware: Firmware, firm: Any, angle: float, sensed: Sensed, silence: f
     if firm.goal != NOWHERE:
         firm.soft = firm.soft + firmware.T_c if firm.soft >= 0.0 else 0.0
     limp = _loses(firmware, firm, silence) or firm.torque == 0 or firm.goal == NOWHERE or _is_limp(firmware, firm)
-    if trips.stop(firm):
+    if stop(firm):
         _stay(firm)
     w = 0.0 if limp else _asked_for(firmware, firm)
-    trips.judge(firmware, firm, w, limp, sensed.i, sensed.V_bus, sensed.T_h)
-    firm.trip = trips.acting(firm)
+    judge(firmware, firm, w, limp, sensed.i, sensed.V_bus, sensed.T_h)
+    firm.trip = acting(firm)
     if firm.starved != 0 and firmware.resets > 0.0:
         _lose_all(firmware, firm)
         return OPEN
-    if trips.stop(firm):
+    if stop(firm):
         _stay(firm)
     if limp or _is_limp(firmware, firm):
         _let_go(firmware, firm)
@@ -161,7 +264,7 @@ def _has_started(firmware: Firmware, firm: Any, silence: float) -> bool:
     firm.restart -= firmware.T_c
     if firm.restart > slack:
         return False
-    firm.restart, firm.trip = 0.0, trips.NONE
+    firm.restart, firm.trip = 0.0, NONE
     return True
 
 
@@ -227,14 +330,14 @@ def _whole(firmware: Firmware) -> float:
 def _asked_for(firmware: Firmware, firm: Any) -> float:
     """Return the duty w that the law asks for, within its own limit."""
     rate, delta = firm.rate, firmware.delta
-    if not trips.stop(firm):
-        profile.follow(firmware, firm)
+    if not stop(firm):
+        follow(firmware, firm)
     z = beyond_zone(firmware, firm.r, firm.y)
     _renew(firmware, firm, z)
     u = duty_of(firmware.k_p, z, delta)
     J = 0.0
     if firmware.k_i > 0.0:
-        if firmware.at_rest == 0.0 or (firm.resting != 0 and trips.acting(firm) == trips.NONE):
+        if firmware.at_rest == 0.0 or (firm.resting != 0 and acting(firm) == NONE):
             firm.J = integrated_error(firm.J, z, firm.excess, firmware.k_i, firmware.kappa, firmware.T_c)
         J = cut(firm.J, delta)
     integral = min(max(J, -firmware.I_limit), firmware.I_limit)
@@ -279,7 +382,7 @@ def derivative(firmware: Firmware, change: float) -> float:
 
 def _given(firmware: Firmware, firm: Any, w: float, sensed: Sensed) -> float:
     """Return the duty that limits and trips leave of w."""
-    most = min(firmware.duty_limit, trips.allowed(firmware, firm))
+    most = min(firmware.duty_limit, allowed(firmware, firm))
     if firm.soft < firmware.soft_time - NEARLY * firmware.T_c:
         most = min(most, firmware.soft_duty)
     d = within(firmware, w, most, firm.decided)
@@ -318,6 +421,6 @@ def _lose_all(firmware: Firmware, firm: Any) -> None:
     """Begin to start anew, as at power-up."""
     firm.goal = firm.written = NOWHERE
     firm.overloaded = firm.tripped = firm.hot = firm.starved = 0
-    firm.overload_clock = firm.current_clock = firm.soft = trips.OFF
+    firm.overload_clock = firm.current_clock = firm.soft = OFF
     _let_go(firmware, firm)
-    firm.age, firm.restart, firm.trip = 0, firmware.restart_time, trips.UNDERVOLTAGE
+    firm.age, firm.restart, firm.trip = 0, firmware.restart_time, UNDERVOLTAGE

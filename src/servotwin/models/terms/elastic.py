@@ -15,8 +15,7 @@ from servotwin.errors import LoadError
 from servotwin.loads import Load
 from servotwin.models.state.modes import PUSH_BACKWARD, PUSH_FORWARD, SPRUNG, Vector
 from servotwin.models.terms.dependence import ON_Q, SPRING, TWO_BODIES
-from servotwin.models.terms.given import Given, either, is_given
-from servotwin.models.terms.hung import Hung
+from servotwin.models.terms.given import Given, Hung, either, is_given
 from servotwin.models.terms.shaft import Shaft
 from servotwin.parameters.group import Relation
 from servotwin.physics.shaft import stretch_beyond_play, twist_torque

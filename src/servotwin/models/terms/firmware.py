@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from servotwin.models.terms.chip import FRAME
 from servotwin.models.terms.dependence import AT_COMMANDS, BEYOND, PROGRAM
+from servotwin.models.terms.frame import FRAME
 from servotwin.models.terms.given import Given, either, place
 from servotwin.models.terms.sensor import stands
 from servotwin.physics.firmware import cut

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from servotwin.models.terms.dependence import CURVED_Q, DRY, ON_Q
-from servotwin.models.terms.hung import Hung
+from servotwin.models.terms.given import Hung
 from servotwin.physics.shaft import pendulum_stiffness, pendulum_torque, spring_torque
 
 _TOO_FAR = 1e12  # rad

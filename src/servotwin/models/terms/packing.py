@@ -23,9 +23,8 @@ from servotwin.models.terms.bridge import NO_BRIDGE
 from servotwin.models.terms.elastic import NO_ELASTIC
 from servotwin.models.terms.follower import NO_FOLLOWER, Follower
 from servotwin.models.terms.friction import NO_FRICTION
-from servotwin.models.terms.given import Given, either
+from servotwin.models.terms.given import Given, Hung, either
 from servotwin.models.terms.heat import NO_HEAT
-from servotwin.models.terms.hung import Hung
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.play import NO_PLAY
 from servotwin.models.terms.sensor import NO_SENSOR

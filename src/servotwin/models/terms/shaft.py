@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 from servotwin.models.state.modes import BACKWARD, FORWARD, FREE, ON_LOWER, ON_UPPER, STUCK
 from servotwin.models.terms.dependence import BY_SHARE, SHOWN, SPRING, STRAIGHT, TWO_BODIES
-from servotwin.models.terms.given import Given
-from servotwin.models.terms.hung import Hung, inertia_on
+from servotwin.models.terms.given import Given, Hung, inertia_on
 from servotwin.physics.friction import sticks
 from servotwin.physics.gear import output_inertia, output_viscous_friction
 from servotwin.physics.shaft import shaft_acceleration

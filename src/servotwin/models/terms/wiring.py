@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from servotwin.models.terms.chip import FRAME
 from servotwin.models.terms.firmware import takes_goals
+from servotwin.models.terms.frame import FRAME
 from servotwin.models.terms.given import Given, either, is_given
 from servotwin.models.terms.sensor import angle_at, stands
 from servotwin.physics.electronics import (

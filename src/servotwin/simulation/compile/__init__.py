@@ -44,6 +44,6 @@ def _kernels(recipe: Recipe) -> Any:
 
 
 def _in_python(recipe: Recipe) -> Any:
-    from servotwin.simulation.compile.plain import plain_kernels
+    from servotwin.simulation.compile.backend import plain_kernels
 
     return plain_kernels(recipe)

@@ -14,9 +14,18 @@ from functools import cache
 from pathlib import Path
 from typing import IO, Any
 
-from servotwin.simulation.compile.compilers import Compiler, compilers, level
 from servotwin.simulation.compile.derive import derive
-from servotwin.simulation.compile.finding import SUFFIX, Built, functions_of, index_name, library_name, problems
+from servotwin.simulation.compile.finding import (
+    SUFFIX,
+    Built,
+    Compiler,
+    compilers,
+    functions_of,
+    index_name,
+    level,
+    library_name,
+    problems,
+)
 from servotwin.simulation.compile.recipe import Recipe
 from servotwin.simulation.compile.signatures import signatures
 from servotwin.simulation.compile.storage import is_there, key_of, writable_folder, write

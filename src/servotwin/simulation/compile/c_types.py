@@ -1,15 +1,14 @@
-"""Types of C for kinds of values, and what changes one into another."""
+"""Types of C for kinds of values, and what functions of others kernels may call."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Callable
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from servotwin.simulation.compile.c_functions import MATH
 from servotwin.simulation.compile.kind_rules import field_kind
 from servotwin.simulation.compile.kinds import (
     BOOL,
@@ -27,6 +26,50 @@ from servotwin.simulation.compile.kinds import (
     Tuple,
     of_value,
 )
+
+# --- What kernels may call beside functions of their own, and its form in C -------------------------------------------
+
+class Primitive(NamedTuple):
+    """A function of Python that C has an expression for.
+
+    `text` gets the arguments, `n` is their number less one; `s` is "f" where they have 32 bits. `result` is None where
+    it is that of the arguments; it `writes` where it changes memory.
+    """
+
+    text: str
+    result: Kind | None = None
+    writes: bool = False
+
+
+PRIMITIVES = {
+    "fma": Primitive("FMA{s}({0}, {1}, {2})"), "two_power": Primitive("two_power{s}({0})"),
+    "binary_exponent": Primitive("binary_exponent{s}({0})"), "scaled": Primitive("scaled({0}, {1})"),
+    "nearest": Primitive("NEAREST{s}({0})"),
+    "floor": Primitive("FLOOR{s}({0})"),
+    "words": Primitive("words({0}, {1})", Array(INT64, 1)),
+    "numbers": Primitive("numbers({0}, {1})", Array(FLOAT64, 1)),
+    "rows": Primitive("rows({0}, {1}, {2})", Array(FLOAT64, 2)),
+    "bytes_at": Primitive("bytes_at({0}, {1})", Array(INT8, 1)),
+    "halves": Primitive("halves({0}, {1})", Array(INT32, 1)),
+    "called": Primitive("TOLD(told_1, {0}, {1})", INT64, True),
+    "told": Primitive("TOLD(told_{n}, {all})", INT64, True),
+    "copied": Primitive("copied({0}, {1}, {2})", None, True),
+    "activate": Primitive("activate({0})", None, True), "active": Primitive("active()", INT64),
+}
+"""Of `models.engine.motions.elementary` and `physics.elementary`, single instructions in the vector form, and of
+`compile.addresses`."""
+VOID = ("copied", "activate")
+MATH = {name: name for name in (
+    "sqrt", "exp", "expm1", "log", "log1p", "sin", "cos", "tan", "tanh", "atan", "atan2", "atanh", "asin", "acos",
+    "sinh", "cosh", "asinh", "copysign", "hypot", "fmod", "pow")}
+"""Functions of `math` that C's library has under the same name, for 32 bits with an f behind it."""
+OF_TWO = ("atan2", "copysign", "hypot", "fmod", "pow")
+"""Those of them that take two numbers."""
+ROUNDED = {"floor": "FLOOR", "ceil": "CEIL"}
+"""Functions of `math` that return a whole number."""
+TRUTHS = {"isfinite": "isfinite", "isnan": "isnan", "isinf": "isinf"}
+
+# --- Types of C for kinds of values, and what changes one into another ------------------------------------------------
 
 _TAKEN = frozenset(
     "auto bool break case char const continue default do double else enum extern false float for goto if inline int "
@@ -46,6 +89,7 @@ _NAMED = ((FLOAT64, 1), (FLOAT64, 2), (INT64, 1), (INT8, 1), (INT32, 1))  # arra
 def identifier(name: str) -> str:
     """Return a name as C may have it."""
     return f"{name}_" if name in _TAKEN or _OURS.fullmatch(name) else name
+
 
 _ROUNDED = ("whole(FLOOR(", "whole(CEIL(")
 

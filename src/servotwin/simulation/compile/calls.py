@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.simulation.compile import Recipe, is_plain, kernels, plain
+from servotwin.simulation.compile import Recipe, backend, is_plain, kernels
 from servotwin.simulation.compile.kinds import Tuple, words_of
 
 _WORD = 8  # bytes
@@ -70,8 +70,9 @@ class Call:
 
 
 _FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
-DRIVERS = Recipe("drivers", tuple(f"servotwin.simulation.compile.{entry}" for entry in (
-    "renewal:renew", "tick:advance", "joints:control", "joints:step")), by_numbers=True)
+DRIVERS = Recipe("drivers", tuple(f"servotwin.{entry}" for entry in (
+    "simulation.compile.tick:renew", "simulation.compile.tick:advance", "robots.joints:control",
+    "robots.joints:step")), by_numbers=True)
 """What is called with numbers, by kernels, by a program in C and by a rigid-body engine."""
 
 
@@ -124,7 +125,7 @@ def _plain_call(kernel: Callable[..., Any], arguments: tuple[Any, ...], returns:
         return int(found) if returns else 1
 
     callback = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(call)
-    return Call(plain.address(callback), np.zeros(1, np.int64), (callback, *arguments))
+    return Call(backend.address(callback), np.zeros(1, np.int64), (callback, *arguments))
 
 
 def _as_now(argument: Any) -> Any:
@@ -143,20 +144,20 @@ def _as_now(argument: Any) -> Any:
 def tick_address() -> int:
     """Return the address of the C function `int servotwin_advance(servotwin_tick *tick)`."""
     if is_plain():
-        return plain.address_of(kernels(DRIVERS).advance, ctypes.c_int32, ctypes.c_int64)
+        return backend.address_of(kernels(DRIVERS).advance, ctypes.c_int32, ctypes.c_int64)
     return _address("advance")
 
 
 @cache
 def joint_addresses() -> tuple[int, int]:
-    """Return the addresses of two C functions of `joints`.
+    """Return the addresses of two C functions of `robots.joints`.
 
     They are `void control(const mjModel *m, mjData *d)` and
     `int64_t step(int64_t *drive, const mjModel *m, mjData *d, int64_t steps)`.
     """
     if is_plain():
         own, word = kernels(DRIVERS), ctypes.c_int64
-        return plain.address_of(own.control, None, word, word), plain.address_of(own.step, word, *[word] * 4)
+        return backend.address_of(own.control, None, word, word), backend.address_of(own.step, word, *[word] * 4)
     return _address("control"), _address("step")
 
 

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar, Protocol
 
-from servotwin.simulation.compile import c_functions
+from servotwin.simulation.compile import c_types
 from servotwin.simulation.compile.c_types import Types, bracketed, identifier, member
 from servotwin.simulation.compile.inference import Specialised
 from servotwin.simulation.compile.kind_rules import constant_int
@@ -323,7 +323,7 @@ class Expressions:
             if isinstance(part, ast.Call) and part in self._own.calls and self._own.calls[part].writes:
                 return True
             if isinstance(part, ast.Call) and isinstance(part.func, ast.Name):
-                primitive = c_functions.PRIMITIVES.get(self._own.module.derived.primitives.get(part.func.id, ""))
+                primitive = c_types.PRIMITIVES.get(self._own.module.derived.primitives.get(part.func.id, ""))
                 if primitive is not None and primitive.writes:
                     return True
         return False

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from servotwin.models.engine.cosim import cosim_calls
+from servotwin.models.engine import cosim
 
 VERSION = 1
 GIVEN = ("pulse_width", "command_angle", "command_voltage", "external_torque", "set_output_angle", "set_output_speed",
@@ -18,7 +18,7 @@ STAGES = ("clock", "accept", "change", "refit", "impose", "follow", "advance", "
 HANDLE = ("lanes", "given", "has", "now", "status", "shaft", "seen", "fresh", "renew", *STAGES)
 """Words of a simulator: a number, and addresses."""
 
-DONE = cosim_calls.ACCEPTED
+DONE = cosim.ACCEPTED
 NOTHING_GIVEN, OTHER_VERSION, OTHER_LANES = range(1, 4)
 NOT_RENEWED = 11
 MESSAGES = {
@@ -26,13 +26,13 @@ MESSAGES = {
     NOTHING_GIVEN: "no struct, or no simulator in it",
     OTHER_VERSION: "the struct has another version",
     OTHER_LANES: "the struct has another number of lanes",
-    cosim_calls.BAD_DURATION: f"the duration is not a number of seconds from 0 to {cosim_calls.LONGEST:.0e}",
-    cosim_calls.BAD_NUMBER: "a number is not finite",
-    cosim_calls.BAD_COMMAND: "a command is not possible, or more than one is given",
-    cosim_calls.BAD_ANGLE: "an angle is beyond a stop",
-    cosim_calls.BAD_INERTIA: "an inertia is negative",
-    cosim_calls.BAD_VOLTAGE: "a bus voltage is not positive, or is one that lanes share",
-    cosim_calls.BEYOND_RECORD: "a recorded torque ends before",
+    cosim.BAD_DURATION: f"the duration is not a number of seconds from 0 to {cosim.LONGEST:.0e}",
+    cosim.BAD_NUMBER: "a number is not finite",
+    cosim.BAD_COMMAND: "a command is not possible, or more than one is given",
+    cosim.BAD_ANGLE: "an angle is beyond a stop",
+    cosim.BAD_INERTIA: "an inertia is negative",
+    cosim.BAD_VOLTAGE: "a bus voltage is not positive, or is one that lanes share",
+    cosim.BEYOND_RECORD: "a recorded torque ends before",
     NOT_RENEWED: "lanes that run in another way now could not be prepared",
 }
 """What the numbers mean that a tick returns."""

@@ -15,12 +15,11 @@ from dataclasses import replace
 
 from servotwin.models.engine.log import WITH_ROWS
 from servotwin.models.state import records
-from servotwin.models.terms.rooms import ACTS, paths
-from servotwin.simulation.compile.derive import derive
+from servotwin.models.terms.numbers import ACTS, paths
+from servotwin.simulation.compile.derive import derive, flat_name
 from servotwin.simulation.compile.inference import Module, Specialised
 from servotwin.simulation.compile.kinds import Kind, Record, Tuple
 from servotwin.simulation.compile.recipe import Recipe
-from servotwin.simulation.compile.rewriting import flat_name
 from servotwin.simulation.compile.signatures import signatures
 from servotwin.simulation.compile.unread import in_general
 

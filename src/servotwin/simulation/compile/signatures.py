@@ -18,9 +18,9 @@ from servotwin.models.engine.log import Happened, Log, Row
 from servotwin.models.engine.memory import Inputs, Memories, Memory
 from servotwin.models.engine.run.run import Plant
 from servotwin.models.state.records import record_of, rows_of
-from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.control import Firm
 from servotwin.models.terms.firmware import Firmware
+from servotwin.models.terms.frame import Chip
 from servotwin.models.terms.given import Given
 from servotwin.models.terms.numbers import Numbers
 from servotwin.simulation.compile.kinds import (
@@ -78,27 +78,27 @@ _SIGNATURES: Mapping[str, tuple[Kind, ...]] = {
     "runs:ready": (_INDICES, _SMALLS, _FLOATS, _INDICES, _FLOATS, _INDICES),
     "runs:note_failures": (_INDICES, _INDICES, _FLOATS, _ROWS, _SMALLS, _FLOATS),
     "event_free:go": (_LANES, _INDICES, _FLOATS, _SMALLS, _ROWS, _INDICES),
-    "final_checks:look_at_lanes": (BOOL, _LANES, *_RECORDED, FLOAT64, _TABLE, _FLOATS, _SMALLS),
+    "cosim:look_at_lanes": (BOOL, _LANES, *_RECORDED, FLOAT64, _TABLE, _FLOATS, _SMALLS),
     "observe_batch:one_by_one": (_LANES, _TABLE, *_RECORDED, _INDICES, _MEMORIES, _TABLE),
-    "cosim_calls:accept": (_FLOATS, _INDICES, _TABLE, _CUBE, _NUMBERS, _FLOATS, _FLOATS, _INDICES, _FLOATS),
-    "cosim_calls:change": (_INDICES, _TABLE, _INDICES, _NUMBERS, _FLOATS, _FLOATS, BOOL, _FLOATS, _FLOATS, _NUMBERS),
-    "cosim_calls:follow": (_INDICES, _TABLE, *(_FLOATS,) * 5, _TABLE, _FLOATS),
-    "cosim_lanes:forget_motions": (_ROWS,),
-    "cosim_lanes:impose_on_records": (_INDICES, _TABLE, _NUMBERS, _INDICES, _INDICES, _FLOATS, _ROWS),
-    "cosim_lanes:show_records": (_INDICES, _ROWS, _TABLE),
-    "cosim_lanes:read_clocks": (_INDICES, _SMALLS, _FLOATS, _ROWS, _FLOATS),
-    "cosim_lanes:take_status": (_INDICES, _SMALLS, _INDICES),
-    "cosim_lanes:note_lost_buses": (_INDICES, _INDICES, _ROWS, _SMALLS, _FLOATS),
+    "cosim:accept": (_FLOATS, _INDICES, _TABLE, _CUBE, _NUMBERS, _FLOATS, _FLOATS, _INDICES, _FLOATS),
+    "cosim:change": (_INDICES, _TABLE, _INDICES, _NUMBERS, _FLOATS, _FLOATS, BOOL, _FLOATS, _FLOATS, _NUMBERS),
+    "cosim:follow": (_INDICES, _TABLE, *(_FLOATS,) * 5, _TABLE, _FLOATS),
+    "cosim:forget_motions": (_ROWS,),
+    "cosim:impose_on_records": (_INDICES, _TABLE, _NUMBERS, _INDICES, _INDICES, _FLOATS, _ROWS),
+    "cosim:show_records": (_INDICES, _ROWS, _TABLE),
+    "cosim:read_clocks": (_INDICES, _SMALLS, _FLOATS, _ROWS, _FLOATS),
+    "cosim:take_status": (_INDICES, _SMALLS, _INDICES),
+    "cosim:note_lost_buses": (_INDICES, _INDICES, _ROWS, _SMALLS, _FLOATS),
 }
 
 
 @cache
 def _of_ticks() -> Mapping[str, tuple[Kind, ...]]:
     """Return what entries are called with that let digital servos go from tick to tick together."""
-    from servotwin.models.engine.batch import digital_tiles
+    from servotwin.models.engine.batch import digital_batch
     from servotwin.models.engine.legs.coupled_units import Coupling, Unit
 
-    return {"digital_batch:go_on": (*_GOING, _records(digital_tiles.TILE_TYPE)),
+    return {"digital_batch:go_on": (*_GOING, _records(digital_batch.TILE_TYPE)),
             "runs:go_on": (*_GOING, BOOL, _FLOATS, _INDICES, _records(record_of(Unit)), _records(record_of(Coupling)))}
 
 
@@ -106,8 +106,7 @@ def _of_ticks() -> Mapping[str, tuple[Kind, ...]]:
 def _of_buses() -> Mapping[str, tuple[Kind, ...]]:
     """Return what entries are called with that move servos on a bus."""
     from servotwin.models.engine.bus.bus_batch import Buses
-    from servotwin.models.engine.bus.bus_records import Mate, Seat, Shared
-    from servotwin.models.engine.bus.event_log import Tape
+    from servotwin.models.engine.bus.bus_records import Mate, Seat, Shared, Tape
     from servotwin.models.engine.lanes import Tables
     from servotwin.models.engine.legs.coupled_units import Coupling, Unit
 
@@ -119,19 +118,16 @@ def _of_buses() -> Mapping[str, tuple[Kind, ...]]:
     return {"bus_batch:go_on": (*own, INT64, INT64, FLOAT64, FLOAT64, *room, *units, tape),
             "bus_batch:look": (*own, *room, _TABLE),
             "bus_batch:voltages": (_LANES, shared, room[1], _TABLE, _FLOATS),
-            "cosim_lanes:break_up": (_INDICES, shared, _ROWS)}
+            "cosim:break_up": (_INDICES, shared, _ROWS)}
 
 
 @cache
 def _of_the_bench() -> Mapping[str, tuple[Kind, ...]]:
     """Return what entries are called with that let servos go on at a bench that is looked at."""
-    from servotwin.models.engine.bus.bus_records import Mate, Seat, Shared
-    from servotwin.models.engine.bus.event_log import Tape
+    from servotwin.models.engine.bus.bus_records import Mate, Seat, Shared, Tape
     from servotwin.models.engine.lanes import Tables
-    from servotwin.models.engine.live.making import Weights
-    from servotwin.models.engine.live.posts import Circuit, Post, Told
+    from servotwin.models.engine.live.posts import Circuit, Post, Sender, Told, Weights
     from servotwin.models.engine.live.screen import Lines, Looks, Switch
-    from servotwin.models.engine.live.sender import Sender
 
     posts, sender, programs = _records(record_of(Post)), _records(record_of(Sender)), _records(record_of(Firmware))
     told = _tuple(Told, _TABLE, edges=_FLOATS)
@@ -160,7 +156,7 @@ _ELSEWHERE: Mapping[str, Callable[[], Mapping[str, tuple[Kind, ...]]]] = {  # wh
     "digital_batch:go_on": _of_ticks, "runs:go_on": _of_ticks, **{f"bench:{name}": _of_the_bench for name in _OF_BENCH},
     "stretch:shown": _of_the_bench,
     "bus_batch:go_on": _of_buses, "bus_batch:look": _of_buses, "bus_batch:voltages": _of_buses,
-    "cosim_lanes:break_up": _of_buses}
+    "cosim:break_up": _of_buses}
 
 
 def _on_tiles(rows: Array, plans: Array, real: Kind) -> dict[str, tuple[Kind, ...]]:
@@ -171,11 +167,11 @@ def _on_tiles(rows: Array, plans: Array, real: Kind) -> dict[str, tuple[Kind, ..
         "side_by_side:advance": (_INDICES, INT64, BOOL, INT64, INT64, FLOAT64, _FLOATS, _FLOATS, BOOL, rows, plans),
         "side_by_side:refit": (_LANES, INT64, _INDICES, _INDICES, rows),
         "observe_batch:side_by_side": (_LANES, _TABLE, _INDICES, rows, _TABLE),
-        "cosim_lanes:gather_lost": (_INDICES, _SMALLS, _FLOATS, _TABLE, rows, *(_INDICES,) * 3, _FLOATS, _MEMORIES),
-        "cosim_lanes:to_records": (_INDICES, rows, _MEMORIES),
-        "cosim_lanes:to_tiles": (_INDICES, _INDICES, _MEMORIES, _FLOATS, rows),
-        "cosim_lanes:impose_on_tiles": (_INDICES, _TABLE, _NUMBERS, _INDICES, _INDICES, _FLOATS, rows),
-        "cosim_lanes:show_tiles": (_INDICES, rows, _TABLE),
+        "cosim:gather_lost": (_INDICES, _SMALLS, _FLOATS, _TABLE, rows, *(_INDICES,) * 3, _FLOATS, _MEMORIES),
+        "cosim:to_records": (_INDICES, rows, _MEMORIES),
+        "cosim:to_tiles": (_INDICES, _INDICES, _MEMORIES, _FLOATS, rows),
+        "cosim:impose_on_tiles": (_INDICES, _TABLE, _NUMBERS, _INDICES, _INDICES, _FLOATS, rows),
+        "cosim:show_tiles": (_INDICES, rows, _TABLE),
     }
 
 

@@ -22,6 +22,8 @@ from servotwin.simulation.compile.layout import (
     VERSION,
 )
 
+# --- The one function that C calls at a tick, over the programs of a simulator ----------------------------------------
+
 _TICK_WORDS, _HANDLE_WORDS, _INPUTS, _SIGNALS = len(TICK), len(HANDLE), len(GIVEN), len(Observed._fields)
 _LANES, _DURATION, _SIMULATOR = TICK.index("lanes"), TICK.index("duration"), TICK.index("simulator")
 _FIRST_GIVEN, _FIRST_SHOWN, _STATUS = TICK.index(GIVEN[0]), TICK.index(SHOWN[0]), TICK.index("status")
@@ -140,3 +142,19 @@ def advance(tick: int) -> int:
         now[1] = 0.0
     _show(t, h, lanes)
     return DONE
+
+# --- Bring the words of a call up to date, in compiled code -----------------------------------------------------------
+
+def renew(at: int) -> int:
+    """Put what has changed into words, and return 1.
+
+    At the address stand how many words are copied, how many tell whether a float is not 0, and for each of these, the
+    former first, the address of the word and that of its source.
+    """
+    copied, told = words(at, 2)[0], words(at, 2)[1]
+    pairs = words(at + 16, 2 * (copied + told))
+    for k in range(copied):
+        words(pairs[2 * k], 1)[0] = words(pairs[2 * k + 1], 1)[0]
+    for k in range(copied, copied + told):
+        words(pairs[2 * k], 1)[0] = 1 if numbers(pairs[2 * k + 1], 1)[0] != 0.0 else 0
+    return 1

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from servotwin.simulation.compile import c_functions
+from servotwin.simulation.compile import c_types
 from servotwin.simulation.compile.kind_rules import (
     WHOLE,
     comparable,
@@ -331,23 +331,23 @@ class Values:
         return self._tuple_of(found, kind.name, kind.fields)
 
     def _primitive(self, node: ast.Call, name: str, kinds: Sequence[Kind | None]) -> Kind | None:
-        function = c_functions.PRIMITIVES[name]
+        function = c_types.PRIMITIVES[name]
         self.writes = self.writes or function.writes
         if function.result is not None:
             return function.result
-        return None if name in c_functions.VOID else self._widest(kinds)
+        return None if name in c_types.VOID else self._widest(kinds)
 
     def _widest(self, kinds: Sequence[Kind | None]) -> Kind:
         return FLOAT32 if FLOAT32 in kinds and FLOAT64 not in kinds else FLOAT64
 
     def _of_math(self, node: ast.Call, name: str) -> Kind | None:
         kinds = [self.of(argument) for argument in node.args]
-        if name not in (*c_functions.MATH, *c_functions.ROUNDED, *c_functions.TRUTHS):
+        if name not in (*c_types.MATH, *c_types.ROUNDED, *c_types.TRUTHS):
             raise self.refused(node, f"math.{name} has no line in c_functions.MATH")
-        self._arguments(node, kinds, 2 if name in c_functions.OF_TWO else 1)
-        if name in c_functions.TRUTHS:
+        self._arguments(node, kinds, 2 if name in c_types.OF_TWO else 1)
+        if name in c_types.TRUTHS:
             return BOOL
-        return INT64 if name in c_functions.ROUNDED else self._widest(kinds)
+        return INT64 if name in c_types.ROUNDED else self._widest(kinds)
 
     def _arguments(self, node: ast.Call, kinds: Sequence[Kind | None], count: int) -> None:
         """Refuse a call of a function of numbers with anything else."""

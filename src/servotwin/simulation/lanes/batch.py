@@ -11,12 +11,11 @@ import numpy as np
 
 from servotwin.errors import SimulationError, UnknownNameError
 from servotwin.models.outputs import SIGNALS
-from servotwin.simulation import files, frames
-from servotwin.simulation.lanes.form_recipes import KERNELS
+from servotwin.simulation import frames, result
+from servotwin.simulation.lanes.forms import KERNELS
 from servotwin.simulation.remarks import LaneRemark
-from servotwin.simulation.servo_run import simulated
-from servotwin.simulation.simulator import Simulator
-from servotwin.simulation.status import Status
+from servotwin.simulation.simulator import Simulator, simulated
+from servotwin.simulation.start import Status
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -212,7 +211,7 @@ class Batch:
         OutputExistsError, OutputError
             If the file exists and `overwrite` is false, or it cannot be written.
         """
-        files.save_lanes(path, self.time, self.signals, self.units, {"lane": np.arange(len(self)), **self._varied},
+        result.save_lanes(path, self.time, self.signals, self.units, {"lane": np.arange(len(self)), **self._varied},
                          what="a batch", overwrite=overwrite)
 
     def to_xarray(self) -> xr.Dataset:

@@ -17,7 +17,7 @@ from servotwin.models.terms.shaft import Shaft
 from servotwin.models.terms.stops import Stops
 from servotwin.simulation.compile.calls import program, tick_address
 from servotwin.simulation.compile.layout import GIVEN, HANDLE, MESSAGES, STAGES, TICK, VERSION
-from servotwin.simulation.lanes.saved import Piece, piece_of
+from servotwin.simulation.lanes.whole_runs import Piece, piece_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

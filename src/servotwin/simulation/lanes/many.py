@@ -13,19 +13,16 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models.engine.memory import ACCURACY
+from servotwin.simulation.frames import times_asked
 from servotwin.simulation.lanes.batch import Batch, Failure
 from servotwin.simulation.lanes.forms import goes_together
 from servotwin.simulation.lanes.inputs import LaneInputs, framed, lanes_of
 from servotwin.simulation.lanes.packed import Asked, Raw, Work
 from servotwin.simulation.lanes.packing import Chunk, Commands, groups
 from servotwin.simulation.lanes.whole_runs import run as run_lanes
-from servotwin.simulation.oddities import warn_of
-from servotwin.simulation.progress import Progress, shown
-from servotwin.simulation.remarks import lane_remarks
-from servotwin.simulation.start import accuracy_of
-from servotwin.simulation.status import Status
-from servotwin.simulation.times import times_asked
-from servotwin.simulation.workers import Crew, memory_limit
+from servotwin.simulation.progress import Crew, Progress, memory_limit, shown
+from servotwin.simulation.remarks import lane_remarks, warn_of
+from servotwin.simulation.start import Status, accuracy_of
 from servotwin.units import is_finite, is_masked
 
 if TYPE_CHECKING:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -10,19 +11,19 @@ from numpy.typing import NDArray
 
 from servotwin.models.engine.lanes import Lanes
 from servotwin.models.state.records import columns_of, mapped, record_of, tiles_with
-from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
+from servotwin.models.terms.frame import Chip
 from servotwin.models.terms.numbers import Numbers
+
+# --- Many servos at once: what a chunk of lanes is, what is asked of it, and what comes back --------------------------
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
-
 FIELDS = ("angle", "speed", "contact", "drive", "error", "wiper", "current", "winding", "housing", "motor_angle",
           "motor_speed", "mesh")
 MORE_FIELDS = ("motor", "silent", "duty", "goal", "reference", "trip")  # of servos that run one by one
 ALL_FIELDS = (*FIELDS, *MORE_FIELDS)  # rows of what a run leaves behind
 SMALL_FIELDS = ("contact", "drive", "mesh", "motor", "silent", "trip")  # fields that are kept as int8
-
 _SHARED = ("pieces", "edges", "accuracy")  # by all lanes
 _TILED: dict[str, Any] = {"numbers": Numbers, "chips": Chip}
 
@@ -194,9 +195,9 @@ class Raw:
     refused : ndarray of float64, shape (B,)
         From when on all pulses are refused [s]; nan where the last one is not.
     marks : ndarray of int8, shape (B,)
-        Sums of `engine.cosim.final_checks.ON_STOP` and `CANNOT_HOLD`.
+        Sums of `engine.cosim.ON_STOP` and `CANNOT_HOLD`.
     kernel : ndarray of int8, shape (B,)
-        Place of the name of its kernels in `form_recipes.KERNELS`.
+        Place of the name of its kernels in `forms.KERNELS`.
     lowest : ndarray, shape (B, 2)
         Least voltage of its supply [V] and when it came [s]; nan where nobody watched it.
     """
@@ -219,3 +220,59 @@ def empty_raw(work: Work) -> Raw:
                np.zeros(lanes, np.int8), np.full(lanes, asked.duration),
                np.ascontiguousarray(work.packed.lanes.start[[0, 1, 3, 4]].T), np.full(lanes, np.nan),
                np.zeros(lanes, np.int8), np.zeros(lanes, np.int8), np.full((lanes, 2), np.nan))
+
+# --- A law for one servo asked of many lanes --------------------------------------------------------------------------
+
+_Which = list[NDArray[np.int64]]
+
+
+class _DividedError(Exception):
+    """Lanes of a group answer differently: some yes, as `holds` says."""
+
+    def __init__(self, holds: NDArray[np.bool_]) -> None:
+        self.holds = holds
+        super().__init__()
+
+
+class _Column(np.ndarray[Any, np.dtype[Any]]):
+    """Numbers of lanes of which a group is asked, the one in `which`."""
+
+    which: _Which
+
+    def __array_finalize__(self, other: Any) -> None:
+        self.which = getattr(other, "which", [])
+
+    def __bool__(self) -> bool:
+        holds = self.view(np.ndarray)[self.which[0]]
+        yes = np.count_nonzero(holds)
+        if 0 < yes < len(holds):
+            raise _DividedError(holds != 0)
+        return bool(yes)
+
+
+def by_groups(law: Callable[..., int], lanes: int, *arguments: Any) -> NDArray[np.int64] | int:
+    """Return what a law says of each lane, or of all of them if its questions do not divide them.
+
+    Its arguments are named tuples of numbers and of columns of so many lanes.
+    """
+    group: _Which = [np.arange(lanes)]
+    found, waiting = np.empty(lanes, np.int64), [group[0]]
+
+    def column(values: Any) -> Any:
+        if not isinstance(values, np.ndarray):
+            return values
+        own = values.reshape(-1).view(_Column)
+        own.which = group
+        return own
+
+    given = [mapped(column, argument) for argument in arguments]
+    while waiting:
+        group[0] = which = waiting.pop()
+        try:
+            said = law(*given)
+            if len(which) == lanes:
+                return said
+            found[which] = said
+        except _DividedError as divided:
+            waiting += [which[divided.holds], which[~divided.holds]]
+    return found

@@ -19,20 +19,19 @@ from servotwin.models.engine.lanes import Lanes
 from servotwin.models.outputs import FIELDS as FIELDS_OF
 from servotwin.models.state.modes import Vector
 from servotwin.models.state.records import mapped
-from servotwin.models.terms.chip import NO_CHIP
+from servotwin.models.terms.frame import NO_CHIP
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import table_of
 from servotwin.physics.pieces import table_rows
 from servotwin.signals.signal import KIND_NAMES
-from servotwin.simulation.lanes.inputs import LAWS, LaneInputs
-from servotwin.simulation.lanes.load_columns import LOAD_NAMES, column_load, recorded_torque, structure
+from servotwin.simulation.lanes.inputs import LAWS, LOAD_NAMES, LaneInputs, column_load, recorded_torque, structure
 from servotwin.simulation.lanes.packed import FIELDS, MORE_FIELDS, SMALL_FIELDS, Asked, Packed, Raw, Torques
 from servotwin.simulation.start import check_start, start_vector
 
 if TYPE_CHECKING:
     from servotwin.loads import Load
     from servotwin.models import Model
-    from servotwin.models.samples import Samples
+    from servotwin.models.columns import Samples
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

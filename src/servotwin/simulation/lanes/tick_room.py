@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine.bus import event_log
-from servotwin.models.engine.bus.event_log import Tape
+from servotwin.models.engine.bus import bus_records
+from servotwin.models.engine.bus.bus_records import Tape
 from servotwin.models.engine.observe import Observed
 from servotwin.simulation.bus_run import BUSES, ROW
 from servotwin.simulation.compile.calls import Call, Now, call_of
 from servotwin.simulation.compile.layout import GIVEN
-from servotwin.simulation.lanes.form_recipes import TICKS
+from servotwin.simulation.lanes.forms import TICKS
 
 if TYPE_CHECKING:
     from servotwin.simulation.lanes.store import Store
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-NO_TAPE = Tape(np.zeros(0, ROW), np.zeros((0, event_log.EVENT)), np.zeros(0), np.zeros(0, np.int64))
+NO_TAPE = Tape(np.zeros(0, ROW), np.zeros((0, bus_records.EVENT)), np.zeros(0), np.zeros(0, np.int64))
 """Of buses whose motions nobody keeps."""
 
 

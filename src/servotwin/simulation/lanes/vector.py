@@ -14,23 +14,20 @@ from servotwin import physics
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models import DigitalServo
 from servotwin.models.base import KINDS, Model
-from servotwin.models.engine.cosim.cosim_calls import LONGEST
+from servotwin.models.engine.cosim import LONGEST
 from servotwin.models.engine.memory import ACCURACY
 from servotwin.models.engine.observe import Observed
 from servotwin.models.terms.wiring import PULSE_RANGE
 from servotwin.signals import Signal, constant
-from servotwin.simulation.bus_supply import supplies_of
+from servotwin.simulation.bus import supplies_of
 from servotwin.simulation.lanes.batch import Failure
 from servotwin.simulation.lanes.inputs import LAWS, lanes_of, pick
 from servotwin.simulation.lanes.lane_numbers import LaneNumbers
-from servotwin.simulation.lanes.lane_sets import SHAFT
 from servotwin.simulation.lanes.many import real_type
-from servotwin.simulation.lanes.saved import VectorMemory
-from servotwin.simulation.lanes.store import Store
-from servotwin.simulation.lanes.whole_runs import known_lowest
-from servotwin.simulation.start import accuracy_of
-from servotwin.simulation.status import Status
-from servotwin.simulation.workers import memory_limit, own_threads, workers_of
+from servotwin.simulation.lanes.store import SHAFT, Store
+from servotwin.simulation.lanes.whole_runs import VectorMemory, known_lowest
+from servotwin.simulation.progress import memory_limit, own_threads, workers_of
+from servotwin.simulation.start import Status, accuracy_of
 from servotwin.units import is_finite, is_masked
 
 if TYPE_CHECKING:

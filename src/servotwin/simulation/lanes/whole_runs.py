@@ -1,7 +1,9 @@
-"""Run a chunk of lanes through the compiled kernels, from start to end."""
+"""Run a chunk of lanes through the compiled kernels, from start to end; and what lanes remember, as records."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,12 +11,21 @@ from numpy.typing import NDArray
 
 from servotwin.models.engine.batch import tiles
 from servotwin.models.engine.lanes import Lanes, Outputs
-from servotwin.models.engine.memory import NONE_YET, Memories
-from servotwin.models.state.records import room
+from servotwin.models.engine.memory import NONE_YET, Memories, Memory
+from servotwin.models.state.records import record_of, room
+from servotwin.models.terms.control import Firm
 from servotwin.simulation.compile import Recipe, kernels
-from servotwin.simulation.lanes.form_recipes import ALL_RUNS, ENDING, KERNELS, last_of, steps_of
-from servotwin.simulation.lanes.forms import OneByOne, SideBySide, kinds_of
-from servotwin.simulation.lanes.memories import flat, memories_of, nothing_yet, taken
+from servotwin.simulation.lanes.forms import (
+    ALL_RUNS,
+    ENDING,
+    KERNELS,
+    TICKS,
+    OneByOne,
+    SideBySide,
+    kinds_of,
+    last_of,
+    steps_of,
+)
 from servotwin.simulation.lanes.packed import (
     ALL_FIELDS,
     SMALL_FIELDS,
@@ -26,8 +37,111 @@ from servotwin.simulation.lanes.packed import (
     some_of,
 )
 
-Indices = NDArray[np.int64]
+# --- What lanes remember, as records ----------------------------------------------------------------------------------
 
+_RECORD, _FIRM = record_of(Memory), record_of(Firm)
+
+
+def nothing_yet(count: int) -> Memories:
+    """Return room for what so many lanes remember."""
+    return Memories(np.zeros(count, _RECORD), np.zeros(count, _FIRM))
+
+
+def taken(memories: Memories, which: Any) -> Memories:
+    """Return what some lanes remember, by their numbers or as a slice."""
+    return Memories(*(array[which] for array in memories))
+
+
+def put_back(memories: Memories, which: Any, some: Memories) -> None:
+    """Let some lanes remember something else."""
+    for array, values in zip(memories, some, strict=True):
+        array[which] = values
+
+
+def copied(memories: Memories) -> Memories:
+    """Return the same, to be kept."""
+    return Memories(*(array.copy() for array in memories))
+
+
+def flat(tiles: NDArray[Any], group: str, name: str) -> Any:
+    """Return a copy of a number of all lanes in tiles, one after the other."""
+    return tiles[group][name].ravel()
+
+
+def memories_of(tiles: NDArray[Any], places: Indices) -> Memories:
+    """Return what the lanes at these places of tiles remember."""
+    found = nothing_yet(len(places))
+    kernels(TICKS).to_records(places, tiles, found)
+    return found
+
+
+# --- What the lanes of a `VectorSimulator` remember, as something to keep ---------------------------------------------
+Array = NDArray[np.float64]
+
+
+class Common(NamedTuple):
+    """What lanes on shared supplies remember together.
+
+    Each lane's bus and its place among those that move together there (−1: none), shape (lanes,); and a record of
+    `models.engine.bus.bus_records.Shared` for each bus.
+    """
+
+    bus_of: NDArray[np.int64]
+    joined: NDArray[np.int64]
+    shared: Mapping[int, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class VectorMemory:
+    """Everything that the lanes of a `VectorSimulator` remember; picklable.
+
+    Parameters
+    ----------
+    model : str
+        Name of the model's class.
+    records, firms : ndarray, shape (lanes,)
+        Records of each lane: of `models.engine.memory.Memory`, and of `models.terms.control.Firm`.
+    command, torque : ndarray, shape (lanes,)
+        What each is told: width of the pulse [s] or control voltage [V]; external torque [N m].
+    status, ended : ndarray, shape (lanes,)
+        Code of its `Status`, and when it failed [s].
+    work : ndarray, shape (lanes,)
+        Of the speeds that were set [J].
+    numbers : ndarray
+        Tiles of `models.terms.numbers.Numbers`: what the lanes were. They are not restored; a lane that has others by
+        then goes on from where it stood.
+    common : Common, optional
+        Of lanes that share supplies.
+    """
+
+    model: str
+    records: NDArray[Any]
+    firms: NDArray[Any]
+    command: Array
+    torque: Array
+    status: NDArray[np.int8]
+    ended: Array
+    work: Array
+    numbers: NDArray[Any]
+    common: Common | None = None
+
+
+class Piece(NamedTuple):
+    """Rows of bytes in memory, each so many bytes behind the one before."""
+
+    address: int
+    rows: int
+    stride: int
+    bytes: int
+
+
+def piece_of(array: NDArray[Any]) -> Piece:
+    """Return an array as one row."""
+    return Piece(array.ctypes.data, 1, array.nbytes, array.nbytes)
+
+# --- Run a chunk of lanes through the compiled kernels, from start to end ---------------------------------------------
+
+Indices = NDArray[np.int64]
 _ROOM = 2_000_000  # numbers that lanes one after the other leave behind at once
 _NEVER = np.zeros(0)
 

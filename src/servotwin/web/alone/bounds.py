@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from servotwin.models import DigitalServo
 from servotwin.models.switched import SwitchedServo
-from servotwin.models.terms.chip import FRAME
+from servotwin.models.terms.frame import FRAME
 from servotwin.models.terms.wiring import PULSE_RANGE, TRAVEL_SLACK
 
 if TYPE_CHECKING:

@@ -12,23 +12,21 @@ from typing import Any
 import numpy as np
 
 from servotwin.errors import InputError
-from servotwin.models.engine.bus import event_log
+from servotwin.models.engine.bus import bus_records
 from servotwin.models.engine.bus.bus_records import ROOM, Mate, Seat, Shared
 from servotwin.models.engine.lanes import Lanes, Tables
 from servotwin.models.engine.live import stretch
-from servotwin.models.engine.live.making import Weights
-from servotwin.models.engine.live.posts import Circuit, Post
-from servotwin.models.engine.live.sender import Sender
+from servotwin.models.engine.live.posts import Circuit, Post, Sender, Weights
 from servotwin.models.engine.log import COUNTS, Happened, Row
 from servotwin.models.engine.memory import Memory
 from servotwin.models.state.records import record_of, rows_of
-from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.control import Firm
 from servotwin.models.terms.firmware import Firmware
+from servotwin.models.terms.frame import Chip
 from servotwin.models.terms.given import Given
 from servotwin.simulation.compile import Recipe
 from servotwin.simulation.compile.building import printed
-from servotwin.simulation.compile.compilers import Compiler, compilers
+from servotwin.simulation.compile.finding import Compiler, compilers
 from servotwin.simulation.compile.kinds import Kind, Scalar, Tuple
 from servotwin.simulation.compile.signatures import signatures
 from servotwin.simulation.compile.translate import Translation
@@ -110,7 +108,7 @@ def layout() -> dict[str, Any]:
                for one in _printed().entries}
     tiles = {"size": rows_of(Chip, np.float64).itemsize, "at": {}}
     return {"records": {**records, "chips": tiles}, "entries": entries, "words": _WORDS, "page": _PAGE,
-            "lanes": Lanes._fields, "tables": Tables._fields, "event": event_log.EVENT,
+            "lanes": Lanes._fields, "tables": Tables._fields, "event": bus_records.EVENT,
             "series": 2 * ROOM, "log": {"motions": stretch.AT_ONCE, "events": 2 * stretch.AT_ONCE, "counts": COUNTS}}
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from servotwin.models.engine.live.posts import NEVER
-from servotwin.models.engine.live.screen import LEFT, TOO_LONG, USED
-from servotwin.models.engine.live.shapes import PERIODS
+from servotwin.models.engine.live.screen import LEFT, PERIODS, TOO_LONG, USED
 from servotwin.models.engine.memory import ACCURACY
 from servotwin.physics.pieces import Piece
 from servotwin.web.live.said import FRAME_RATE, RATES

@@ -13,9 +13,9 @@ from servotwin.bench import FEEDBACK_CONVERTER, INPUT_CONVERTER, ControlSupply, 
 from servotwin.errors import ServotwinError
 from servotwin.loads import Load, Pendulum
 from servotwin.models import DigitalServo
-from servotwin.models.engine.live import making, screen
+from servotwin.models.engine.live import posts, screen
 from servotwin.models.engine.live.posts import UNITS
-from servotwin.models.engine.live.shapes import FIELDS
+from servotwin.models.engine.live.screen import FIELDS
 from servotwin.models.outputs import SIGNALS
 from servotwin.models.switched import SwitchedServo
 from servotwin.models.terms.given import field_of
@@ -24,10 +24,10 @@ from servotwin.parameters.group import RULES
 from servotwin.parameters.quantity import SET_BY_USER
 from servotwin.parameters.servo import KINDS as KINDS_OF_SERVOS
 from servotwin.signals.signal import KINDS
-from servotwin.simulation.bus_supply import OF_BUS
+from servotwin.simulation.bus import OF_BUS
 from servotwin.simulation.engine import failure
-from servotwin.simulation.files import shown_columns
-from servotwin.simulation.status import Status
+from servotwin.simulation.result import shown_columns
+from servotwin.simulation.start import Status
 from servotwin.web.alone.bounds import bounds_of
 from servotwin.web.alone.csv_rules import csv_rules
 from servotwin.web.alone.limits import limits
@@ -124,7 +124,7 @@ def _no_load() -> dict[str, float]:
 def _model(name: str) -> dict[str, Any]:
     """Return what is alike of all servos of a model."""
     kind = model_named(name)
-    return {"family": making.FAMILIES[name], "requires": kind.requires, "reads": [*kind.requires, *kind.optional]}
+    return {"family": posts.FAMILIES[name], "requires": kind.requires, "reads": [*kind.requires, *kind.optional]}
 
 
 def _servo(name: str) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from servotwin import errors
 from servotwin.parameters import GROUPS
 from servotwin.parameters.servo import PLACES, USUAL_NAMES
-from servotwin.simulation.bus_supply import MODEL_NAMES
+from servotwin.simulation.bus import MODEL_NAMES
 
 ONLY_WITH_SERVER = "only with the server: servotwin web"
 WORDS = {

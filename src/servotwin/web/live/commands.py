@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from servotwin import signals
-from servotwin.models.engine.live.shapes import FIELDS, PERIODS
+from servotwin.models.engine.live.screen import FIELDS, PERIODS
 from servotwin.signals import Signal
 from servotwin.web.live.rules import checked
 from servotwin.web.live.said import COMMAND

@@ -9,7 +9,7 @@ import numpy as np
 
 from servotwin.errors import InputError
 from servotwin.parameters.servo_file import servo_text
-from servotwin.simulation.files import write_csv
+from servotwin.simulation.result import write_csv
 from servotwin.text import file_stem
 from servotwin.web.live.replay import replay
 

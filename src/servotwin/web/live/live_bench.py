@@ -10,8 +10,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.errors import InputError
-from servotwin.simulation.bus_supply import OF_BUS
-from servotwin.simulation.lanes.load_columns import LOAD_NAMES
+from servotwin.simulation.bus import OF_BUS
+from servotwin.simulation.lanes.inputs import LOAD_NAMES
 from servotwin.units import is_finite
 from servotwin.web.live.actions import Action, checked
 from servotwin.web.live.beginning import first_commands, first_of, load_of, models_of

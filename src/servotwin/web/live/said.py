@@ -6,7 +6,7 @@ from typing import Any
 
 from servotwin.errors import HIDDEN
 from servotwin.models.engine.live.posts import UNITS
-from servotwin.models.engine.live.shapes import FIELDS
+from servotwin.models.engine.live.screen import FIELDS
 from servotwin.text import LONGEST_NAME
 from servotwin.web.live.rules import Rule, number
 

@@ -9,8 +9,8 @@ from servotwin.errors import InputError
 from servotwin.loads import Load
 from servotwin.models.engine.live.screen import Looks, first_look
 from servotwin.parameters.groups import Supply
-from servotwin.simulation.bus_steps import BusSteps
-from servotwin.simulation.bus_supply import MODEL_NAMES, MODELS, check_rigid, check_supply, on_supply, source_of
+from servotwin.simulation.bus import MODEL_NAMES, MODELS, check_rigid, check_supply, on_supply, source_of
+from servotwin.simulation.bus_run import BusSteps
 from servotwin.web.live.station import Endless, Seen, Station
 
 if TYPE_CHECKING:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
-from servotwin.models.engine.live import sender
-from servotwin.models.engine.live.sender import Sender
+from servotwin.models.engine.live import posts
+from servotwin.models.engine.live.posts import Sender
 
 
 class FrameEdge(NamedTuple):
@@ -44,15 +44,15 @@ class Transmitter:
     @property
     def next_edge(self) -> float:
         """When the next frame begins [s]."""
-        return sender.next_edge(self._clock)
+        return posts.next_edge(self._clock)
 
     def snapped(self, time: float) -> float:
         """Return a time, or that of the edge right next to it: what is a billionth of a frame away is the edge [s]."""
-        return sender.snapped(self._clock, time)
+        return posts.snapped(self._clock, time)
 
     def tune(self, rate: float) -> None:
         """Take another rate [Hz] from the next edge on."""
-        sender.tune(self._clock, rate)
+        posts.tune(self._clock, rate)
 
     def lose(self, share: float) -> None:
         """Let a share of the frames get lost from now on."""
@@ -62,6 +62,6 @@ class Transmitter:
         """Return the frames that begin before a time [s] and were not returned yet."""
         edges = []
         while (edge := self.next_edge) < time:
-            edges.append(FrameEdge(edge, not sender.is_lost(self._clock)))
-            sender.pass_edge(self._clock)
+            edges.append(FrameEdge(edge, not posts.is_lost(self._clock)))
+            posts.pass_edge(self._clock)
         return edges

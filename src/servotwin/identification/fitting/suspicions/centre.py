@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError
 from servotwin.identification.survey.motion import motion_of
 from servotwin.logs.column_words import SAID
+from servotwin.models.standing import mid_travel
 from servotwin.models.terms.wiring import TRAVEL_SLACK
-from servotwin.models.travel import mid_travel
 from servotwin.units.words import unit_shown
 
 if TYPE_CHECKING:

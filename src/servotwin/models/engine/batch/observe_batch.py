@@ -12,7 +12,7 @@ from servotwin.models.engine.run.run import as_now, mode_under, told
 from servotwin.models.state.modes import RIGID, Vector
 from servotwin.models.state.records import TILE
 from servotwin.models.terms import duty
-from servotwin.models.terms.chip import present as pulsed_chip
+from servotwin.models.terms.frame import present as pulsed_chip
 from servotwin.models.terms.numbers import warm
 from servotwin.models.terms.sensor import slack
 from servotwin.physics.pieces import piece_value

@@ -9,9 +9,10 @@ from __future__ import annotations
 from typing import Any
 
 from servotwin.models.engine.batch import rk_steps, tiles, warm_batch, warm_segments
-from servotwin.models.engine.batch.rk_slots import (
+from servotwin.models.engine.batch.rk_steps import (
     NOBODY,
     SLOTS,
+    State,
     before_in,
     mode_in,
     numbers_in,
@@ -19,7 +20,6 @@ from servotwin.models.engine.batch.rk_slots import (
     put_numbers_in,
     step,
 )
-from servotwin.models.engine.batch.rk_steps import State
 from servotwin.models.engine.batch.tiles import More
 from servotwin.models.engine.events import crossings
 from servotwin.models.terms import heat

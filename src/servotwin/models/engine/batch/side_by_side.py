@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 from servotwin.models.engine.batch import (
     backlash_batch,
     frame_phases,
-    frame_windows,
     inductive_batch,
     inductive_segments,
     linear_segments,
@@ -79,9 +78,9 @@ def _advance(which: Indices, form: int, slack: bool, duration: float, widths: Fl
         _hang(which, form, torques, tile)
     full, noisy = _needs_all(size, tile)
     lost = 0
-    while frame_windows.begin(widths, size, False, tile, plan, before) > 0:
+    while frame_phases.begin(widths, size, False, tile, plan, before) > 0:
         _through(size, full, noisy, form, slack, False, tile, plan)
-        lost += frame_windows.give_up(size, form, tile, plan, before)
+        lost += frame_phases.give_up(size, form, tile, plan, before)
     return lost
 
 
@@ -94,13 +93,13 @@ def _go_on(pieces: Floats, listed: Floats, form: int, slack: bool, which: Indice
         tile.clock.remaining[j] = duration
     full, noisy = _needs_all(size, tile)
     lost = 0
-    while frame_windows.begin(listed, size, own, tile, plan, before) > 0:
-        frame_windows.commands(pieces, size, tile, plan)
+    while frame_phases.begin(listed, size, own, tile, plan, before) > 0:
+        frame_phases.commands(pieces, size, tile, plan)
         wanted = _wanted(size, tile, plan, before)
         _through(size, full, noisy, form, slack, wanted > 0, tile, plan)
         if wanted > 0:
             _write(which, form, slack, times, outputs, tile, plan, before)
-        lost += frame_windows.give_up(size, form, tile, plan, before)
+        lost += frame_phases.give_up(size, form, tile, plan, before)
     return lost
 
 
@@ -113,8 +112,8 @@ def _through(size: int, full: bool, noisy: bool, form: int, slack: bool, keep: b
         for j in range(size):
             plan.draw[j] = 0.0
     if full:
-        frame_windows.measure(size, form, tile, plan)
-    frame_windows.divide(size, full, slack, tile, plan)
+        frame_phases.measure(size, form, tile, plan)
+    frame_phases.divide(size, full, slack, tile, plan)
     if tiles.has_more(form):
         for j in range(size):
             tiles.put_more(tile.more_before, j, tiles.more_at(tile.servo, j))

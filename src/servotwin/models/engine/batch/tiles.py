@@ -14,8 +14,7 @@ import numpy as np
 from servotwin.models.engine.batch import inductive_segments, linear_segments, piecewise_segments
 from servotwin.models.engine.batch.inductive_segments import Circuit, Course, Winding
 from servotwin.models.engine.batch.linear_segments import ArcNumbers
-from servotwin.models.engine.batch.rk_slots import slots_type
-from servotwin.models.engine.batch.rk_steps import SMOOTH, STEEP
+from servotwin.models.engine.batch.rk_steps import SMOOTH, STEEP, slots_type
 from servotwin.models.engine.dynamics import contacts
 from servotwin.models.engine.lanes import chip_at, chip_of, numbers_at, numbers_of
 from servotwin.models.engine.memory import FIRST_STEP
@@ -23,7 +22,7 @@ from servotwin.models.engine.motions.motion import FINE
 from servotwin.models.engine.motions.warm_exponential import Gone, Law
 from servotwin.models.state.modes import INSIDE, RIGID
 from servotwin.models.state.records import TILE, fill, reader, room, rows_of, tile_of, writer
-from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.frame import Chip
 from servotwin.models.terms.numbers import NEUTRAL, Numbers
 from servotwin.physics.backlash import play
 

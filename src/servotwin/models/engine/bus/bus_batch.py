@@ -7,11 +7,19 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.models.engine import controller, step
 from servotwin.models.engine.batch.observe_batch import put
-from servotwin.models.engine.bus import bus_unit, event_queue, shared_source
-from servotwin.models.engine.bus.bus_records import drive_of, lowest_of, numbers_of, put_numbers, put_point, source_of
+from servotwin.models.engine.bus import bus_unit, coupled_step, event_queue
+from servotwin.models.engine.bus.bus_records import (
+    Tape,
+    drive_of,
+    lowest_of,
+    numbers_of,
+    put_numbers,
+    put_point,
+    runs,
+    source_of,
+)
 from servotwin.models.engine.bus.coupled_motion import APART
-from servotwin.models.engine.bus.event_log import Tape, runs
-from servotwin.models.engine.dynamics import bus_side
+from servotwin.models.engine.dynamics import currents
 from servotwin.models.engine.lanes import Tables, Told, chip_of, inputs_at
 from servotwin.models.engine.lanes import numbers_of as numbers_at
 from servotwin.models.engine.legs import coupled_ticks
@@ -214,11 +222,11 @@ def voltages(lanes: Lanes, shared: Any, mates: Any, states: Floats, found: Float
                 numbers = duty.at_duty(numbers, now)
             else:
                 numbers = step.at_pulses(numbers, int(states[r, 9]))
-            if bus_side.is_connected(numbers, drive, y):
+            if currents.is_connected(numbers, drive, y):
                 mate = mates[connected]
-                put_numbers(mate.numbers, bus_side.on_stiff_source(numbers, drive == 0.0))
+                put_numbers(mate.numbers, currents.on_stiff_source(numbers, drive == 0.0))
                 put_vector(mate.y, y)
-                mate.sign = bus_side.part_on_bus(drive, numbers.bridge, now, y)
+                mate.sign = currents.part_on_bus(drive, numbers.bridge, now, y)
                 mate.returns = 1 if drive == 0.0 else 0
                 connected += 1
-        found[n] = shared_source.put_in_zones(source, mates, connected, source.V)[1]
+        found[n] = coupled_step.put_in_zones(source, mates, connected, source.V)[1]

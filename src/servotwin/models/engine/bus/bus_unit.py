@@ -11,7 +11,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from servotwin.models.engine import controller, step
-from servotwin.models.engine.bus import coupled_motion, event_log
+from servotwin.models.engine.bus import bus_records, coupled_motion
 from servotwin.models.engine.bus.bus_records import (
     Track,
     decided_of,
@@ -29,21 +29,20 @@ from servotwin.models.engine.bus.bus_records import (
     put_track,
     vector_of,
 )
-from servotwin.models.engine.dynamics import bus_side
+from servotwin.models.engine.dynamics import currents
 from servotwin.models.engine.memory import NOT_ASKED, Inputs, Memory, Point, put_vector, since
 from servotwin.models.engine.motions import choice, motion
 from servotwin.models.engine.motions.motion import Motion
 from servotwin.models.state.modes import Mode
 from servotwin.models.terms import duty, firmware, frame
-from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.control import told_by
-from servotwin.models.terms.frame import Frame
+from servotwin.models.terms.frame import Chip, Frame
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import wiper_at
 from servotwin.physics.pieces import Piece
 
 if TYPE_CHECKING:
-    from servotwin.models.engine.bus.event_log import Tape
+    from servotwin.models.engine.bus.bus_records import Tape
 
 _UNKNOWN = math.nan
 
@@ -213,13 +212,13 @@ def wiper_of(seat: Any, q: float) -> float:
 
 def move(seat: Any, unit: int, shared: Any, mates: Any, point: Point, event: int, written: Tape) -> None:
     """Let a servo go on its present motion to a point, where an event may be."""
-    if event_log.runs(written) and point.time > seat.point.time:
+    if bus_records.runs(written) and point.time > seat.point.time:
         if seat.joined >= 0:
-            event_log.write_together(written, unit, seat, point.time, shared, mates[seat.joined])
+            bus_records.write_together(written, unit, seat, point.time, shared, mates[seat.joined])
         else:
-            event_log.write_alone(written, unit, seat, point.time)
+            bus_records.write_alone(written, unit, seat, point.time)
     if event >= 0:
-        event_log.write_event(written, unit, seat.origin + point.time, event, point.mode, point.y.q)
+        bus_records.write_event(written, unit, seat.origin + point.time, event, point.mode, point.y.q)
     put_point(seat.point, point)
     seat.arrival = _UNKNOWN
 
@@ -237,9 +236,9 @@ def hear(seat: Any, unit: int, now: Frame, written: Tape) -> None:
     put_decided(seat.decided, now)
     nothing = Mode(0, 0, 0, 0, 0)
     if now.drive != before.drive:
-        event_log.write_event(written, unit, time, event_log.DRIVES + int(now.drive), nothing, angle)
+        bus_records.write_event(written, unit, time, bus_records.DRIVES + int(now.drive), nothing, angle)
     if heeds and now.silent != before.silent:
-        event_log.write_event(written, unit, time, event_log.SILENCE + now.silent, nothing, angle)
+        bus_records.write_event(written, unit, time, bus_records.SILENCE + now.silent, nothing, angle)
     if now.drive != before.drive or (heeds and now.silent != before.silent):
         forget(seat)
 
@@ -249,9 +248,8 @@ def obey(seat: Any, unit: int, firm: Any, written: Tape) -> None:
     duty_before, trip_before = seat.shown.duty, seat.shown.trip
     show(seat, firm)
     if seat.shown.trip != trip_before:
-        event_log.write_event(written, unit, seat.origin + seat.clock, event_log.TRIPS + seat.shown.trip, Mode(0, 0, 0,
-                                                                                                               0, 0),
-                              seat.point.y.q)
+        kind, still = bus_records.TRIPS + seat.shown.trip, Mode(0, 0, 0, 0, 0)
+        bus_records.write_event(written, unit, seat.origin + seat.clock, kind, still, seat.point.y.q)
     if seat.shown.duty != duty_before:
         forget(seat)
 
@@ -260,10 +258,10 @@ def take_part(seat: Any, unit: int, mate: Any, start: Any, y: Any) -> None:
     """Let a servo that is connected to the bus take part in a common motion from a start, where it stands at y."""
     drive, now, numbers = drive_of(seat), vector_of(y), numbers_now(seat)
     returns = drive == 0.0
-    put_numbers(mate.numbers, bus_side.on_stiff_source(numbers, returns))
+    put_numbers(mate.numbers, currents.on_stiff_source(numbers, returns))
     put_mode(mate.mode, mode_of(seat.point.mode))
     put_piece(mate.tau, tau_by(seat, seat.origin + seat.late))
     mate.unit, mate.returns = unit, 1 if returns else 0
-    mate.sign = bus_side.part_on_bus(drive, numbers.bridge, seat.shown.duty, vector_of(start))
+    mate.sign = currents.part_on_bus(drive, numbers.bridge, seat.shown.duty, vector_of(start))
     put_vector(mate.start, vector_of(start))
     put_vector(mate.y, now)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from servotwin.models.engine.bus import coupled_step, shared_source
+from servotwin.models.engine.bus import coupled_step
 from servotwin.models.engine.bus.bus_records import (
     Shared,
     mode_of,
@@ -19,7 +19,7 @@ from servotwin.models.engine.bus.bus_records import (
     vector_of,
 )
 from servotwin.models.engine.bus.coupled_step import turns
-from servotwin.models.engine.dynamics import bus_side, contacts, guards
+from servotwin.models.engine.dynamics import contacts, currents, guards
 from servotwin.models.engine.events import crossings
 from servotwin.models.engine.memory import FIRST_STEP, FLAT, NOT_ASKED, Lowest, put_vector
 from servotwin.models.engine.motions import stribeck
@@ -46,7 +46,7 @@ APART, TOGETHER, ENDED = range(3)
 
 def at_start(source: Source) -> Shared:
     """Return what servos on a source remember when none has moved yet."""
-    return Shared(APART, shared_source.FOLLOWING, 1, -1, -1, 0, coupled_step.BY_SERIES, 0, source.V, FIRST_STEP, 0.0,
+    return Shared(APART, coupled_step.FOLLOWING, 1, -1, -1, 0, coupled_step.BY_SERIES, 0, source.V, FIRST_STEP, 0.0,
                   0.0, math.inf, source, NOT_ASKED)
 
 
@@ -58,9 +58,9 @@ def begin(shared: Any, mates: Any, time: float, limit: float, same: bool) -> Non
     source, count = source_of(shared.source), shared.members
     _look_at_start(mates, count)
     if same and shared.jumped == 0:
-        shared.voltage = shared_source.bus_voltage(source, shared.state, mates, count)
+        shared.voltage = coupled_step.bus_voltage(source, shared.state, mates, count)
     else:
-        state, voltage = shared_source.put_in_zones(source, mates, count, shared.voltage)
+        state, voltage = coupled_step.put_in_zones(source, mates, count, shared.voltage)
         shared.state, shared.voltage = state, voltage
         for k in range(count):
             _settle(mates[k], time, voltage)
@@ -85,7 +85,7 @@ def _longest_step(shared: Any, mates: Any) -> float:
         mate = mates[k]
         tau = piece_value(piece_of(mate.tau), shared.begin)
         longest = min(longest, stribeck.longest_step(numbers_of(mate.numbers), mode_of(mate.mode),
-                                                     shared_source.behind(mate, shared.voltage), tau,
+                                                     coupled_step.behind(mate, shared.voltage), tau,
                                                      vector_of(mate.start)))
     return longest
 
@@ -103,7 +103,7 @@ def _look_at_start(mates: Any, count: int) -> None:
 
 def _settle(mate: Any, time: float, voltage: float) -> None:
     mode, y = mode_of(mate.mode), vector_of(mate.start)
-    put_mode(mate.mode, guards.settled(numbers_of(mate.numbers), mode.zone, shared_source.behind(mate, voltage),
+    put_mode(mate.mode, guards.settled(numbers_of(mate.numbers), mode.zone, coupled_step.behind(mate, voltage),
                                        piece_value(piece_of(mate.tau), time), y, mode.mesh, False))
 
 
@@ -281,16 +281,16 @@ def _guard(source: Source, shared: Any, mates: Any, j: int, kind: int, s: float)
     """Return a guard of a mate, or (j < 0) of the source."""
     if j < 0:
         look(shared, mates, s)
-        V = shared_source.bus_voltage(source, shared.state, mates, shared.members)
-        total = shared_source.drawn(V, mates, shared.members)
-        guard, other = shared_source.source_guards(source, shared.state, V, total)
+        V = coupled_step.bus_voltage(source, shared.state, mates, shared.members)
+        total = coupled_step.drawn(V, mates, shared.members)
+        guard, other = coupled_step.source_guards(source, shared.state, V, total)
         return guard if kind == 0 else other
     mate, u, t = mates[j], 0.0, shared.begin + s
     if kind == guards.SPEED or kind == guards.UPPER or kind == guards.LOWER:
         put_vector(mate.y, state_at(shared, mate, s))
     else:
         look(shared, mates, s)
-        u = shared_source.behind(mate, shared_source.bus_voltage(source, shared.state, mates, shared.members))
+        u = coupled_step.behind(mate, coupled_step.bus_voltage(source, shared.state, mates, shared.members))
     tau, y = piece_of(mate.tau), vector_of(mate.y)
     return guards.guard(numbers_of(mate.numbers), mode_of(mate.mode), kind, u, 0.0, piece_value(tau, t),
                         piece_rate(tau, t), y, y)[0]
@@ -342,7 +342,7 @@ def lowest_between(lowest: Lowest, shared: Any, mates: Any, origin: float, a: fl
 def _voltage_at(shared: Any, mates: Any, s: float) -> float:
     """Return V_bus [V] at s [s] after the beginning."""
     look(shared, mates, s)
-    return shared_source.bus_voltage(source_of(shared.source), shared.state, mates, shared.members)
+    return coupled_step.bus_voltage(source_of(shared.source), shared.state, mates, shared.members)
 
 
 def arrive(shared: Any, mates: Any) -> Mode:
@@ -354,8 +354,8 @@ def arrive(shared: Any, mates: Any) -> Mode:
     else:
         look(shared, mates, shared.end - shared.begin)
     if whose < 0 and kind >= 0:
-        shared.state = shared_source.after(shared.state, kind)
-    V = shared_source.bus_voltage(source, shared.state, mates, count)
+        shared.state = coupled_step.after(shared.state, kind)
+    V = coupled_step.bus_voltage(source, shared.state, mates, count)
     shared.jumped = 1 if whose >= 0 and jumps(kind) else 0
     shared.voltage, shared.phase = V, ENDED
     if whose < 0:
@@ -363,11 +363,11 @@ def arrive(shared: Any, mates: Any) -> Mode:
     mate = mates[whose]
     numbers = numbers_of(mate.numbers)
     if mate.returns > 0 and mate.mode.zone == NO_CURRENT:  # teeth that meet would part by a torque that there is not
-        numbers = bus_side.blocked(numbers)
-    mode, y = crossings.cross(numbers, mode_of(mate.mode), kind, shared_source.behind(mate, V),
+        numbers = currents.blocked(numbers)
+    mode, y = crossings.cross(numbers, mode_of(mate.mode), kind, coupled_step.behind(mate, V),
                            piece_value(piece_of(mate.tau), shared.end), vector_of(mate.y))
     put_vector(mate.y, y)
-    return Mode(shared_source.let_through(mate, mode.zone), mode.contact, mode.mesh, mode.motor, mode.share)
+    return Mode(coupled_step.let_through(mate, mode.zone), mode.contact, mode.mesh, mode.motor, mode.share)
 
 
 def jumps(kind: int) -> bool:

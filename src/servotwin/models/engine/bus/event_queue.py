@@ -10,8 +10,9 @@ import math
 from typing import Any
 
 from servotwin.models.engine import controller, step
-from servotwin.models.engine.bus import bus_unit, coupled_motion, event_log, shared_source
+from servotwin.models.engine.bus import bus_records, bus_unit, coupled_motion, coupled_step
 from servotwin.models.engine.bus.bus_records import (
+    Tape,
     chip_of,
     decided_of,
     drive_of,
@@ -27,8 +28,7 @@ from servotwin.models.engine.bus.bus_records import (
     vector_of,
 )
 from servotwin.models.engine.bus.coupled_motion import APART, ENDED, TOGETHER
-from servotwin.models.engine.bus.event_log import Tape
-from servotwin.models.engine.dynamics import bus_side, currents
+from servotwin.models.engine.dynamics import currents
 from servotwin.models.engine.lanes import inputs_at
 from servotwin.models.engine.memory import (
     FRAMES,
@@ -107,7 +107,7 @@ def run(told: Any, firms: Any, count: int, shared: Any, seats: Any, mates: Any, 
     for j in range(count):
         bus_unit.plan_ahead(seats[j], bus_unit.edge_of(seats[j], inputs_at(told, seats[j]), firms), until)
     while time < until:
-        if event_log.is_full(written, count):
+        if bus_records.is_full(written, count):
             status = PAUSED
             break
         status = act(told, firms, count, shared, seats, mates, written, time, until)
@@ -255,7 +255,7 @@ def _measure(inputs: Inputs, j: int, count: int, shared: Any, seats: Any, mates:
     t_in = piece_value(since(piece, origin), now)
     here = bus_unit.point_now(seat, shared, mates, time)
     if not frame.accepted(chip, t_in):
-        event_log.write_event(written, j, origin + now, event_log.REFUSED, Mode(0, 0, 0, 0, 0), here.y.q)
+        bus_records.write_event(written, j, origin + now, bus_records.REFUSED, Mode(0, 0, 0, 0, 0), here.y.q)
     v_m, V_bus = 0.0, chip.V_oc
     if chip.beta != 0.0 or chip.c_s != 0.0:
         _, v_m, V_bus = _currents(j, count, shared, seats, mates, here.y, time)
@@ -311,8 +311,8 @@ def _currents(j: int, count: int, shared: Any, seats: Any, mates: Any, y: Vector
         V_bus = _alone_on_bus(seats[last], bus_unit.numbers_now(seats[last]), there.y)[2]
     else:
         V_bus = bus_voltage(count, shared, seats, mates, time)
-    stiff = warm(bus_side.on_stiff_source(own, False), y)
-    u = bus_side.part_on_bus(drive, own.bridge, seat.shown.duty, y) * V_bus if drive != 0.0 else 0.0
+    stiff = warm(currents.on_stiff_source(own, False), y)
+    u = currents.part_on_bus(drive, own.bridge, seat.shown.duty, y) * V_bus if drive != 0.0 else 0.0
     zone = currents.zone_of(stiff, u, 0.0, y.q, y.w_m, y.i)
     i = y.i if inductive(stiff.motor) else currents.current(stiff, zone, u, y.q, y.w_m)
     return i, terminal_voltage(stiff.bridge, stiff.source, stiff.motor, u, y.w_m, i, V_bus), V_bus
@@ -334,7 +334,7 @@ def bus_voltage(count: int, shared: Any, seats: Any, mates: Any, time: float) ->
             y = bus_unit.point_now(seat, shared, mates, time).y
             bus_unit.take_part(seat, k, others[connected], y, y)
             connected += 1
-    return shared_source.put_in_zones(source, others, connected, source.V)[1]
+    return coupled_step.put_in_zones(source, others, connected, source.V)[1]
 
 
 # --- motions ----------------------------------------------------------------------------------------------------------

@@ -1,4 +1,8 @@
-"""Which way the current flows and how large it is: behind a bridge, or where the voltage follows the error."""
+"""Which way the current flows and how large it is: behind a bridge, or where the voltage follows the error.
+
+A servo whose bus voltage is given has u = s V_bus in its circuit, where s is the sign, or the duty of a bridge under
+PWM; its numbers are those of a stiff source.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +17,18 @@ from servotwin.models.state.modes import (
     limited,
     sign_of,
 )
-from servotwin.models.terms import bridge, follower, source
+from servotwin.models.terms import bridge, duty, follower, source
+from servotwin.models.terms import source as source_term
+from servotwin.models.terms.bridge import Bridge, coasts
 from servotwin.models.terms.elastic import turning
 from servotwin.models.terms.motor import inductive
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import error_of, error_rate
+from servotwin.models.terms.source import Source
 from servotwin.physics import motor
 from servotwin.physics.bridge import bridge_current
 
+# --- Which way the current flows and how large it is ------------------------------------------------------------------
 
 def by_current(numbers: Numbers, zone: int) -> bool:
     """Tell whether a zone behind a bridge lasts as long as its current does: where the current has inertia."""
@@ -133,3 +141,47 @@ def stall_current(numbers: Numbers, V: float) -> float:
         i = bridge_current(V, 0.0, numbers.bridge.D_drive, numbers.bridge.R_drive)
         return min(i, numbers.source.I_max)
     return motor.steady_armature_current(numbers.follower.V_max, 0.0, numbers.motor.R, numbers.motor.K_b)
+
+# --- A servo whose bus voltage is given -------------------------------------------------------------------------------
+
+_BLOCKS = 1e300  # V
+
+
+def on_stiff_source(numbers: Numbers, returning: bool) -> Numbers:
+    """Return a servo whose bus voltage is given: driven, or returning current through its diodes."""
+    path, source = numbers.bridge, numbers.source
+    if not returning:
+        return driven(numbers, path.D_drive, path.R_drive - source.R_b)
+    R = path.off.R if source_term.regulated(source) else path.off.R - source.R_b
+    return driven(numbers, max(path.D_drive, 1e-300), R)  # a diode without drop still has a direction
+
+
+def driven(numbers: Numbers, D: float, R: float) -> Numbers:
+    """Return a servo whose bus voltage is given and drives it with so much drop [V] and resistance [Ω]."""
+    path = numbers.bridge
+    return numbers._replace(bridge=path._replace(D_drive=D, R_drive=R), source=Source(numbers.source.V, 0.0, math.inf))
+
+
+def blocked(numbers: Numbers) -> Numbers:
+    """Return a servo whose diodes block: no voltage of the bus drives a current in it, whatever its speed jumps to."""
+    path = numbers.bridge
+    return numbers._replace(bridge=path._replace(D_drive=_BLOCKS))
+
+
+def is_connected(numbers: Numbers, drive: float, y: Vector) -> bool:
+    """Tell whether a motor is connected to the bus: driven, or through the diodes of a bridge that coasts."""
+    return drive != 0.0 or (coasts(numbers.bridge) and (y.i != 0.0 or y.w_m != 0.0))
+
+
+def sign_on_bus(drive: float, y: Vector) -> float:
+    """Return the sign of the bus voltage in a circuit, driven or (0) through the diodes of a coasting bridge."""
+    if drive != 0.0:
+        return drive
+    # against the current, or against the one that the back-EMF would drive
+    return -math.copysign(1.0, y.i) if y.i != 0.0 else math.copysign(1.0, y.w_m)
+
+
+def part_on_bus(drive: float, path: Bridge, now: float, y: Vector) -> float:
+    """Return which part of the bus voltage is in a circuit, with its sign; `now` is the duty of a bridge under PWM."""
+    sign = sign_on_bus(drive, y)
+    return sign * duty.share_of(path, now) if duty.present(path) else sign

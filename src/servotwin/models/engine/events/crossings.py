@@ -1,8 +1,8 @@
-"""What comes after the end of a mode: how it goes on, and where a guard has reached zero."""
+"""What comes after the end of a mode, and what events are called."""
 
 from __future__ import annotations
 
-from servotwin.models.engine.dynamics import contacts, currents, spring_contact
+from servotwin.models.engine.dynamics import contacts, currents, guards, spring_contact
 from servotwin.models.engine.dynamics.guards import (
     CORE_BACKWARD,
     CORE_FORWARD,
@@ -28,11 +28,15 @@ from servotwin.models.engine.dynamics.guards import (
 )
 from servotwin.models.state.modes import (
     BACKWARD,
+    CONDUCTING,
     CORE,
     FORWARD,
     FREE,
     INSIDE,
+    LIMITED_BACKWARD,
+    LIMITED_FORWARD,
     LOOSE,
+    NO_CURRENT,
     ON_BACKWARD,
     ON_FORWARD,
     ON_LOWER,
@@ -43,12 +47,14 @@ from servotwin.models.state.modes import (
     TRAIL_FORWARD,
     Mode,
     Vector,
+    at_rest,
     moving,
 )
 from servotwin.models.terms import elastic, heat, play, source
 from servotwin.models.terms.friction import creeping_speed, smoothed
 from servotwin.models.terms.numbers import Numbers, warm
 
+# --- What comes after the end of a mode: how it goes on, and where a guard has reached zero ---------------------------
 
 def cross(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:
     """Return mode and state just after the guard `kind` of `mode` has reached zero."""
@@ -154,3 +160,39 @@ def _with_current_at_edge(numbers: Numbers, zone: int, kind: int, u: float, y: V
     low, high = currents.zone_limits(numbers, zone, u)
     i = high if kind == ZONE_UP else low
     return Vector(y.q, y.w, 0.0 if i == 0.0 else i, y.T_w, y.T_h, y.q_m, y.w_m)
+
+# --- What events are called: by a number in compiled code, by words everywhere else -----------------------------------
+
+NAMES = (
+    *guards.EVENT_NAMES, "stick", "reversal", "current limited", "current stops", "current starts", "gear held",
+    "drive backward", "drive ends", "drive forward", "silence ends", "silence begins", "pulse refused", "trip ends",
+    "trips by overload", "trips by current", "trips by heat", "trips by undervoltage")
+"""By their numbers; of several of one name the first is used."""
+_FIRST = tuple(guards.EVENT_NAMES.index(name) for name in guards.EVENT_NAMES)
+STICK, REVERSAL, LIMITED, STOPS, STARTS, HELD = range(len(guards.EVENT_NAMES), len(guards.EVENT_NAMES) + 6)
+DRIVE_ENDS, SILENCE_ENDS, REFUSED, TRIP_ENDS = HELD + 2, HELD + 4, HELD + 6, HELD + 7
+"""Beside `DRIVE_ENDS` stand both drives, behind `SILENCE_ENDS` that it begins, behind `TRIP_ENDS` the trips."""
+NO_EVENT, _ZONE = -1, guards.EVENT_NAMES.index("zone")
+
+
+def is_usual(kind: int) -> bool:
+    """Tell whether an event comes with every pulse: of a bridge's drive, or of the zone of its current."""
+    return kind == _ZONE or LIMITED <= kind <= STARTS or DRIVE_ENDS - 1 <= kind <= DRIVE_ENDS + 1
+
+
+def kind_of(ended_by: int, after: Mode) -> int:
+    """Return the number of an event that ends a mode (a guard) and after which another one holds.
+
+    It is `NO_EVENT` for what nobody would see.
+    """
+    if ended_by < 0 or ended_by == guards.SHARE or ended_by == guards.CREEPS:
+        return NO_EVENT
+    if ended_by == guards.SPEED and at_rest(after.contact):
+        return STICK
+    if ended_by == guards.SPEED and after.contact != CORE:
+        return REVERSAL
+    if after.zone >= CONDUCTING and (ended_by == guards.ZONE_UP or ended_by == guards.ZONE_DOWN):
+        if after.zone == LIMITED_BACKWARD or after.zone == LIMITED_FORWARD:
+            return LIMITED
+        return STOPS if after.zone == NO_CURRENT else STARTS
+    return _FIRST[ended_by]

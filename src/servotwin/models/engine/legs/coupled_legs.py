@@ -3,27 +3,32 @@
 How much a series bends within a leg is bounded by its coefficients: |x(t) − chord| ≤ h² max|ẍ|/8, and ẋ keeps its sign
 where h |ẋ(0)| > h² max|ẍ|. So it is mostly enough to look at both ends of a leg; guards that may fall below zero on the
 way are followed, as the general engine has them.
+
+A guard is written in parts of the leg, Σ c_n xⁿ with x from 0 to 1, so that its value, its slope and a bound of how
+much it bends are sums of coefficients.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from servotwin.models.engine.dynamics import contacts, currents, guards
-from servotwin.models.engine.dynamics.bus_side import driven, part_on_bus
+from servotwin.models.engine.dynamics.currents import driven, part_on_bus
 from servotwin.models.engine.events import crossings
-from servotwin.models.engine.legs import coupled_series, legs
-from servotwin.models.engine.legs.coupled_events import first_end
-from servotwin.models.engine.legs.coupled_laws import follow, put_law_of
-from servotwin.models.engine.legs.coupled_series import put_after, voltage_at
+from servotwin.models.engine.legs import coupled_units, legs
 from servotwin.models.engine.legs.coupled_units import (
+    follow,
+    put_after,
+    put_law_of,
     put_unit_mode,
     put_unit_numbers,
     put_unit_state,
+    state_at,
     unit_mode,
     unit_numbers,
     unit_state,
+    voltage_at,
 )
 from servotwin.models.engine.legs.legs import MOST_SHORT, SHORT
 from servotwin.models.state.modes import (
@@ -37,18 +42,293 @@ from servotwin.models.state.modes import (
     sign_of,
 )
 from servotwin.models.terms import bridge, duty, play
+from servotwin.models.terms.friction import core_speed
 from servotwin.models.terms.numbers import warm
 from servotwin.physics.motor import back_emf
+
+# --- What ends the mode of a servo on a coupled leg, and when: guards along power series, and their roots -------------
+
+# --- Guards that look at places and speeds alone, along a coupled leg -------------------------------------------------
+BY_PLACE = 1 << guards.SPEED | 1 << guards.MOTOR_SPEED | guards.MEETINGS | guards.STOPS
+_STEPS = 100  # of a search, which takes four
+_COURSE_INSTANT, _COURSE_ROUNDING = 1e-16, 1e-16  # s and units of a guard, within which a root is found
+_NEAR = 1e-4  # of a leg: how well the time of a least value is found, whose square counts
+_RISES = 50  # halvings of a leg, to see a guard that starts at zero rise
+
+
+def first_below(unit: Any, kind: int, terms: int, length: float) -> float:
+    """Return when a guard of a servo falls below zero along a leg [s]; inf: it does not."""
+    bend, last = _put_course(unit, kind, terms, length)
+    first = unit.course[0]
+    if first < guards.BELOW:  # what another one did has ended this mode too
+        return 0.0
+    if last < guards.BELOW:
+        return length * _course_crossing(unit.course, terms, 1.0, last, _COURSE_INSTANT / length)
+    if min(first, last) >= 0.125 * bend or abs(unit.course[1]) >= bend:  # the chord bounds it, or it is monotone
+        return math.inf
+    lowest = _lowest(unit.course, terms)
+    least = _value(unit.course, terms, lowest)
+    if least >= guards.BELOW:
+        return math.inf
+    return length * _course_crossing(unit.course, terms, lowest, least, _COURSE_INSTANT / length)
+
+
+def _put_course(unit: Any, kind: int, terms: int, length: float) -> tuple[float, float]:
+    """Write a guard of a servo as a series in parts of a leg; return a bound of its second derivative, and its end."""
+    y, law, mode, start = unit.y, unit.law, unit.mode, 0.0
+    motor = output = 0.0  # what counts of the speed of what the motor turns, and of the output's alone
+    angle = True
+    if kind == guards.SPEED:
+        way, angle = 1.0 if mode.contact == FORWARD else -1.0, False
+        start = -core_speed(unit_numbers(unit.numbers).friction)
+        if mode.mesh == INSIDE:
+            output = way * law.apart
+        else:
+            motor = way * law.moves
+    elif kind == guards.MOTOR_SPEED:
+        motor, angle = law.moves if mode.motor == FORWARD else -law.moves, False
+    elif kind == guards.MEET_FORWARD or kind == guards.MEET_BACKWARD:
+        way = 1.0 if kind == guards.MEET_FORWARD else -1.0
+        start = unit.numbers.play.half - way * (y.q_m - y.q)
+        motor, output = -way * law.moves, way * law.apart
+    else:
+        way = 1.0 if kind == guards.UPPER else -1.0
+        start = way * ((unit.numbers.stops.upper if kind == guards.UPPER else unit.numbers.stops.lower) - y.q)
+        if mode.mesh == INSIDE:
+            output = -way * law.apart
+        else:
+            motor = -way * law.moves
+    return _in_parts(unit, angle, start, motor, output, terms, length)
+
+
+def _in_parts(unit: Any, angle: bool, start: float, motor: float, output: float, terms: int,
+              length: float) -> tuple[float, float]:
+    """Write what begins so and turns with these parts of both speeds, or is them."""
+    bend, power, lag = 0.0, 1.0, 1 if angle else 0
+    unit.course[0] = start
+    if not angle:
+        unit.course[0] += _of_both(unit, motor, output, 0)
+    end = unit.course[0]
+    for n in range(1, terms + 1 + lag):
+        power *= length
+        c = _of_both(unit, motor, output, n - lag) * power
+        if angle:
+            c /= n
+        unit.course[n] = c
+        end += c
+        bend += n * (n - 1) * abs(c)
+    if not angle:
+        unit.course[terms + 1] = 0.0
+    return bend, end
+
+
+def _of_both(unit: Any, motor: float, output: float, n: int) -> float:
+    """Return a coefficient of so much of both speeds; of one that does not count it may be anything."""
+    c = 0.0
+    if motor != 0.0:
+        c = motor * unit.speed[n]
+    if output != 0.0:
+        c += output * unit.output[n]
+    return c
+
+
+def _value(course: Any, terms: int, x: float) -> float:
+    f = 0.0
+    for n in range(terms + 1, -1, -1):
+        f = f * x + course[n]
+    return f
+
+
+def _value_and_slope(course: Any, terms: int, x: float) -> tuple[float, float]:
+    f = slope = 0.0
+    for n in range(terms + 1, 0, -1):
+        f = f * x + course[n]
+        slope = slope * x + f
+    return f * x + course[0], slope
+
+
+def _slope_and_bend(course: Any, terms: int, x: float) -> tuple[float, float]:
+    slope = bend = 0.0
+    for n in range(terms + 1, 1, -1):
+        slope = slope * x + n * course[n]
+        bend = bend * x + slope
+    return slope * x + course[1], bend
+
+
+def _lowest(course: Any, terms: int) -> float:
+    """Return where a guard is least that turns once at most, 0 or 1 where that is at an end: where its slope rises."""
+    a, slope = 0.0, float(course[1])
+    b, end = 1.0, _slope_and_bend(course, terms, 1.0)[0]
+    if slope >= 0.0 or end <= 0.0:
+        return 0.5 if slope > 0.0 and end > 0.0 else 0.0
+    x = slope / (slope - end)
+    for _ in range(_STEPS):
+        slope, bend = _slope_and_bend(course, terms, x)
+        if slope < 0.0:
+            a = x
+        else:
+            b = x
+        new = x - slope / bend if bend > 0.0 else 0.5 * (a + b)
+        if not a < new < b:
+            new = 0.5 * (a + b)
+        if abs(new - x) <= _NEAR or b - a <= _NEAR:
+            return new
+        x = new
+    return x
+
+
+def _course_crossing(course: Any, terms: int, b: float, f_b: float, instant: float) -> float:
+    """Return where a guard falls below zero, between the beginning and where it is below, by Newton's method.
+
+    Both in parts of a leg. Where a step would lead out of what is known to hold the root, half of that is taken.
+    """
+    a, f_a = 0.0, float(course[0])
+    if f_a <= -guards.BELOW:  # it starts at zero, to rounding: look whether it rises before it falls
+        for _ in range(_RISES):
+            a = 0.5 * b
+            f_a = _value(course, terms, a)
+            if f_a > -guards.BELOW:
+                break
+            b, f_b = a, f_a
+        if f_a <= -guards.BELOW or f_b > 0.0:
+            return 0.0
+    x = a + (b - a) * f_a / (f_a - f_b)
+    for _ in range(_STEPS):
+        f, slope = _value_and_slope(course, terms, x)
+        if abs(f) <= _COURSE_ROUNDING:
+            return x
+        if f > 0.0:
+            a = x
+        else:
+            b = x
+        new = x - f / slope if slope < 0.0 else 0.5 * (a + b)
+        if abs(new - x) <= instant:
+            return min(max(new, a), b)
+        if not a < new < b:
+            new = 0.5 * (a + b)
+        x = new
+    return b
+
+
+# --- What ends the mode of a servo on a coupled leg, and when: guards along power series, and their roots -------------
+_HALVINGS = 200
+_INSTANT, _ROUNDING = 1e-16, 1e-16  # s and units of a guard, within which a root is found
+
+
+class Place(NamedTuple):
+    """Where a servo is along a leg: how long after its beginning [s], the voltage in its circuit [V], its state."""
+
+    s: float
+    u: float
+    y: Vector
+
+
+def first_end(unit: Any, common: Any, doubtful: int, length: float, last: bool) -> tuple[int, float]:
+    """Return which doubtful guard of a servo falls below zero first along a leg (−1: none), and when [s].
+
+    Where it is the `last` instant it counts as well. A guard turns once at most, about where a parabola does.
+    """
+    found, first, kinds = -1, length, doubtful
+    for kind in range(guards.KINDS):
+        if (kinds & BY_PLACE) >> kind & 1:
+            s = first_below(unit, kind, common.terms, length)
+            if s < first or (s == first and found < 0 and last):
+                found, first = kind, s
+    kinds &= ~BY_PLACE
+    if kinds == 0:
+        return found, first
+    end = first
+    at_start = _place(unit, common, 0.0)
+    at_end = _place(unit, common, end)
+    for kind in range(guards.KINDS):
+        if kinds >> kind & 1:
+            s = _below(unit, common, kind, at_start, at_end)
+            if s < first or (s == first and found < 0 and last):
+                found, first = kind, s
+    return found, first
+
+
+def _below(unit: Any, common: Any, kind: int, at_start: Place, at_end: Place) -> float:
+    """Return when a guard that looks at torques falls below zero between two places [s]; inf: it does not."""
+    f, f_end, length = _guard(unit, kind, at_start), _guard(unit, kind, at_end), at_end.s
+    if f < guards.BELOW:  # what another one did has ended this mode too
+        return 0.0
+    if f_end < guards.BELOW:
+        return _crossing(unit, common, kind, 0.0, f, length, f_end)
+    lowest = _place(unit, common, 0.5 * length)
+    least = _guard(unit, kind, lowest)
+    bend = f - 2.0 * least + f_end
+    turn = 0.25 * (3.0 * f - 4.0 * least + f_end) / bend * length if bend > 0.0 else -1.0
+    if least >= guards.BELOW and 0.0 < turn < length:
+        lowest = _place(unit, common, turn)
+        least = _guard(unit, kind, lowest)
+    if least >= guards.BELOW:
+        return math.inf
+    return _crossing(unit, common, kind, 0.0, f, lowest.s, least)
+
+
+def _place(unit: Any, common: Any, s: float) -> Place:
+    """Return where a servo is at s [s] after the beginning of a leg."""
+    y = state_at(unit, common.terms, s)
+    return Place(s, unit.sign * voltage_at(common, s), y)
+
+
+def _guard(unit: Any, kind: int, place: Place) -> float:
+    """Return a guard of a servo somewhere along a leg."""
+    return guards.guard(unit_numbers(unit.numbers), unit_mode(unit.mode), kind, place.u, 0.0, unit.torque, 0.0,
+                        place.y, place.y)[0]
+
+
+def _crossing(unit: Any, common: Any, kind: int, a: float, f_a: float, b: float, f_b: float) -> float:
+    """Return when a guard falls below zero, between two times [s] at which it is at least zero, to rounding, and below.
+
+    By inverse parabolas where they are sure to lead on, else by halves (Chandrupatla 1997).
+    """
+    if f_a <= -guards.BELOW:  # it starts at zero, to rounding: look whether it rises before it falls
+        start = a
+        for _ in range(50):
+            a = start + 0.5 * (b - start)
+            place = _place(unit, common, a)
+            f_a = _guard(unit, kind, place)
+            if f_a > -guards.BELOW:
+                break
+            b, f_b = a, f_a
+        if f_a <= -guards.BELOW or f_b > 0.0:
+            return start
+    new, f_new, old, f_old, part = b, f_b, a, f_a, f_a / (f_a - f_b)
+    part = 1.0 - part
+    for _ in range(_HALVINGS):
+        s = new + part * (old - new)
+        place = _place(unit, common, s)
+        f = _guard(unit, kind, place)
+        if (f > 0.0) == (f_new > 0.0):
+            third, f_third = new, f_new
+        else:
+            third, f_third = old, f_old
+            old, f_old = new, f_new
+        new, f_new = s, f
+        least = _INSTANT / abs(old - new)
+        if abs(f) <= _ROUNDING:
+            return s
+        if least > 0.5:
+            break
+        xi, phi = (new - old) / (third - old), (f_new - f_old) / (f_third - f_old)
+        part = 0.5
+        if phi * phi < xi and (1.0 - phi) * (1.0 - phi) < 1.0 - xi:
+            part = (f_new / (f_old - f_new) * f_third / (f_old - f_third)
+                    + (third - new) / (old - new) * f_new / (f_third - f_new) * f_old / (f_third - f_old))
+        part = min(max(part, least), 1.0 - least)
+    return new if f_new <= 0.0 else old
+
+# --- Legs of servos on one supply -------------------------------------------------------------------------------------
 
 MOST_LEGS = 400  # to one instant; servos that need more are left to the general engine
 _LEAST = 0.05  # of the open-circuit voltage: below, buses are left to the general engine
 _SAME = 1e-14  # of that
 _CLOSE = 1e-13  # A
-
 _ZONES = 1 << guards.ZONE_UP | 1 << guards.ZONE_DOWN
 _BY_TORQUE = 1 << guards.SHARE | 1 << guards.PART
 _AT_REST = ~(_ZONES | 1 << guards.SPEED | guards.MEETINGS | guards.STOPS)  # what ends rest of what the motor turns
-
 DONE, LEFT = 1, 0
 ZONE, DUTY = 1, 2  # why a mode has to be found anew
 
@@ -171,8 +451,8 @@ def go(units: Any, count: int, common: Any, time: float) -> float:
             moving = moving or units[k].active != 0
         if not moving or not left > 0.0:
             return time
-        length = min(left, coupled_series.longest(units, count))
-        coupled_series.work_out(units, count, common, length)
+        length = min(left, coupled_units.longest(units, count))
+        coupled_units.work_out(units, count, common, length)
         whose, kind, end = _ending(units, count, common, length)
         if whose < 0:
             if not is_plain(units, count, common, common.then, True):
@@ -238,8 +518,6 @@ def jumps(kind: int) -> bool:
 
 
 # --- whether a mode lasts ---------------------------------------------------------------------------------------------
-
-
 def doubtful(unit: Any, common: Any, length: float) -> int:
     """Return which guards of a servo do not surely stay above zero along a leg, as a sum of 1 << kind."""
     law, mode, y, after, bend = unit.law, unit.mode, unit.y, unit.after, unit.bend

@@ -13,9 +13,9 @@ from typing import NamedTuple
 from servotwin.models.engine.dynamics import contacts, currents, guards
 from servotwin.models.engine.dynamics.coefficients import Apart, apart_coefficients, linear_coefficients
 from servotwin.models.engine.events import crossings
-from servotwin.models.engine.events.event_times import first_end
+from servotwin.models.engine.events.first_event import first_end
 from servotwin.models.engine.motions import first_order
-from servotwin.models.engine.motions.relative_motion import Course, both
+from servotwin.models.engine.motions.first_order import Course, both
 from servotwin.models.state.modes import INSIDE, ON_BACKWARD, ON_FORWARD, Mode, Vector, at_rest
 from servotwin.models.terms import play
 from servotwin.models.terms.numbers import Numbers

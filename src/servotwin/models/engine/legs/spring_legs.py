@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from servotwin.models.engine import step
 from servotwin.models.engine.dynamics import currents, guards, spring_contact
-from servotwin.models.engine.dynamics.rates import rates_of
+from servotwin.models.engine.dynamics.coefficients import rates_of
 from servotwin.models.engine.legs.legs import Gone
 from servotwin.models.engine.memory import Point
 from servotwin.models.engine.motions import motion, two_mass_series

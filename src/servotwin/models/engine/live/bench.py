@@ -6,14 +6,13 @@ from typing import Any
 
 from servotwin.models.engine import controller
 from servotwin.models.engine.bus import bus_unit
-from servotwin.models.engine.bus.bus_records import put_shared
+from servotwin.models.engine.bus.bus_records import Tape, put_shared
 from servotwin.models.engine.bus.coupled_motion import at_start
-from servotwin.models.engine.bus.event_log import Tape
 from servotwin.models.engine.lanes import Lanes, Tables, inputs_at
 from servotwin.models.engine.lanes import Told as ToldAll
-from servotwin.models.engine.live import making, stretch, together
 from servotwin.models.engine.live import posts as those
-from servotwin.models.engine.live import sender as transmitter
+from servotwin.models.engine.live import posts as transmitter
+from servotwin.models.engine.live import stretch, together
 from servotwin.models.engine.live.posts import Told
 from servotwin.models.engine.live.screen import NEXT, NO_LOW, USED, Looks, Screen, first_look
 from servotwin.models.engine.log import Log
@@ -31,9 +30,9 @@ _REST = 1e-9  # s, of the way: no part of its own
 
 
 def make(posts: Any, programs: Any, k: int, family: int, givens: Any, weights: Any) -> int:
-    """Make a servo of what is given of it and of what hangs on it; return `making.MADE`, or what forbids it."""
+    """Make a servo of what is given of it and of what hangs on it; return `posts.MADE`, or what forbids it."""
     post = posts[k]
-    return making.make(post, programs[k], family, making.given_in(givens[k]), making.weights_in(weights[k]))
+    return those.make(post, programs[k], family, those.given_in(givens[k]), those.weights_in(weights[k]))
 
 
 def begin(posts: Any, k: int, told: Told, memories: Memories) -> None:

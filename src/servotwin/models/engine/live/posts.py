@@ -1,25 +1,77 @@
-"""Servos at a bench as kernels keep them: a record for each, the pulses that they hear, and where they begin."""
+"""Servos at a bench as kernels keep them: how each is made, the pulses that it hears, and where it begins."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.models.engine.live import shapes
+from servotwin.loads.parts import STANDARD_GRAVITY
+from servotwin.models.engine.live import screen
 from servotwin.models.engine.live.screen import NO_LOW, USED, Lines, Low, Said, Switch
-from servotwin.models.engine.live.sender import is_lost, next_edge, pass_edge
 from servotwin.models.engine.memory import Inputs, Memories, in_force, memory_at, put_memory, put_started, with_bodies
 from servotwin.models.state.modes import INSIDE, RIGID, Vector
+from servotwin.models.state.noise import uniform
 from servotwin.models.state.records import record_reader, record_writer
-from servotwin.models.terms import play
-from servotwin.models.terms.chip import Chip
+from servotwin.models.terms import firmware, frame, packing, play, wiring
+from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware, takes_goals
+from servotwin.models.terms.frame import NO_CHIP, Chip
+from servotwin.models.terms.given import Given, Hung, either, inertia_on, is_given
 from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.sensor import stands
 from servotwin.physics.converter import generated_width, supplied_count
 from servotwin.physics.pieces import piece_value
 
 if TYPE_CHECKING:
     from servotwin.models.engine.live.screen import Floats
 
+# --- What sends the pulses: a frame clock whose rate may change, and frames that get lost -----------------------------
+
+_SAME = 1e-9  # of a frame: instants that are nearer are one
+
+
+class Sender(NamedTuple):
+    """A frame clock: of its frames `passed` have begun since `base`, and `number` in all."""
+
+    rate: float  # of frames [Hz]
+    lost: float  # share of the frames that are not sent
+    seed: int  # of which these are
+    base: float  # [s]
+    passed: int
+    number: int
+    time: float  # that the bench has come to [s]
+
+
+def next_edge(sender: Any) -> float:
+    """Return when the next frame begins [s]."""
+    edge: float = sender.base + sender.passed / sender.rate
+    return edge
+
+
+def snapped(sender: Any, time: float) -> float:
+    """Return a time, or that of the edge right next to it: what is a billionth of a frame away is the edge [s]."""
+    edge: float = sender.base + round((time - sender.base) * sender.rate) / sender.rate
+    return edge if abs(time - edge) * sender.rate <= _SAME and edge >= next_edge(sender) else time
+
+
+def tune(sender: Any, rate: float) -> None:
+    """Take another rate [Hz] from the next edge on: the frame that has begun stays as it is."""
+    sender.base, sender.passed, sender.rate = next_edge(sender), 0, rate
+
+
+def is_lost(sender: Any) -> bool:
+    """Tell whether the next frame gets lost; that is the same whatever came before."""
+    if sender.lost == 0.0 or sender.lost == 1.0:
+        return bool(sender.lost == 1.0)
+    return bool(uniform(sender.seed, sender.number) < sender.lost)
+
+
+def pass_edge(sender: Any) -> None:
+    """Let the next frame begin."""
+    sender.passed, sender.number = sender.passed + 1, sender.number + 1
+
+# --- Servos at a bench as kernels keep them ---------------------------------------------------------------------------
+
+# --- Servos at a bench as kernels keep them ---------------------------------------------------------------------------
 UNITS = ("us", "deg", "V")
 """Units of commands."""
 _SI = (1e-6, math.pi / 180.0, 1.0)
@@ -113,12 +165,12 @@ def take(post: Any, unit: int, shape: int, given: Floats, time: Floats, value: F
     pieces, and when these start [s].
     """
     follow = post.width if unit == 0 else post.angle if unit == 1 else post.voltage
-    count = shapes.shaped(shape, given, time, value, table)
-    shapes.scaled(table, count, _SI[unit], 0.0)
-    low, high, lowest, highest = shapes.extremes(table, count)
+    count = screen.shaped(shape, given, time, value, table)
+    screen.scaled(table, count, _SI[unit], 0.0)
+    low, high, lowest, highest = screen.extremes(table, count)
     ends[0], ends[1], ends[4], ends[5] = low, high, 1.0 * lowest, 1.0 * highest
-    shapes.scaled(table, count, follow.gain, follow.offset)
-    ends[2], ends[3], _, _ = shapes.extremes(table, count)
+    screen.scaled(table, count, follow.gain, follow.offset)
+    ends[2], ends[3], _, _ = screen.extremes(table, count)
     for n in range(count):
         table[n, 0] += start
     ends[6], ends[7] = table[lowest, 0], table[highest, 0]
@@ -246,3 +298,104 @@ def inputs_of(post: Any, k: int, servos: int, told: Told, programs: Any) -> Inpu
     edges = told.edges[at:at + (post.heard if post.pulsed == 1 else 0)]
     return Inputs(told.commands[first:first + count], told.curves[0:0], post.torque + post.push, 0.0, edges, curve,
                   post.seed, post.accuracy, programs[k:k + 1])
+
+
+# --- A servo at a bench, made of what is given of it and of what hangs on its shaft -----------------------------------
+AVERAGED, BOUNDED, PULSED, DIGITAL = range(4)
+FAMILIES = {"AveragedServo": AVERAGED, "AveragedServoInductive": AVERAGED, "BoundedServo": BOUNDED,
+            "PulseServo": PULSED, "PulseServoInductive": PULSED, "DigitalServo": DIGITAL}
+"""Which models are made alike."""
+MADE, NO_INERTIA = 0, 1  # how it ends
+_NONE = Follow(0.0, 0.0)
+
+
+class Weights(NamedTuple):
+    """What hangs on a shaft at a bench (SI); `torque` pushes towards smaller angles."""
+
+    inertia: float
+    viscous_friction: float
+    torque: float
+    coulomb_torque: float
+    mass: float  # at the end of an arm
+    arm: float  # length of it
+    hanging_angle: float
+
+
+given_in = record_reader("given_in", Given)
+weights_in = record_reader("weights_in", Weights)
+put_program = record_writer("put_program", Firmware)
+
+
+def make(post: Any, program: Any, family: int, given: Given, weights: Weights) -> int:
+    """Make a servo; return `MADE`, or what forbids it: then it is what it was."""
+    hung = hung_of(weights)
+    if (given.gear_backlash > 0.0 or given.gear_stiffness > 0.0) and not inertia_on(given, hung) > 0.0:
+        return NO_INERTIA
+    if family == PULSED:
+        put_numbers(post.numbers, packing.pulsed(given, hung, 0.0))
+    elif family == DIGITAL:
+        put_numbers(post.numbers, packing.digital(given, hung, 0.0))
+    elif family == BOUNDED:
+        put_numbers(post.numbers, packing.bounded(given, hung))
+    else:
+        put_numbers(post.numbers, packing.averaged(given, hung))
+    post.pulsed = 1 if family == PULSED or (family == DIGITAL and not takes_goals(given)) else 0
+    put_chip(post.chip, frame.pack(given, math.nan) if family == PULSED else NO_CHIP)
+    put_program(program, firmware.pack(given, math.nan) if family == DIGITAL else NO_FIRMWARE)
+    _tell(post, family, given)
+    post.torque = weights.torque
+    return MADE
+
+
+def hung_of(weights: Weights) -> Hung:
+    """Return a load as servos are made of it."""
+    return Hung(weights.inertia + weights.mass * weights.arm * weights.arm, weights.viscous_friction,
+                weights.coulomb_torque, 0.0, 0.0, weights.mass * STANDARD_GRAVITY * weights.arm, weights.hanging_angle,
+                0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def _tell(post: Any, family: int, given: Given) -> None:
+    """Note how a servo follows commands, and where it may begin."""
+    angle, width, voltage = _NONE, _NONE, _NONE
+    has_gain = is_given(given.electronics_voltage_to_pulse_gain)
+    post.lowest, post.highest = -math.inf, math.inf
+    if family == DIGITAL and takes_goals(given):
+        angle = Follow(1.0, 0.0)
+    elif family == DIGITAL or family == PULSED:
+        told = family == PULSED or (is_given(given.electronics_one_shot_slope)
+                                    and is_given(given.potentiometer_feedback_gain))
+        width = Follow(1.0, 0.0) if told else _NONE
+        if told and not stands(given):
+            angle = _line(wiring.pulse_of_angle(given))
+            voltage = _line(wiring.pulse_of_voltage(given)) if has_gain else _NONE
+    else:
+        averaged = family == AVERAGED
+        angle = _line(wiring.feedback_line(given))
+        width = _line(wiring.averaged_by_pulse(given) if averaged else wiring.bounded_by_pulse(given))
+        if has_gain:
+            voltage = _line(wiring.averaged_by_voltage(given) if averaged else wiring.bounded_by_voltage(given))
+    if family != AVERAGED:
+        post.lowest = either(given.stops_lower_angle, -math.inf)
+        post.highest = either(given.stops_upper_angle, math.inf)
+    if family == DIGITAL:
+        post.lowest = max(post.lowest, either(given.firmware_lower_goal, -math.inf))
+        post.highest = min(post.highest, either(given.firmware_upper_goal, math.inf))
+    put_follow(post.width, width)
+    put_follow(post.angle, angle)
+    put_follow(post.voltage, voltage)
+    put_lines(post.lines, Lines(_slope(voltage), _start(voltage), _slope(angle), _start(angle), _slope(width),
+                                _start(width), either(given.gear_gear_reduction, 1.0)))
+
+
+def _line(gain_and_offset: tuple[float, float]) -> Follow:
+    return Follow(gain_and_offset[0], gain_and_offset[1])
+
+
+def _slope(line: Follow) -> float:
+    """Return by how much a command changes with what the servo follows; 0 where it takes none."""
+    return 1.0 / line.gain if line.gain != 0.0 else 0.0
+
+
+def _start(line: Follow) -> float:
+    """Return the command where what the servo follows is 0."""
+    return -line.offset / line.gain if line.gain != 0.0 else 0.0

@@ -34,9 +34,9 @@ from servotwin.models.engine.run.lowest import lowest_on, voltage_at
 from servotwin.models.engine.run.run import as_now, mode_under, plant_of, run, told
 from servotwin.models.engine.step import COMPLETED, at_pulses
 from servotwin.models.terms import duty, firmware, source
-from servotwin.models.terms.chip import Chip
-from servotwin.models.terms.chip import present as pulsed_chip
 from servotwin.models.terms.elastic import turning
+from servotwin.models.terms.frame import Chip
+from servotwin.models.terms.frame import present as pulsed_chip
 from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.models.terms.sensor import wiper_at
 from servotwin.physics.pieces import piece_value

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from servotwin.models.engine.bus import event_log, event_queue, shared_source
-from servotwin.models.engine.bus.bus_records import numbers_of, put_numbers, source_of
-from servotwin.models.engine.bus.event_log import Tape
-from servotwin.models.engine.dynamics import bus_side
-from servotwin.models.engine.events import kinds
+from servotwin.models.engine.bus import bus_records, coupled_step, event_queue
+from servotwin.models.engine.bus.bus_records import Tape, numbers_of, put_numbers, source_of
+from servotwin.models.engine.dynamics import currents
+from servotwin.models.engine.events import crossings
 from servotwin.models.engine.lanes import inputs_at
 from servotwin.models.engine.live.posts import lines_of, low_of, put_low, put_said, said_of
 from servotwin.models.engine.live.screen import (
@@ -238,14 +237,14 @@ def _voltage(posts: Any, shared: Any, seats: Any, mates: Any, written: Tape, tim
         row, numbers = row_at(written.motions, posts[j].row), numbers_of(seats[j].numbers)
         said, y = _said_in(posts[j], row, earlier), _state_in(numbers, row, written.numbers, seats[j].accuracy, time)
         numbers = _now(numbers, said)
-        if bus_side.is_connected(numbers, said.drive, y):
+        if currents.is_connected(numbers, said.drive, y):
             mate = mates[count + connected]
-            put_numbers(mate.numbers, bus_side.on_stiff_source(numbers, said.drive == 0.0))
+            put_numbers(mate.numbers, currents.on_stiff_source(numbers, said.drive == 0.0))
             put_vector(mate.y, y)
-            mate.sign = bus_side.part_on_bus(said.drive, numbers.bridge, said.duty, y)
+            mate.sign = currents.part_on_bus(said.drive, numbers.bridge, said.duty, y)
             mate.returns = 1 if said.drive == 0.0 else 0
             connected += 1
-    return shared_source.put_in_zones(supply, mates[count:], connected, supply.V)[1]
+    return coupled_step.put_in_zones(supply, mates[count:], connected, supply.V)[1]
 
 
 def _see_all(told: Any, posts: Any, shared: Any, seats: Any, mates: Any, written: Tape, time: float, shown_at: float,
@@ -272,14 +271,14 @@ def _note_all(written: Tape, events: Any, rows: Any, used: Any) -> None:
     """Note what has happened that people are told of."""
     for n in range(written.used[1]):
         j, time, kind = int(written.events[n, 0]), written.events[n, 1], int(written.events[n, 2])
-        code = kinds.NO_EVENT
+        code = crossings.NO_EVENT
         if kind >= 0:
-            code = kinds.kind_of(kind, Mode(int(written.events[n, 3]), int(written.events[n, 4]), 0, 0, 0))
-        elif event_log.SILENCE <= kind <= event_log.SILENCE + 1:
-            code = kinds.SILENCE_ENDS + kind - event_log.SILENCE
-        elif kind == event_log.REFUSED:
-            code = kinds.REFUSED
-        elif event_log.TRIPS <= kind < event_log.TRIPS + 5:
-            code = kinds.TRIP_ENDS + kind - event_log.TRIPS
-        if code != kinds.NO_EVENT:
+            code = crossings.kind_of(kind, Mode(int(written.events[n, 3]), int(written.events[n, 4]), 0, 0, 0))
+        elif bus_records.SILENCE <= kind <= bus_records.SILENCE + 1:
+            code = crossings.SILENCE_ENDS + kind - bus_records.SILENCE
+        elif kind == bus_records.REFUSED:
+            code = crossings.REFUSED
+        elif bus_records.TRIPS <= kind < bus_records.TRIPS + 5:
+            code = crossings.TRIP_ENDS + kind - bus_records.TRIPS
+        if code != crossings.NO_EVENT:
             note(Screen(rows[j], events[j], used[USED * j:USED * j + USED]), time, code)

@@ -1,7 +1,14 @@
-"""Which motion begins in a mode: in closed form wherever that is linear, else one integrator step."""
+"""Which motion begins in a mode: in closed form wherever that is linear, else one integrator step.
+
+Friction that fades with speed is a magnitude of several torques through the gear: K_m τ_m − K_e τ_e, and while any
+static friction is left K_ms τ_m − K_es τ_e, and τ_e or τ_m + τ_e for what is quadratic in them. Where one of them
+changes its sign, rates have a kink, or jump. A step that leads across is less accurate than its error says, and so is
+what is interpolated within it.
+"""
 
 from __future__ import annotations
 
+from servotwin.models.engine.dynamics import currents, spring_contact
 from servotwin.models.engine.dynamics.coefficients import (
     against_of,
     apart_coefficients,
@@ -9,16 +16,8 @@ from servotwin.models.engine.dynamics.coefficients import (
     linear_coefficients,
     speed_coefficients,
 )
-from servotwin.models.engine.dynamics.guards import creeping
-from servotwin.models.engine.motions import (
-    dormand_prince,
-    kinks,
-    rodas,
-    stribeck,
-    two_mass_series,
-    warm_law,
-    warm_linear,
-)
+from servotwin.models.engine.dynamics.guards import creeping, geared
+from servotwin.models.engine.motions import dormand_prince, rodas, stribeck, two_mass_series, warm_linear
 from servotwin.models.engine.motions.motion import (
     APART,
     CREEP,
@@ -62,6 +61,7 @@ from servotwin.models.state.modes import (
     at_rest,
     constant_current,
     in_linear_zone,
+    slides,
 )
 from servotwin.models.terms import elastic, follower, friction, heat, load, motor, play, sensor, source
 from servotwin.models.terms.dependence import (
@@ -76,9 +76,63 @@ from servotwin.models.terms.dependence import (
     STEEP_W,
     TWO_BODIES,
 )
-from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.friction import Friction, fades, share, static_share
+from servotwin.models.terms.load import external_torque
+from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.physics.elementary import power
+from servotwin.physics.load_friction import torque_on_gear
 from servotwin.physics.pieces import Piece, piece_value
+
+# --- Kinks of friction that fades: a step by time ends where one is ---------------------------------------------------
+
+_CLOSE = 1e-6  # of a step: a kink that close to one of its ends is at that end
+_NOTHING = 1e-12  # of the torques: less than that has no sign
+IN_FLOATS = {"_CLOSE": 1e-3, "_NOTHING": 1e-5}
+
+
+def part_before(numbers: Numbers, mode: Mode, u: tuple[float, float], tau: tuple[float, float], before: Vector,
+                after: Vector) -> float:
+    """Return the part of a step by time after which there is a kink; 1 where there is none.
+
+    `u` and `tau` are the inputs at both ends.
+    """
+    if not fades(numbers.friction) or not slides(geared(numbers, mode)):
+        return 1.0
+    own = numbers.friction
+    m_0, e_0 = _through_gear(numbers, mode, u[0], tau[0], before)
+    m_1, e_1 = _through_gear(numbers, mode, u[1], tau[1], after)
+    none = _NOTHING * (abs(m_0) + abs(e_0) + abs(m_1) + abs(e_1))
+    part = _part(share(own, m_0, e_0), share(own, m_1, e_1), none)
+    if creeping(numbers, mode, before) or creeping(numbers, mode, after):
+        part = min(part, _part(static_share(own, m_0, e_0), static_share(own, m_1, e_1), none))
+        if _is_quadratic(own):
+            part = min(part, _part(e_0, e_1, none), _part(m_0 + e_0, m_1 + e_1, none))
+    return part
+
+
+def _is_quadratic(friction: Friction) -> bool:
+    return friction.K_mq > 0.0 or friction.K_eq > 0.0
+
+
+def _part(begin: float, end: float, none: float) -> float:
+    """Return the part of a step after which a torque changes its sign that goes from one value to another."""
+    if not ((begin < -none and end > none) or (end < -none and begin > none)):
+        return 1.0
+    part = begin / (begin - end)
+    return part if _CLOSE < part < 1.0 - _CLOSE else 1.0
+
+
+def _through_gear(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> tuple[float, float]:
+    """Return the torques of motor and load on the gear [N m], in +q."""
+    numbers = warm(numbers, y)
+    tau_m = currents.drive_torque(numbers, mode.zone, u, y)
+    if elastic.present(numbers.elastic):
+        return tau_m, spring_contact.on_gear(numbers, mode.mesh, tau, y)
+    if mode.mesh == INSIDE:
+        return tau_m, 0.0
+    return tau_m, torque_on_gear(external_torque(numbers.load, tau, y.q), y.w, numbers.shaft.b_out)
+
+# --- Which motion begins in a mode: in closed form wherever that is linear, else one integrator step ------------------
 
 _WITH_HEAT = ON_HEAT | ON_I | BY_SHARE | TWO_BODIES | FADING  # what may be asked of a step beside the straight law
 _TOLERANCE = 0.3  # error of one implicit step, relative to 1 + |state|: a part of the accuracy asked for
@@ -193,7 +247,7 @@ def _long_step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y:
         factor = min(6.0, max(0.15, 0.9 * power(size, -0.125))) if size > 0.0 else 6.0
         part = factor if size > 1.0 else min(
             stribeck.part_before(numbers, mode, y, y1),
-            kinks.part_before(numbers, mode, (piece_value(u, t0), piece_value(u, t0 + h)),
+            part_before(numbers, mode, (piece_value(u, t0), piece_value(u, t0 + h)),
                               (piece_value(tau, t0), piece_value(tau, t0 + h)), y, y1))
         if size <= 1.0 and (part == 1.0 or t0 + h * part == t0):
             following = max(step, h * factor) if h == most else h * factor  # a step that was cut short tells little
@@ -221,9 +275,9 @@ def _creep(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vec
 def _warming(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float, limit: float,
              accuracy: float) -> Motion:
     """Return a step of a servo that warms up, or a motion that is none where its rates are not apart."""
-    law = warm_law.law_of(numbers, mode, u.value, tau.value, y)
+    law = warm_linear.law_of(numbers, mode, u.value, tau.value, y)
     none = closed(IMPOSSIBLE, numbers, mode, u, tau, t0, y, NO_COEFFICIENTS, (0.0, 0.0), step)
-    if not warm_law.suits(law):
+    if not warm_linear.suits(law):
         return none
     h, found = warm_linear.follow(law, numbers.heat, y, limit, FINE * accuracy)
     if t0 + h == t0:

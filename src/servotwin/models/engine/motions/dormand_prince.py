@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from servotwin.models.engine.dynamics.rates import rates_of
+from servotwin.models.engine.dynamics.coefficients import rates_of
 from servotwin.models.state.modes import Mode, Vector
 from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.pieces import Piece, piece_value

@@ -11,8 +11,9 @@ from typing import NamedTuple
 from servotwin.models.engine.dynamics.coefficients import (
     apart_coefficients,
     current_of,
+    jacobian,
+    rates_of,
 )
-from servotwin.models.engine.dynamics.rates import jacobian, rates_of
 from servotwin.models.engine.motions import (
     dormand_prince,
     first_order,
@@ -20,10 +21,9 @@ from servotwin.models.engine.motions import (
     second_order,
     stribeck,
     two_mass_series,
-    warm_law,
     warm_linear,
 )
-from servotwin.models.engine.motions.relative_motion import Course, both
+from servotwin.models.engine.motions.first_order import Course, both
 from servotwin.models.engine.motions.rodas import Triple
 from servotwin.models.state.modes import (
     INSIDE,
@@ -120,7 +120,7 @@ def output_apart(numbers: Numbers, mode: Mode, u: Piece, tau: Piece) -> tuple[fl
 
 def _warm_step(motion: Motion, s: float) -> warm_linear.Step:
     """Return the step of a servo that warms up, of a length s [s]."""
-    law = warm_law.law_of(motion.numbers, motion.mode, motion.u.value, motion.tau.value, motion.start)
+    law = warm_linear.law_of(motion.numbers, motion.mode, motion.u.value, motion.tau.value, motion.start)
     return warm_linear.step(law, motion.numbers.heat, motion.start, s)
 
 

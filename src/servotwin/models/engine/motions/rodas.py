@@ -9,7 +9,7 @@ Julia Differential Equations package", BIT Numerical Mathematics 63, 27 (2023).
 
 from __future__ import annotations
 
-from servotwin.models.engine.dynamics.rates import rates_of
+from servotwin.models.engine.dynamics.coefficients import rates_of
 from servotwin.models.state.modes import Mode, Vector
 from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.pieces import Piece, piece_value

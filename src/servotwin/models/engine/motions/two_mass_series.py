@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from servotwin.models.engine.dynamics.rates import rates_of
+from servotwin.models.engine.dynamics.coefficients import rates_of
 from servotwin.models.engine.motions.elementary import fma
 from servotwin.models.state.modes import NOWHERE, Mode, Vector, sign_of
 from servotwin.models.terms import elastic, source

@@ -1,9 +1,11 @@
-"""A servo alone, as a program in C has it: told one pulse or goal at a time, it goes on, and tells of itself."""
+"""A servo alone, as a program in C has it: made of what is given of it, it goes on, and tells of itself."""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
+from servotwin.models.engine.demands import demanded
 from servotwin.models.engine.log import Log
 from servotwin.models.engine.memory import (
     SAME,
@@ -19,15 +21,19 @@ from servotwin.models.engine.observe import Observed, observed, told_by
 from servotwin.models.engine.run.run import as_now, mode_under, run, told
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.state.modes import INSIDE, RIGID, Vector
-from servotwin.models.terms import control, duty, play
-from servotwin.models.terms.chip import Chip
-from servotwin.models.terms.chip import present as pulsed_chip
+from servotwin.models.terms import control, duty, firmware, frame, packing, play, wiring
+from servotwin.models.terms.firmware import Firmware
+from servotwin.models.terms.frame import NO_CHIP, Chip
+from servotwin.models.terms.frame import present as pulsed_chip
+from servotwin.models.terms.given import Given, Hung
 from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.models.terms.wiring import Wiring, possible, rest_angle
-from servotwin.physics.pieces import piece_value
+from servotwin.physics.pieces import Piece, piece_value
 
 if TYPE_CHECKING:
     from servotwin.models.engine.lanes import Floats
+
+# --- A servo alone, as a program in C has it --------------------------------------------------------------------------
 
 READY, NOT_FINITE, NOT_POSSIBLE, BEFORE = 0, -1, -2, -3  # what a call is answered, beside the codes of a step
 
@@ -116,3 +122,42 @@ def at_motor(shown: Observed, N: float) -> Observed:
         shown.motor_torque / N, shown.load_torque, N * shown.motor_angle, N * shown.motor_speed, shown.load_angle,
         shown.feedback_voltage, shown.error_time, shown.drive, shown.winding_temperature, shown.housing_temperature,
         shown.duty, shown.goal_angle, shown.reference_angle, shown.trip)
+
+# --- A servo alone, made of what is given of it and of what hangs on its shaft ----------------------------------------
+
+def asks(servo: Alone, own: Firmware) -> int:
+    """Return all that a servo asks of the code that follows it: flags of `terms.dependence`."""
+    return demanded(servo.plant, servo.chip, own, Piece())
+
+
+def pulsed(given: Given, hung: Hung, error: float, torque: float, accuracy: float) -> Alone:
+    """Return an analog servo behind its bridge; `error` is that of its table where its feedback stands [V]."""
+    numbers = packing.pulsed(given, hung, error)
+    return Alone(numbers, frame.pack(given, math.nan), wiring.pulsed(given, math.nan), given.gear_gear_reduction,
+                 torque, numbers.heat.T_amb, accuracy)
+
+
+def digital(given: Given, hung: Hung, error: float, torque: float, accuracy: float) -> Alone:
+    """Return a digital servo behind its bridge, without its program."""
+    numbers = packing.digital(given, hung, error)
+    return Alone(numbers, NO_CHIP, wiring.digital(given, math.nan), given.gear_gear_reduction, torque,
+                 numbers.heat.T_amb, accuracy)
+
+
+def bounded(given: Given, hung: Hung, error: float, torque: float, accuracy: float) -> Alone:
+    """Return a servo whose voltage follows the error between its bounds."""
+    numbers = packing.bounded(given, hung)
+    return Alone(numbers, NO_CHIP, wiring.bounded(given), given.gear_gear_reduction, torque, numbers.heat.T_amb,
+                 accuracy)
+
+
+def averaged(given: Given, hung: Hung, error: float, torque: float, accuracy: float) -> Alone:
+    """Return a servo whose voltage follows the error without bound."""
+    numbers = packing.averaged(given, hung)
+    return Alone(numbers, NO_CHIP, wiring.averaged(given), given.gear_gear_reduction, torque, numbers.heat.T_amb,
+                 accuracy)
+
+
+def program(given: Given) -> Firmware:
+    """Return the program of a digital servo."""
+    return firmware.pack(given, math.nan)

@@ -6,7 +6,7 @@ import math
 from typing import Any, NamedTuple
 
 from servotwin.models.engine import controller
-from servotwin.models.engine.events import kinds
+from servotwin.models.engine.events import crossings
 from servotwin.models.engine.legs import legs, tick_legs
 from servotwin.models.engine.legs.tick_legs import LEGS, SPRING_LEGS
 from servotwin.models.engine.log import (
@@ -64,9 +64,9 @@ from servotwin.models.state.modes import RIGID, Mode, at_rest
 from servotwin.models.state.records import record_reader
 from servotwin.models.terms import control, duty, elastic, firmware, frame, play
 from servotwin.models.terms.bridge import heeds_silence
-from servotwin.models.terms.chip import Chip
-from servotwin.models.terms.chip import present as pulsed_chip
 from servotwin.models.terms.control import NOWHERE
+from servotwin.models.terms.frame import Chip
+from servotwin.models.terms.frame import present as pulsed_chip
 from servotwin.models.terms.heat import present as warms
 from servotwin.models.terms.motor import inductive
 from servotwin.models.terms.numbers import Numbers
@@ -166,7 +166,7 @@ def from_step_to_step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memo
         if log.counts[SHORT] >= legs.MOST_SHORT:
             memory, held = calmed(numbers, chip, inputs, memory)
             if has_rows(log.counts[KEEPS]) and held != 0:
-                write_event(log, time_of(memory), kinds.HELD, memory.point.y.q)
+                write_event(log, time_of(memory), crossings.HELD, memory.point.y.q)
     if firmware.present(inputs.firmware[0]):
         controller.pause(inputs, memory)
     return memory, COMPLETED
@@ -194,14 +194,14 @@ def _note(numbers: Numbers, chip: Chip, inputs: Inputs, before: Memory, trip: in
     """Write down what a step has brought: what chip or program did, the motion, and the event that ended it."""
     start, angle, was, now = origin_of(memory) + before.point.time, before.point.y.q, before.chip, memory.chip
     if now.drive != was.drive:
-        write_event(log, start, kinds.DRIVE_ENDS + int(now.drive), angle)
+        write_event(log, start, crossings.DRIVE_ENDS + int(now.drive), angle)
     if heeds_silence(numbers.bridge) and now.silent != was.silent:
-        write_event(log, start, kinds.SILENCE_ENDS + now.silent, angle)
+        write_event(log, start, crossings.SILENCE_ENDS + now.silent, angle)
     if pulsed_chip(chip) and now.number > was.number and frame.may_refuse(chip) and not frame.accepted(
             chip, pulse_width(inputs, before)):
-        write_event(log, start, kinds.REFUSED, angle)
+        write_event(log, start, crossings.REFUSED, angle)
     if firmware.present(inputs.firmware[0]) and memory.firm[0].trip != trip:
-        write_event(log, start, kinds.TRIP_ENDS + memory.firm[0].trip, angle)
+        write_event(log, start, crossings.TRIP_ENDS + memory.firm[0].trip, angle)
     if log.counts[KEEPS] == ALL and (time_of(memory) > start or log.counts[BEGUN] == 0):
         drive, told = now.drive, (0.0, 0.0, 0.0, 0)
         if firmware.present(inputs.firmware[0]):
@@ -210,8 +210,8 @@ def _note(numbers: Numbers, chip: Chip, inputs: Inputs, before: Memory, trip: in
             told = control.told_by(firm)
         write_motion(log, motion_row(0, origin_of(memory), before.point.time, memory.point.time, now.error,
                                      before.point.wiper, drive, now.silent, told, m))
-    kind = kinds.kind_of(event, memory.point.mode)
-    if kind != kinds.NO_EVENT:
+    kind = crossings.kind_of(event, memory.point.mode)
+    if kind != crossings.NO_EVENT:
         write_event(log, time_of(memory), kind, memory.point.y.q)
 
 

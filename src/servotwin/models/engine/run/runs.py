@@ -29,7 +29,7 @@ from servotwin.models.engine.run.run import from_step_to_step
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.state.modes import INSIDE, LOST, RIGID, Vector
 from servotwin.models.terms import firmware, play
-from servotwin.models.terms.chip import present as pulsed_chip
+from servotwin.models.terms.frame import present as pulsed_chip
 from servotwin.models.terms.numbers import Numbers
 
 if TYPE_CHECKING:

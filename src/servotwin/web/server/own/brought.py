@@ -11,7 +11,7 @@ from collections.abc import Callable, Coroutine
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.errors import InputError, ServotwinError
-from servotwin.simulation.lanes.load_columns import with_numbers
+from servotwin.simulation.lanes.inputs import with_numbers
 from servotwin.web.live.beginning import load_of
 from servotwin.web.server.limits import Allowance
 from servotwin.web.server.own.fits import Fits

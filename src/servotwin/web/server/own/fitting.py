@@ -13,7 +13,7 @@ import numpy as np
 from servotwin.identification import Fit, Log, identify
 from servotwin.identification.report.shown import error_shown, estimate_lines
 from servotwin.parameters.servo_file import servo_text
-from servotwin.simulation.workers import HERE
+from servotwin.simulation.progress import HERE
 from servotwin.text import file_stem
 from servotwin.web.lessons.mystery import guess_of
 from servotwin.web.live.overlay import of_the_bench, trace_facts

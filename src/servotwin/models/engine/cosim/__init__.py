@@ -1,1 +1,0 @@
-"""What another simulator does between ticks: it imposes states, reads signals, changes numbers."""
