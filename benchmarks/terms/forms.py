@@ -1,6 +1,6 @@
 """Part 9: each form in which lanes run beside the next general one: time of a lane, with the form and with it off.
 
-Of digital servos by `runs` it is the legs or series by which these go from tick to tick that are off.
+Of `digital` it is the legs or series by which these go from tick to tick that are off.
 
 A form stays where a servo of the catalog or a documented load runs in it, and it is over 1.5 times faster.
 """
@@ -31,8 +31,8 @@ CASES = (  # a form, and servos that run in it
     ("by_strides", st.PulseServo, "hitec-hs-755hb", {}, st.loads.Pendulum(mass=0.1, length=0.1)),
     ("by_ticks", st.DigitalServo, "dsservo-ds3218", {}, PLAIN),
     ("by_ticks", st.DigitalServo, "dynamixel-xl330-m077", {}, PLAIN),
-    ("runs", st.DigitalServo, "feetech-sts3215-12v", {}, PLAIN),
-    ("runs", st.DigitalServo, "feetech-sts3215-12v", HEAT, PLAIN))
+    ("digital", st.DigitalServo, "feetech-sts3215-12v", {}, PLAIN),
+    ("digital", st.DigitalServo, "feetech-sts3215-12v", HEAT, PLAIN))
 
 
 def seconds(kind: type, name: str, changes: dict[str, float], load: st.loads.Load, without: str = "") -> float:

@@ -19,6 +19,7 @@ from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.shaft import Shaft
 from servotwin.models.terms.source import Source
 from servotwin.simulation.lanes import whole_runs
+from servotwin.simulation.lanes.forms import RUNS
 from servotwin.simulation.lanes.packed import FIELDS, empty_raw
 from servotwin.simulation.lanes.whole_runs import run as run_lanes
 
@@ -130,7 +131,7 @@ GIVING_UP = ("stops", "everything", "all bands", "backlash, two decisions wait")
 
 def one_by_one(work):
     raw = empty_raw(work)
-    whole_runs.run_one_by_one(work, work.packed.columns(), np.arange(work.packed.size), raw)
+    whole_runs.run_one_by_one(work, work.packed.columns(), np.arange(work.packed.size), raw, RUNS)
     return raw
 
 

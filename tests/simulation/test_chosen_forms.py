@@ -21,7 +21,7 @@ from servotwin.models.terms.firmware import NO_FIRMWARE
 from servotwin.models.terms.frame import NO_CHIP
 from servotwin.physics.pieces import Piece
 from servotwin.simulation.lanes import forms
-from servotwin.simulation.lanes.forms import ALL_RUNS
+from servotwin.simulation.lanes.forms import DIGITAL
 from servotwin.simulation.lanes.packed import by_groups
 
 NOBODY = np.zeros(1, np.bool_)
@@ -65,9 +65,9 @@ OF_ANALOG = {
         "limit+creep creep+share creep+slack creep+coast"),
 }
 OF_DIGITAL = {
-    "runs, by legs": (  # the plain one has drops
+    "digital, by legs": (  # the plain one has drops
         "plain play share steps bend play+share play+steps play+bend share+steps share+bend steps+bend"),
-    "runs, by series": "heat limit play+heat play+limit heat+limit heat+share heat+steps limit+share limit+steps",
+    "digital, by series": "heat limit play+heat play+limit heat+limit heat+share heat+steps limit+share limit+steps",
 }
 OF_CATALOG = {
     "by_bands": (
@@ -77,7 +77,7 @@ OF_CATALOG = {
         "hitec-hs-645mg hitec-hs-755mg hitec-hs-805bb hitec-hs-81 hitec-hs-85bb power-hd-hd-1501mg "
         "unbranded-micro-13g"),
     "by_ticks": "dsservo-ds3218 dsservo-rds3115 dynamixel-xl330-m077 feetech-ft-7235 towerpro-mg995",
-    "runs, by legs": (
+    "digital, by legs": (
         "dynamixel-2xl430-w250 dynamixel-ax-12a dynamixel-mx-106 dynamixel-mx-28 dynamixel-mx-64 dynamixel-xc330-t288 "
         "dynamixel-xc430-w240 dynamixel-xl-320 dynamixel-xl330-m288 dynamixel-xl430-w250 dynamixel-xm430-w210 "
         "dynamixel-xm430-w350 emax-es08md feetech-ft-15m0 feetech-ft-2806 feetech-sts3215-12v feetech-sts3215-7v4 "
@@ -92,12 +92,12 @@ def form_of(model, load=NO_LOAD, dtype="float64", told=False, bent=False):
     pulsed, numbers, program = isinstance(model, PULSED), model.pack(load), model.firmware() or NO_FIRMWARE
     (kind,) = forms.kinds_with(
         numbers, model.chip() if pulsed else NO_CHIP, 1, dtype, NOBODY, NOBODY | told, bent, program)
-    if kind.recipe != ALL_RUNS or program == NO_FIRMWARE:
+    if kind.recipe != DIGITAL:
         return kind.recipe.name
     inputs = SimpleNamespace(torque=[()] * told, curve=[()] * bent, firmware=(program,))
     for way, part, asked in ((LEGS, "legs", False), (LEGS, "legs", True), (POWER_SERIES, "series", False)):
         if runs.way_of(numbers, inputs, SimpleNamespace(lowest=NOT_ASKED), 1.0, asked) == way:
-            (own,) = (one for one in ALL_RUNS.parts if one.name == part)
+            (own,) = (one for one in DIGITAL.parts if one.name == part)
             demands = forms.Terms(numbers, NO_CHIP, program, inputs=TABLE * bent | RECORDED * told)
             assert demands.suit(own.knows | own.leaves), part  # what its kernels leave out is not asked for
             if not asked:
@@ -124,12 +124,12 @@ def combined(kind, servo, names, dtype, rng):
     return form_of(kind(varied(servo.replace(own), rng)), load, dtype, "told" in names, "bend" in names)
 
 
-def expected(table, names):
-    """Return what is written down for a set of features."""
+def expected(table, names, general="runs"):
+    """Return what is written down for a set of features, or the general form."""
     if "spring" in names:
-        return "runs"
+        return general
     told = "+".join(names) or "plain"
-    return next((form for form, sets in table.items() if told in sets.split()), "runs")
+    return next((form for form, sets in table.items() if told in sets.split()), general)
 
 
 def pairs(without=()):
@@ -157,7 +157,7 @@ def test_servos_without_pulses_take_the_forms_that_they_took(servo):
 def test_digital_servos_take_the_forms_that_they_took(servo):
     rng = np.random.default_rng(3)
     for names in pairs(OF_PULSES):
-        form = expected(OF_DIGITAL, names)
+        form = expected(OF_DIGITAL, names, "digital")
         assert combined(st.DigitalServo, servo.replace(PROGRAM), names, "float64", rng) == form, names
 
 
@@ -168,7 +168,7 @@ def test_servos_of_the_catalog_take_the_forms_that_they_took():
         servo = st.load_servo(name)
         analog = servo.kind == "analog"
         found = form_of((st.PulseServo if analog else st.DigitalServo)(servo))
-        assert found == known.get(name, "runs"), name
+        assert found == known.get(name, "runs" if analog else "digital"), name
 
 
 @pytest.mark.long
@@ -183,7 +183,7 @@ def test_no_servo_of_today_needs_kernels_that_are_not_made_beforehand(servo):
         names = rng.permutation(own)[:rng.integers(3, 7)].tolist()
         digital = programs[rng.integers(len(programs))]
         assert combined(st.DigitalServo, digital, names, "float64", rng) in (
-            "by_ticks", "runs, by legs", "runs"), names
+            "by_ticks", "digital, by legs", "digital"), names
 
 
 def test_many_lanes_are_asked_what_each_of_them_is(servo):

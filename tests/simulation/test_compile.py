@@ -16,7 +16,7 @@ from servotwin.simulation.compile.building import printed
 from servotwin.simulation.compile.derive import derive
 from servotwin.simulation.compile.finding import compilers
 from servotwin.simulation.compile.translate import header
-from servotwin.simulation.lanes.forms import _BY_FORMULA, ALL_RUNS, CALM
+from servotwin.simulation.lanes.forms import _BY_FORMULA, CALM, DIGITAL, RUNS
 
 SLIDE = Recipe("slide", ("servotwin.models.engine.batch.linear_segments:slide",), vector=True)
 NUMBERS = ArcNumbers(60.0, 60.0, 0.2, 1 / 60.0, 1 / 60.0, 5.0, 330.0, 20.0, 5.0, 6.0, 0.4, 0.1, 33.0, 40.0, 5.0, 1.0,
@@ -74,7 +74,7 @@ def reached(name, functions):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("ending", ["phases__phases", "windows__divide"])
+@pytest.mark.parametrize("ending", ["phases__phases", "phases__divide"])
 def test_float32_stays_float32(ending):
     functions = functions_of(printed(_BY_FORMULA["float32"]).text.removeprefix(header()))
     (name,) = (each for each in functions if each.endswith(ending))
@@ -104,7 +104,7 @@ def test_two_processes_at_once(tmp_path):
 
 @pytest.mark.long
 def test_what_no_term_asks_for_is_left_out():
-    calm, loose, everything = (derive(one).text for one in (CALM, ALL_RUNS.parts[0], ALL_RUNS))
+    calm, loose, everything = (derive(one).text for one in (CALM, DIGITAL.parts[0], RUNS))
     assert not any(f"motions_choice__{name}" in calm for name in FLAGGED)
     assert all(f"motions_choice__{name}" in everything for name in FLAGGED)
     assert "terms_heat__warming_rates" in everything

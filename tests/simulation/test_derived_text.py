@@ -8,7 +8,7 @@ from servotwin.simulation import bus_run
 from servotwin.simulation.compile.derive import derive
 from servotwin.simulation.lanes import forms
 
-RECIPES = (bus_run.BUSES, forms.ALL_RUNS,
+RECIPES = (bus_run.BUSES, forms.RUNS, forms.DIGITAL,
            forms.CALM, forms.LOOK, forms.BY_TICKS,
            forms.TICKS)
 

@@ -7,7 +7,7 @@ import pytest
 from servotwin.models.engine.batch import tiles
 from servotwin.models.terms.numbers import ACTS
 from servotwin.simulation.compile import reading, unread
-from servotwin.simulation.lanes.forms import ALL_RUNS, side_by_side
+from servotwin.simulation.lanes.forms import DIGITAL, side_by_side
 
 pytestmark = pytest.mark.long
 
@@ -26,7 +26,7 @@ def folder(tmp_path, monkeypatch):
 def test_what_a_term_says_is_known_where_it_is_read(folder, monkeypatch):
     """Lanes side by side leave stops to others, and go through the play by a law of their own."""
     assert set(find(BY_GAPS)) == {"shaft.b_out", "stops.restitution"}
-    assert find(ALL_RUNS) == ()
+    assert find(DIGITAL) == ()
     monkeypatch.setattr(reading, "ACTS", ACTS)
     assert list(reading.unread_numbers(BY_GAPS, ())) == []
 

@@ -52,7 +52,7 @@ def calls():
     """Return calls of `runs` in a run of a few servos: name, what goes in, what comes out of this process."""
     found, call = [], Function.__call__
     names = {}
-    kernels = whole_runs.kernels(forms.ALL_RUNS)
+    kernels = whole_runs.kernels(forms.RUNS)
     for name in ("start", "go_on"):
         for function in getattr(kernels, name).functions:
             names[function] = name
@@ -80,7 +80,7 @@ def calls():
 def programs(tmp_path_factory):
     """Return a program for each target and entry."""
     folder = tmp_path_factory.mktemp("programs")
-    (folder / "kernels.c").write_text(printed(forms.ALL_RUNS).text)
+    (folder / "kernels.c").write_text(printed(forms.RUNS).text)
     found = {}
     for target in TARGETS:
         for name in ("start", "go_on"):

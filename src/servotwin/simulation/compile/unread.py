@@ -12,13 +12,14 @@ from servotwin.simulation.compile.recipe import Recipe
 from servotwin.simulation.compile.storage import is_there, kept_folder, key_of, write
 
 IN_GENERAL = "_in_general"
+FROM_TICK_TO_TICK = ("LEGS", "SPRING_LEGS", "POWER_SERIES")  # ways of going on that a program may take
 
 
 @cache
 def in_general(recipe: Recipe) -> Recipe:
     """Return a recipe in which no way of going on is chosen by the numbers that it knows."""
-    return replace(recipe, name=recipe.name + IN_GENERAL, parts=(),
-                   never=(*recipe.never, "LEGS", "SPRING_LEGS", "POWER_SERIES"))
+    return replace(recipe, name=recipe.name + IN_GENERAL, knows=-1, always=0, parts=(),
+                   never=(*recipe.never, *FROM_TICK_TO_TICK))
 
 
 @cache

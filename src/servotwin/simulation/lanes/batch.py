@@ -113,7 +113,7 @@ class Batch:
         >>> batch = st.simulate_many(st.DigitalServo(st.load_servo("feetech-sts3215-12v")),
         ...                          st.signals.constant(20.0, unit="deg"), duration=0.1)
         >>> batch.stats.kernel.tolist()
-        ['runs']
+        ['digital']
         """
         return BatchStats(np.array(KERNELS)[self.run_by])
 

@@ -55,7 +55,7 @@ from servotwin.models.terms.frame import NO_CHIP, Chip
 from servotwin.models.terms.numbers import NOTHING, ROOMS, Numbers
 from servotwin.physics.pieces import Piece
 from servotwin.simulation.compile import Recipe, is_plain
-from servotwin.simulation.compile.unread import IN_GENERAL, in_general, unread
+from servotwin.simulation.compile.unread import FROM_TICK_TO_TICK, IN_GENERAL, in_general, unread
 from servotwin.simulation.lanes.packed import Packed, by_groups, swept
 
 # --- The forms in which lanes run compiled ----------------------------------------------------------------------------
@@ -99,7 +99,7 @@ PLAIN = _PLAIN | PULSES | FOLLOWS | RECORDED
 _LEFT_TO_EVENTS = AT_STOPS | SHOWN | PULSES | STEPS
 CALM = Recipe("calm", ("servotwin.models.engine.batch.event_free:go",), knows=PLAIN & ~(
     _LEFT_TO_EVENTS | RECORDED | TABLE), leaves=_LEFT_TO_EVENTS)
-"""Ticks of lanes in which nothing happens, three times faster; the others are for `ALL_RUNS`."""
+"""Ticks of lanes in which nothing happens, three times faster; the others are for `RUNS`."""
 _TICKS = _PLAIN & ~ON_Q | _DIGITAL
 LEGS = _TICKS | PLAY | TWO_BODIES | BY_SHARE
 """What legs follow exactly."""
@@ -111,11 +111,13 @@ _BY_TICKS_ALONE = (
     Recipe("series", ("servotwin.models.engine.legs.coupled_ticks:alone",),  # warm windings, a supply with a limit
            knows=(LEGS & ~TABLE | ON_HEAT | REGULATED) & ~_LEFT_TO_RUNS, leaves=_LEFT_TO_RUNS, always=_ALWAYS))
 """Digital servos from tick to tick."""
-ALL_RUNS = Recipe("runs", _ENTRIES, never=WITH_ROWS, parts=_BY_TICKS_ALONE)
-"""All lanes: digital ones from tick to tick where that leads on, else from step to step."""
+RUNS = Recipe("runs", _ENTRIES, knows=~_DIGITAL, never=(*WITH_ROWS, *FROM_TICK_TO_TICK))
+"""All lanes without a program, from step to step."""
+DIGITAL = Recipe("digital", _ENTRIES, always=_ALWAYS, never=WITH_ROWS, parts=_BY_TICKS_ALONE)
+"""All that have one: from tick to tick where that leads on, else from step to step."""
 BY_TICKS = Recipe("by_ticks", ("servotwin.models.engine.batch.digital_batch:go_on",), vector=True,
                   knows=_TICKS & ~DROPS, always=_ALWAYS)
-"""Digital servos from tick to tick, side by side; what is left of a call is for `ALL_RUNS`. Two to three times faster
+"""Digital servos from tick to tick, side by side; what is left of a call is for `DIGITAL`. Two to three times faster
 for four servos of the catalog."""
 # Not compiled for its own sake: what these call says which numbers are known where a program goes in one loop
 _LEFT_BY_TICKS = _LEFT_TO_RUNS | BEYOND | ONE_WAY
@@ -134,13 +136,13 @@ TICKS = Recipe("ticks", (
         "show_records", "read_clocks", "take_status", "note_lost_buses", "break_up"))))
 """Lanes of all forms between two calls: what is imposed on them, and the way from tiles to records and back."""
 ENDING = Recipe("ending", ("servotwin.models.engine.cosim:look_at_lanes",), vector=True, knows=~_DIGITAL)
-_IN_RUNS = tuple((replace(part, entries=_ENTRIES, never=WITH_ROWS), part.entries) for part in ALL_RUNS.parts)
-_PARTS = {BY_TICKS: (_BY_TICKS, *_IN_RUNS), ALL_RUNS: _IN_RUNS}
+_IN_DIGITAL = tuple((replace(part, entries=_ENTRIES, never=WITH_ROWS), part.entries) for part in DIGITAL.parts)
+_PARTS = {BY_TICKS: (_BY_TICKS, *_IN_DIGITAL), DIGITAL: _IN_DIGITAL, RUNS: ()}
 
 
 def last_of(recipe: Recipe) -> Recipe:
     """Return the kernels that finish every call of lanes of a form."""
-    return ALL_RUNS if recipe == BY_TICKS else recipe
+    return DIGITAL if recipe == BY_TICKS else recipe
 
 
 def steps_of(recipe: Recipe, ended: Any, nearly: bool = False) -> Iterator[tuple[Recipe, str, tuple[Any, ...]]]:
@@ -168,8 +170,8 @@ def side_by_side(form: int, dtype: str) -> Recipe:
     return _BY_FORMULA[dtype] if form == tiles.ONE_FORMULA else _BY_FORM[form]
 
 
-KERNELS = tuple(sorted((*(one.name for one in (ALL_RUNS, BY_TICKS, *_BY_FORMULA.values(), *_BY_FORM.values())),
-                        ALL_RUNS.name + IN_GENERAL)))
+KERNELS = tuple(sorted((*(one.name for one in (RUNS, DIGITAL, BY_TICKS, *_BY_FORMULA.values(), *_BY_FORM.values())),
+                        RUNS.name + IN_GENERAL)))
 """Names of all kernels in which lanes run."""
 
 # --- Which lanes run in which form: the fastest that can follow what their terms do, else the general one -------------
@@ -302,7 +304,7 @@ def _of_analog(terms: Terms, left: Mask, dtype: str) -> Iterator[SideBySide | On
         if len(which):
             yield _together(terms, form, own_type, which)
     if not is_plain() and np.any(left & terms.suit(CALM.knows)):
-        yield OneByOne(_take(terms, left, ALL_RUNS, terms.fit(CALM)), ALL_RUNS, True)
+        yield OneByOne(_take(terms, left, RUNS, terms.fit(CALM)), RUNS, True)
     yield from _at_last(terms, left)
 
 
@@ -313,18 +315,18 @@ def _alone(terms: Terms, left: Mask) -> Iterator[OneByOne]:
     yield from _at_last(terms, sprung)
     if digital and not is_plain():
         yield OneByOne(_take(terms, left, BY_TICKS), BY_TICKS, quick=True)
-        yield OneByOne(_take(terms, left, ALL_RUNS, terms.suit(LEGS)), ALL_RUNS, quick=True)
+        yield OneByOne(_take(terms, left, DIGITAL, terms.suit(LEGS)), DIGITAL, quick=True)
     yield from _at_last(terms, left)
 
 
 def _at_last(terms: Terms, left: Mask) -> Iterator[OneByOne]:
     """Return how those run that no faster form takes: none that its kernels do not know either, as terms are now."""
+    runs = DIGITAL if np.any(terms.ask(PROGRAM)) else RUNS
     if is_plain():  # a fast form has no worth there, nor to ask for it
-        yield OneByOne(np.flatnonzero(left), ALL_RUNS)
+        yield OneByOne(np.flatnonzero(left), runs)
         return
-    known = terms.known_to(parts_of(ALL_RUNS)) if np.any(left & terms.ask(PWM)) else True
-    yield OneByOne(_take(terms, left, ALL_RUNS, known), ALL_RUNS)
-    yield OneByOne(np.flatnonzero(left), in_general(ALL_RUNS))
+    yield OneByOne(_take(terms, left, runs), runs)
+    yield OneByOne(np.flatnonzero(left), in_general(RUNS))
 
 
 def _take(terms: Terms, left: Mask, recipe: Recipe, wanted: Any = True) -> Indices:

@@ -114,7 +114,7 @@ class Tiles:
             lost = room._replace(memories=Memories(*(Some(array, number) for array in room.memories)), **first)
             put = call_of(TICKS, "to_tiles", Some(places, number), lost.which, lost.memories,
                           store.numbers.frame_period, rows)
-            return [gather, *_one_by_one(forms.ALL_RUNS, store, lost, number), put]
+            return [gather, *_one_by_one(forms.RUNS, store, lost, number), put]
 
         return Chain([advance], given_up)
 

@@ -16,9 +16,9 @@ from servotwin.models.state.records import record_of, room
 from servotwin.models.terms.control import Firm
 from servotwin.simulation.compile import Recipe, kernels
 from servotwin.simulation.lanes.forms import (
-    ALL_RUNS,
     ENDING,
     KERNELS,
+    RUNS,
     TICKS,
     OneByOne,
     SideBySide,
@@ -210,10 +210,10 @@ def run_side_by_side(work: Work, lanes: Lanes, kind: SideBySide, raw: Raw) -> No
         owed = flat(rows, "clock", "owed")[:len(which)]
         places = np.flatnonzero(owed > 0.0)
         _finish(work, lanes, which[places], owed[places], flat(rows, "count", "output")[places],
-                memories_of(rows, places), raw, ALL_RUNS)
+                memories_of(rows, places), raw, RUNS)
 
 
-def run_one_by_one(work: Work, lanes: Lanes, which: Indices, raw: Raw, recipe: Recipe = ALL_RUNS) -> None:
+def run_one_by_one(work: Work, lanes: Lanes, which: Indices, raw: Raw, recipe: Recipe) -> None:
     """Run some lanes one after the other, in float64."""
     memories = nothing_yet(len(which))
     kernels(last_of(recipe)).start(lanes, which, memories)
