@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import servotwin as st
-from servotwin.identification.fitting.baselines import fit_slew_lag
+from servotwin.identification.fitting.slew_lag import fit_slew_lag
 from servotwin.look import COLOURS, LINES, WIDTH, context, finished, new_figure
 
 DOCS = Path(__file__).resolve().parents[1]

@@ -11,11 +11,9 @@ from reference import arm_rig_recorder as recorder
 from reference.arm_rig_fits import FREE, files_of
 from robots.robots_cases import links
 from servotwin.identification.arms import dynamics
-from servotwin.identification.arms.episodes import episodes_from
-from servotwin.identification.arms.numbers import Numbers
+from servotwin.identification.arms.identify_arm import arm_registers
 from servotwin.identification.arms.problem import Problem
-from servotwin.identification.arms.registers import arm_registers
-from servotwin.identification.arms.rows import used_rows
+from servotwin.identification.arms.rows import Numbers, episodes_from, used_rows
 from servotwin.parameters.registers.held import register_family_of
 from servotwin.parameters.registers.table import set_registers, written
 from servotwin.robots import Motion, Mount, robot_model, run_motion

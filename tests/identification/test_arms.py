@@ -10,18 +10,13 @@ import servotwin as st
 from robots.robots_cases import links
 from servotwin.errors import InputError
 from servotwin.identification.arms import dynamics, identify_arm
-from servotwin.identification.arms.arm_fit import BELIEFS, ArmCause
-from servotwin.identification.arms.causes import confirmed
-from servotwin.identification.arms.doubts import shaken
-from servotwin.identification.arms.episodes import episodes_from
+from servotwin.identification.arms.arm_fit import BELIEFS, ArmCause, confirmed, shaken
+from servotwin.identification.arms.dynamics import WholeArm
 from servotwin.identification.arms.lanes import JointLanes
-from servotwin.identification.arms.numbers import Numbers
 from servotwin.identification.arms.problem import Problem
-from servotwin.identification.arms.rows import Noise, beyond_scatter, used_rows, whitened
-from servotwin.identification.arms.whole import WholeArm
-from servotwin.identification.fitting.point import LogPart
-from servotwin.identification.fitting.uncertainty import Rows
-from servotwin.identification.fitting.words import Unidentifiable
+from servotwin.identification.arms.rows import Noise, Numbers, beyond_scatter, episodes_from, used_rows, whitened
+from servotwin.identification.fitting.case import LogPart
+from servotwin.identification.fitting.uncertainty import Rows, Unidentifiable
 from servotwin.robots import Motion, Mount, run_motion
 
 pytestmark = pytest.mark.long

@@ -17,7 +17,7 @@ from servotwin.identification.fitting.arrow import (
     block,
     together,
 )
-from servotwin.identification.fitting.point import STEP, LogPart, Point
+from servotwin.identification.fitting.case import STEP, LogPart, Point
 
 T = np.linspace(0.0, 4.0, 31)
 WAVE = np.cos(7.0 * T)

@@ -14,16 +14,16 @@ from reference.rig_fits import judged
 from servotwin.identification.fitting.assumptions import (
     CLOCK,
     ROUNDED,
+    Ends,
     Systematic,
     _drawn,
     _Law,
     assumptions,
     with_assumptions,
 )
+from servotwin.identification.fitting.case import PERIOD_SCALE, Point
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Space
-from servotwin.identification.fitting.intervals import Ends
-from servotwin.identification.fitting.point import PERIOD_SCALE, Point
 from servotwin.identification.fitting.uncertainty import Uncertainty
 
 FILE = st.load_servo("hitec-hs-755hb").replace({"electronics.frame_period": 0.01})

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.baselines import LOSSES, fit_slew_lag
-from servotwin.identification.fitting.slew_lag import SlewLag, usable
+from servotwin.identification.fitting.slew_lag import LOSSES, SlewLag, fit_slew_lag, usable
 from servotwin.logs.log import Log
 from servotwin.logs.readers import read_logs
 

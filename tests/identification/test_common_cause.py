@@ -6,8 +6,8 @@ import pytest
 
 from identification.fits import FREE, fitted, some
 from identification.synthetic_logs import TRUTH
-from servotwin.identification.fitting.common_cause import Agreeing, common_cause
 from servotwin.identification.fitting.free import nominal
+from servotwin.identification.fitting.validate import Agreeing, common_cause
 
 
 def items(powers, factor, spread=0.02):

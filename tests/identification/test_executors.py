@@ -14,9 +14,9 @@ from identification.synthetic_logs import PENDULUM
 from servotwin.errors import InputError
 from servotwin.identification import friction_ladder
 from servotwin.identification.fitting.batches import Running
+from servotwin.identification.fitting.case import Point
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Space
-from servotwin.identification.fitting.point import Point
 from simulation.test_workers import Backwards
 
 SPAWN = multiprocessing.get_context("spawn")

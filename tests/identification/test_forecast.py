@@ -9,9 +9,9 @@ import servotwin as st
 from identification.synthetic_logs import PENDULUM, TRUTH, noisy, run
 from servotwin.errors import InputError
 from servotwin.identification.fitting.batches import Running
+from servotwin.identification.fitting.case import DELAY_SCALE, FINE, OFFSET_SCALE, SPEED_SCALE, Point
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Space
-from servotwin.identification.fitting.point import DELAY_SCALE, FINE, OFFSET_SCALE, SPEED_SCALE, Point
 
 FREE = ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque",
         "electronics.stretcher_gain", "electronics.deadband", "load.pendulum.mass")

@@ -12,13 +12,19 @@ import servotwin as st
 from cli import fit_logs
 from servotwin.errors import OutputExistsError
 from servotwin.identification import identify
-from servotwin.identification.fitting.point import SHARED
+from servotwin.identification.fitting.case import SHARED
+from servotwin.identification.fitting.uncertainty import Unidentifiable
 from servotwin.identification.fitting.verdict import Cause
-from servotwin.identification.fitting.words import Unidentifiable
 from servotwin.identification.report import page as report
 from servotwin.identification.report import pictures as report_pictures
-from servotwin.identification.report import traces as report_traces
-from servotwin.identification.report.shown import dimension_of_free, error_rows, estimate_lines, nominal_of, tables_of
+from servotwin.identification.report import pictures as report_traces
+from servotwin.identification.report.pictures import (
+    dimension_of_free,
+    error_rows,
+    estimate_lines,
+    nominal_of,
+    tables_of,
+)
 from servotwin.look import figure_in, unit_for
 from servotwin.units import from_si
 

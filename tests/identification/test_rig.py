@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import servotwin as st
-from servotwin.identification.fitting.rig import has_unknown_phase
-from servotwin.identification.fitting.validate import validate
+from servotwin.identification.fitting.validate import has_unknown_phase, validate
 
 SERVO = st.load_servo("hitec-hs-755hb")
 RIGS = [(), ("delay", "angle_offset"), ("frame_phase",), ("delay", "angle_offset", "frame_phase", "initial_state")]

@@ -9,8 +9,8 @@ import servotwin as st
 from servotwin.datasheet.full_drive import FullDrive
 from servotwin.datasheet.rotor import slow_rotor, time_constant_of
 from servotwin.identification import Sheet, SheetPoint, servo_from_sheet, sheet_contradictions
-from servotwin.identification.sheets.contradictions import usual_torque
-from servotwin.identification.sheets.rotor import time_constant
+from servotwin.identification.sheets.motor_range import usual_torque
+from servotwin.identification.sheets.servo_of_sheet import time_constant
 from servotwin.models import default_model, mid_travel
 from servotwin.parameters import catalog_names, load_servo, printed_points
 from servotwin.physics import stall_current_for

@@ -20,7 +20,7 @@ from servotwin.identification import (
     sheet_of,
     write_servo_text,
 )
-from servotwin.identification.sheets.contradictions import torque_question
+from servotwin.identification.sheets.motor_range import torque_question
 from servotwin.models import MODELS
 from servotwin.parameters import catalog_names, load_servo
 

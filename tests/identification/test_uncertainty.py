@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from servotwin.identification.fitting.arrow import Loss, Prior
-from servotwin.identification.fitting.memory import memory_of
-from servotwin.identification.fitting.point import LogPart
-from servotwin.identification.fitting.uncertainty import Counts, Rows, _widest, rows_of, uncertainty
+from servotwin.identification.fitting.case import LogPart
+from servotwin.identification.fitting.uncertainty import Counts, Rows, _widest, memory_of, rows_of, uncertainty
 
 NONE = Prior(np.zeros(1), np.zeros(1))
 

@@ -8,10 +8,9 @@ import pytest
 import servotwin as st
 from identification.synthetic_logs import TRUTH, noisy, run
 from servotwin.identification import identify
-from servotwin.identification.fitting.diagnosis.gain import gain, teaching
-from servotwin.identification.fitting.independence import cross_correlation
-from servotwin.identification.fitting.judging import _outliers
-from servotwin.identification.fitting.noise import SensorSeries, isolated, noise_of
+from servotwin.identification.fitting.diagnosis.bench import gain, teaching
+from servotwin.identification.fitting.identify import _outliers
+from servotwin.identification.fitting.noise import SensorSeries, cross_correlation, isolated, noise_of
 from servotwin.identification.fitting.uncertainty import Rows
 from servotwin.identification.fitting.verdict import against, judge, rival
 from servotwin.logs.log import Log

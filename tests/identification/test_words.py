@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from servotwin.identification.fitting.words import Unidentifiable, explain, vague_directions
+from servotwin.identification.fitting.uncertainty import Unidentifiable, explain, vague_directions
 
 KM, N, J, F, R = ("motor.torque_constant", "gear.gear_reduction", "motor.rotor_inertia",
                   "friction.coulomb_torque_forward", "motor.armature_resistance")

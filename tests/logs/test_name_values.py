@@ -59,7 +59,7 @@ def test_what_is_wrong_is_said_in_one_line(tmp_path, files, words):
 
 
 def test_commands_about_an_end_of_the_travel_are_centred_before_a_fit():
-    from servotwin.identification.fitting.suspicions.centre import centred
+    from servotwin.identification.fitting.suspicions.followed import centred
     from servotwin.logs import Log
 
     time = 0.02 * np.arange(300)

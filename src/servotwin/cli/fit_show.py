@@ -11,7 +11,7 @@ from servotwin.cli.summary import names as dotted
 from servotwin.cli.summary import was_set
 from servotwin.cli.terminal import pairs, table
 from servotwin.identification.fitting.holdout import fit_percent
-from servotwin.identification.report.shown import (
+from servotwin.identification.report.pictures import (
     MODELS,
     error_rows,
     error_shown,

@@ -8,10 +8,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 from servotwin.errors import InputError, ServotwinError, UnknownNameError
-from servotwin.identification.fitting.findings import MENDED
+from servotwin.identification.fitting.fit import MENDED
 from servotwin.identification.fitting.free import Space, nominal
 from servotwin.identification.fitting.stopping import Within
-from servotwin.identification.report.shown import dimension_of_free
+from servotwin.identification.report.pictures import dimension_of_free
 from servotwin.logs.mend_names import MENDS
 from servotwin.studies.kinds import Distribution, Normal, Offset, Relative, Uniform
 from servotwin.studies.words import distribution_of

@@ -69,7 +69,7 @@ def read(paths: Sequence[Path], file_format: str, columns: Sequence[str] | None,
     from servotwin.cli import fit_words
     from servotwin.identification import read_logs
     from servotwin.identification.fitting.registers import of_no_robot
-    from servotwin.identification.fitting.suspicions.centre import centred
+    from servotwin.identification.fitting.suspicions.followed import centred
 
     windows = fit_words.left_out(leave_out)
     said = columns_said(columns, rate, commanded)

@@ -16,10 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from rich.console import RenderableType
 
-    from servotwin.identification.survey.clock import Clock
-    from servotwin.identification.survey.motion import Motion
-    from servotwin.identification.survey.survey import Survey
-    from servotwin.identification.survey.values import Values
+    from servotwin.identification.survey.survey import Clock, Motion, Survey, Values
     from servotwin.logs import Log
 
 # signal or kind of command -> (unit as printed, of `servotwin.units`, its dimension)

@@ -51,7 +51,7 @@ def fit(
     from servotwin.cli.robot_words import as_options
     from servotwin.cli.stopping import best_kept, end_if_stopped
     from servotwin.identification.arms import identify_arm
-    from servotwin.identification.arms.plant import UNKNOWN, mounts_of, plant_of
+    from servotwin.identification.arms.identify_arm import UNKNOWN, mounts_of, plant_of
     from servotwin.robots.episode import joints_of_dataset
 
     limit = duration("--within", within)
@@ -89,7 +89,7 @@ def fit(
 
 
 def _show(found: ArmFit, told: dict[str, Any]) -> None:
-    from servotwin.identification.report.arm_page import error_rows, estimate_rows
+    from servotwin.identification.report.page import error_rows, estimate_rows
 
     head, rows = error_rows(found)
     said = [*map(str, found.unidentifiable), *map(str, found.left_out), *told["warnings"]]
@@ -109,7 +109,7 @@ def _write(found: ArmFit, told: dict[str, Any], targets: Sequence[Target], stems
     from servotwin.cli.robot_files import joint_pages
     from servotwin.cli.robot_page import figure, figures
     from servotwin.cli.robot_validate_page import errors_picture, write_windows
-    from servotwin.identification.report.arm_page import arm_page
+    from servotwin.identification.report.page import arm_page
 
     judged = found.holdout or found.training
     with staged(targets, force=force) as drafts:

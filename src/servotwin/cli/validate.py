@@ -92,7 +92,7 @@ def _run(servo: Servo, model: str | None, nuisance: list[str] | None, sensors: l
          mend: list[str] | None, read: Callable[[Model], list[Log]]) -> Validation:
     from servotwin.cli import fit_words
     from servotwin.cli.model_words import class_of
-    from servotwin.identification.fitting.checks import checked_servo
+    from servotwin.identification.fitting.fit import checked_servo
     from servotwin.identification.fitting.validate import recorded_model
     from servotwin.identification.fitting.validate import validate as run
 
@@ -158,7 +158,7 @@ def _report(found: Validation, above: Mapping[str, float], limits: Mapping[str |
 def _sections(found: Validation, above: Mapping[str, float], limits: Mapping[str | None, float],
               files: list[str]) -> list[RenderableType]:
     from servotwin.cli import fit_show
-    from servotwin.identification.report.shown import error_shown, rig_text
+    from servotwin.identification.report.pictures import error_shown, rig_text
 
     tables = {"": found.errors}
     rig = [rig_text(name, value) + (" (fitted)" if name in found.fitted else "")
@@ -179,7 +179,7 @@ def _sections(found: Validation, above: Mapping[str, float], limits: Mapping[str
 
 
 def _log_table(found: Validation) -> Any:
-    from servotwin.identification.report.shown import error_unit, percent
+    from servotwin.identification.report.pictures import error_unit, percent
 
     errors = found.errors.errors[found.errors.models[0]]
     signals = {trace.log.name: trace.signal for trace in found.traces}

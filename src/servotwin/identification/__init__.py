@@ -7,27 +7,37 @@ if TYPE_CHECKING:
     from servotwin.identification.arms.arm_fit import ArmFit
     from servotwin.identification.arms.identify_arm import identify_arm
     from servotwin.identification.fitting.advise import Advice, Experiment, advise
-    from servotwin.identification.fitting.choosing import Ladder, Rung
-    from servotwin.identification.fitting.findings import Finding, findings
-    from servotwin.identification.fitting.fit import Fit, Interval, Start, Trace
+    from servotwin.identification.fitting.case import LogPart, Point
+    from servotwin.identification.fitting.fit import Finding, Fit, Interval, Start, Trace, findings
     from servotwin.identification.fitting.forecast import Forecast
     from servotwin.identification.fitting.free import LUMPED, FreeParameter, Space
     from servotwin.identification.fitting.holdout import ErrorTable, LogError
     from servotwin.identification.fitting.identify import identify
-    from servotwin.identification.fitting.ladder import RUNGS, friction_ladder
-    from servotwin.identification.fitting.point import LogPart, Point
+    from servotwin.identification.fitting.ladder import RUNGS, Ladder, Rung, friction_ladder
     from servotwin.identification.fitting.structures import Structure, as_structure, compare_structures
-    from servotwin.identification.fitting.uncertainty import Uncertainty
+    from servotwin.identification.fitting.uncertainty import Uncertainty, Unidentifiable
     from servotwin.identification.fitting.validate import Validation, validate
     from servotwin.identification.fitting.verdict import Cause, Verdict
-    from servotwin.identification.fitting.words import Unidentifiable
     from servotwin.identification.fitting.yielding import Yielded
-    from servotwin.identification.sheets.contradictions import Contradiction, sheet_contradictions, sheet_flags
-    from servotwin.identification.sheets.csv_sheets import SheetList, read_sheets
-    from servotwin.identification.sheets.motor_range import MotorRange, Range, motor_range
+    from servotwin.identification.sheets.motor_range import (
+        Contradiction,
+        MotorRange,
+        Range,
+        motor_range,
+        sheet_contradictions,
+        sheet_flags,
+    )
     from servotwin.identification.sheets.servo_of_sheet import servo_from_sheet
-    from servotwin.identification.sheets.sheet import Sheet, SheetPoint
-    from servotwin.identification.sheets.sheet_file import servo_file_text, sheet_of, sheet_table, write_servo_text
+    from servotwin.identification.sheets.sheet import (
+        Sheet,
+        SheetList,
+        SheetPoint,
+        read_sheets,
+        servo_file_text,
+        sheet_of,
+        sheet_table,
+        write_servo_text,
+    )
     from servotwin.logs import (
         BamConvention,
         Log,
@@ -50,30 +60,28 @@ _HOMES = {
     "identification.arms.arm_fit": ("ArmFit",),
     "identification.arms.identify_arm": ("identify_arm",),
     "identification.fitting.advise": ("Advice", "Experiment", "advise"),
-    "identification.fitting.choosing": ("Ladder", "Rung"),
-    "identification.fitting.findings": ("Finding", "findings"),
-    "identification.fitting.fit": ("Fit", "Interval", "Start", "Trace"),
+    "identification.fitting.case": ("LogPart", "Point"),
+    "identification.fitting.fit": ("Finding", "Fit", "Interval", "Start", "Trace", "findings"),
     "identification.fitting.forecast": ("Forecast",),
     "identification.fitting.free": ("LUMPED", "FreeParameter", "Space"),
     "identification.fitting.holdout": ("ErrorTable", "LogError"),
     "identification.fitting.identify": ("identify",),
-    "identification.fitting.ladder": ("RUNGS", "friction_ladder"),
-    "identification.fitting.point": ("LogPart", "Point"),
+    "identification.fitting.ladder": ("RUNGS", "Ladder", "Rung", "friction_ladder"),
     "identification.fitting.structures": ("Structure", "as_structure", "compare_structures"),
-    "identification.fitting.uncertainty": ("Uncertainty",),
+    "identification.fitting.uncertainty": ("Uncertainty", "Unidentifiable"),
     "identification.fitting.validate": ("Validation", "validate"),
     "identification.fitting.verdict": ("Cause", "Verdict"),
-    "identification.fitting.words": ("Unidentifiable",),
     "identification.fitting.yielding": ("Yielded",),
-    "identification.sheets.contradictions": ("Contradiction", "sheet_contradictions", "sheet_flags"),
-    "identification.sheets.csv_sheets": ("SheetList", "read_sheets"),
-    "identification.sheets.motor_range": ("MotorRange", "Range", "motor_range"),
+    "identification.sheets.motor_range": (
+        "Contradiction", "MotorRange", "Range", "motor_range", "sheet_contradictions", "sheet_flags"),
     "identification.sheets.servo_of_sheet": ("servo_from_sheet",),
-    "identification.sheets.sheet": ("Sheet", "SheetPoint"),
-    "identification.sheets.sheet_file": ("servo_file_text", "sheet_of", "sheet_table", "write_servo_text"),
-    "logs": ("BamConvention", "Log", "ReadColumn", "Reading", "keep_columns", "read_bam_log", "read_bam_parameters",
-             "read_csv_log", "read_lerobot_logs", "read_logs", "read_miuzei_logs", "write_bam_log",
-             "write_bam_parameters", "write_log"),
+    "identification.sheets.sheet": (
+        "Sheet", "SheetList", "SheetPoint", "read_sheets", "servo_file_text", "sheet_of", "sheet_table",
+        "write_servo_text"),
+    "logs": (
+        "BamConvention", "Log", "ReadColumn", "Reading", "keep_columns", "read_bam_log", "read_bam_parameters",
+        "read_csv_log", "read_lerobot_logs", "read_logs", "read_miuzei_logs", "write_bam_log",
+        "write_bam_parameters", "write_log"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 

@@ -4,33 +4,428 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+import time as clock
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as Xml
 
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.errors import InputError
-from servotwin.identification.arms.arm_fit import HALF, ArmFit
-from servotwin.identification.arms.dynamics import Demand, link_names, links_of, with_masses
-from servotwin.identification.arms.episodes import episodes_from, motions_of
-from servotwin.identification.arms.numbers import CLOCK, GAIN, Numbers
-from servotwin.identification.arms.plant import UNKNOWN, mounts_of, plant_of, supply_of
+from servotwin.errors import InputError, UnknownNameError
+from servotwin.identification.arms.arm_fit import HALF, ArmCause, ArmFit, Doubts, causes_of, confirmed, doubts_of
+from servotwin.identification.arms.dynamics import Demand, WholeArm, link_names, links_of, with_masses
 from servotwin.identification.arms.problem import Problem
-from servotwin.identification.arms.rows import used_rows
-from servotwin.identification.arms.stages import Way, searched
-from servotwin.identification.fitting import checks
-from servotwin.identification.fitting.diagnosis.counted import counts_turns
+from servotwin.identification.arms.rows import (
+    CLOCK,
+    GAIN,
+    LATENCY,
+    LATENCY_SCALE,
+    Episode,
+    LeftOut,
+    Linear,
+    Noise,
+    Numbers,
+    beyond_scatter,
+    episodes_from,
+    motions_of,
+    noise_of,
+    parts_of,
+    spread_of,
+    strange_windows,
+    used_rows,
+    usual_steps,
+    without,
+)
+from servotwin.identification.fitting import fit as checks
+from servotwin.identification.fitting.case import DELAY_SCALE
+from servotwin.identification.fitting.diagnosis.drifts import counts_turns
+from servotwin.identification.fitting.registers import (
+    PROMISING,
+    TAKEN,
+    Bench,
+    Lanes,
+    RegisterSearch,
+    State,
+    Tried,
+    has_registers,
+    numbers_apart,
+)
+from servotwin.identification.fitting.registers import searched as registers_searched
 from servotwin.identification.fitting.stopping import Stops, Within
-from servotwin.parameters import Servo, Supply
+from servotwin.models import Model, default_model
+from servotwin.parameters import Servo, Supply, load_servo
 from servotwin.parameters.output_side import OUTPUT_SIDE
 from servotwin.parameters.quantity import Quantity
-from servotwin.robots import Motion, Mount, RobotValidation, validate_robot
+from servotwin.parameters.registers.robots import as_robot_has_it, said_of, set_of_robot
+from servotwin.robots import Motion, Mount, RobotValidation, joint_names, robot_model, validate_robot
 from servotwin.robots.contacts import leave_out_measured
+from servotwin.robots.coupling import couplings_of
 from servotwin.robots.episode import joints_of_dataset
 from servotwin.units import is_finite
+
+# --- The robot of a fit: its model, its servos, and what stands for them where nobody says ----------------------------
+
+UNKNOWN = "unknown"
+_SO101, _ARM_SERVO = "so101", "feetech-sts3215-12v"
+_MASS, _REACH, _SPREAD = 0.2, 0.1, 1e-3  # kg, m, kg m²: of the pendulum that stands for an unknown arm
+
+
+def plant_of(robot: Any, joints: Sequence[str]) -> tuple[Any, tuple[str, ...]]:
+    """Return the MjModel of a robot, and what was assumed; "unknown" gives every joint a pendulum of its own."""
+    if robot != UNKNOWN:
+        return robot_model(robot), ()
+    root = Xml.Element("mujoco", model=UNKNOWN)
+    Xml.SubElement(root, "option", timestep="0.002")
+    Xml.SubElement(root, "compiler", angle="radian", inertiafromgeom="false")
+    world = Xml.SubElement(root, "worldbody")
+    for k, joint in enumerate(joints):
+        body = Xml.SubElement(world, "body", name=f"{joint}_weight", pos=f"0 {k} 0")
+        Xml.SubElement(body, "joint", name=joint, axis="0 1 0")
+        Xml.SubElement(body, "inertial", pos=f"{_REACH} 0 0", mass=str(_MASS), diaginertia="1e-6 1e-6 1e-6")
+        wheel = Xml.SubElement(body, "body", name=f"{joint}_inertia")
+        Xml.SubElement(wheel, "inertial", pos="0 0 0", mass="1e-3", diaginertia=f"{_SPREAD} {_SPREAD} {_SPREAD}")
+    return robot_model(_spec(Xml.tostring(root, encoding="unicode"))), (
+        "no robot file: each joint is a bare servo with an unknown arm, a weight that hangs at an unknown angle and an "
+        "inertia; what joints do to each other is not in it",)
+
+
+def _spec(xml: str) -> Any:
+    from servotwin.robots.places import load_mujoco
+
+    return load_mujoco().MjSpec.from_string(xml)
+
+
+def mounts_of(servos: Any, robot: Any, plant: Any, motions: Sequence[Motion]) -> tuple[dict[str, Mount],
+                                                                                       tuple[str, ...]]:
+    """Return the servos at the joints of a robot, and what was assumed of them.
+
+    Raises
+    ------
+    InputError
+        If there is no servo, or the joints do not match.
+    """
+    recorded = [joint for joint in motions[0].measured if all(joint in one.angles for one in motions)]
+    joints = [name for name, kind in joint_names(plant).items() if kind == "angle" and name in recorded]
+    if not joints:
+        raise InputError(f"joints of {motions[0].source}", got=", ".join(motions[0].angles),
+                         allowed=f"joints of the robot: {', '.join(joint_names(plant))}")
+    kind = motions[0].robot
+    if servos is None:
+        if robot != _SO101:
+            raise InputError("servo of a robot", got="none", allowed="a servo, or one of each joint by its name")
+        servos, kind = load_servo(_ARM_SERVO), kind or _SO101
+    given = dict(servos) if isinstance(servos, Mapping) else dict.fromkeys(joints, servos)
+    for joint in given:
+        if joint not in joint_names(plant):
+            raise UnknownNameError("joint of the robot", joint, joint_names(plant))
+    made, changed = {}, []
+    for joint in joints:
+        if joint not in given:
+            continue
+        mount = _mount(given[joint])
+        servo = as_robot_has_it(mount.model.servo, kind, joint) if kind else mount.model.servo
+        if servo is not mount.model.servo:
+            changed.append(set_of_robot(kind, joint))
+            mount = Mount(type(mount.model)(servo), mount.zero, mount.direction, mount.ratio)
+        made[joint] = mount
+    if not made:
+        raise InputError("servos", got=", ".join(given), allowed=f"some at recorded joints: {', '.join(joints)}")
+    kinds = {type(mount.model) for mount in made.values()}
+    if len(kinds) > 1:
+        raise InputError("servos of a robot", got=" and ".join(sorted(kind.__name__ for kind in kinds)),
+                         allowed="models of one kind")
+    free = [name for name in joint_names(plant) if name not in made and name not in couplings_of(plant)]
+    return made, (*((said_of(kind, *changed),) if changed else ()), *((
+        f"no servo and no recorded goals at {', '.join(free)}: what hangs there moves freely",) if free else ()))
+
+
+def _mount(given: Any) -> Mount:
+    if isinstance(given, Mount):
+        return given
+    model: Model = default_model(given) if isinstance(given, Servo) else given
+    return Mount(model)
+
+
+def supply_of(bus: Supply | None, mounts: Mapping[str, Mount]) -> Supply | None:
+    """Return the supply that all servos share: the given one, or that of the first servo's file."""
+    if bus is not None:
+        return bus
+    model = next(iter(mounts.values())).model
+    volts = model.value_or("supply.open_circuit_voltage", 0.0)
+    return Supply(open_circuit_voltage=volts, internal_resistance=model.value_or("supply.internal_resistance", 0.0)
+                  or None) if volts > 0.0 else None
+
+# --- Registers of a robot's servos that nobody recorded, tried as whole lanes of its joints before its fit ------------
+
+Make = Callable[[Mapping[str, Mount]], Numbers]
+_EPISODES, _REGISTERS_SECONDS = 2, 12.0  # that are looked at, those in which goals go furthest, and of each [s]
+_MOVES = 0.05  # rad: a joint that moves less tells nothing
+
+
+class _ArmBench(Bench):
+    """Joints of a robot one by one, under the torque and inertia that their measured motion asks for.
+
+    Masses, zeros and numbers of servos are those of files. Registers make up for some of what is wrong with these, so
+    that no finer values are tried, and another register counts only where it leaves less than half.
+    """
+
+    rounds = 0
+
+    def __init__(self, what: Problem, make: Make, episodes: Sequence[Episode]) -> None:
+        super().__init__([mount.model.servo for mount in what.numbers.mounts.values()],
+                         np.any([np.ptp(one.measured, axis=0) > _MOVES for one in episodes], axis=0))
+        self.what, self.make, self.episodes = what, make, [*episodes]
+        self.used = [used_rows(one)[:, 0] for one in self.episodes]
+
+    def simplest(self, seen: Mapping[State, Tried]) -> list[State]:
+        """Return the states with as few choices as do not leave twice what others do, of fewest registers first."""
+        least = min(one.error for one in seen.values())
+        few = min(state.choices for state, one in seen.items() if TAKEN * one.error <= least)
+        some = {state: one for state, one in seen.items() if state.choices == few}
+        least = min(one.error for one in some.values())
+        near = [state for state, one in some.items() if one.error <= PROMISING * least]
+        return sorted(near, key=lambda state: (len(seen[state].registers), seen[state].error))
+
+    def lanes(self, some: Sequence[Tried]) -> Lanes:
+        """Return what simulates servos of one form, in all episodes."""
+        numbers = self.make(with_servos(self.what.numbers.mounts, some[0].servos))
+        lanes, late = self.what._replace(numbers=numbers).lanes(), numbers.names.index(LATENCY)
+        apart = [numbers_apart([one.servos[j] for one in some]) for j in range(len(self.servos))]
+
+        def run(which: Sequence[int], delays: Array) -> list[tuple[Array, Array]]:
+            points = np.repeat(numbers.start[None], len(which), axis=0)
+            points[:, late] = delays / LATENCY_SCALE
+            columns = numbers.columns(points)
+            for j, (own, names) in enumerate(zip(columns, apart, strict=True)):
+                own |= {name: np.array([some[k].servos[j].get(name) for k in which], np.float64) for name in names}
+            residual, later = [], []
+            for episode, used in zip(self.episodes, self.used, strict=True):
+                angles = lanes.run(episode, points, columns)
+                residual.append((angles - episode.measured)[:, used])
+                later.append(-DELAY_SCALE * np.gradient(angles, episode.time, axis=1)[:, used])
+            return [*zip(np.concatenate(residual, axis=1), np.concatenate(later, axis=1), strict=True)]
+
+        return run
+
+
+def with_servos(mounts: Mapping[str, Mount], servos: Sequence[Servo]) -> dict[str, Mount]:
+    """Return mounts with other servos, in the order of the joints."""
+    return {joint: Mount(type(mount.model)(servo), mount.zero, mount.direction, mount.ratio)
+            for (joint, mount), servo in zip(mounts.items(), servos, strict=True)}
+
+
+def arm_registers(what: Problem, make: Make) -> tuple[RegisterSearch | None, dict[str, Mount]]:
+    """Return what stands in the registers of a robot's servos, and the mounts with those that are taken.
+
+    All servos get the same registers, and single ones others where that clearly leaves less of their own error.
+
+    Parameters
+    ----------
+    what : Problem
+    make : callable
+        Returns the numbers of a fit with other mounts.
+    """
+    mounts = dict(what.numbers.mounts)
+    if not has_registers([mount.model for mount in mounts.values()]):
+        return None, mounts
+    episodes = sorted(what.episodes, key=lambda one: -float(np.abs(np.diff(one.goals, axis=0)).sum()))[:_EPISODES]
+    some = what._replace(episodes=episodes).shorter(_REGISTERS_SECONDS).episodes
+    bench = _ArmBench(what, make, some)
+    search = registers_searched(bench, bench, names=[*mounts])
+    if search is None:
+        return None, mounts
+    servos = search.taken.servos if search.taken is not None else [mount.model.servo for mount in mounts.values()]
+    servos = [search.joints[joint].servo if joint in search.joints else servo
+              for joint, servo in zip(mounts, servos, strict=True)]
+    return search, with_servos(mounts, servos)
+
+# --- The two stages of the fit of a robot, of which each keeps the best that it has found wherever it is stopped ------
+
+Show = Callable[[float, str], None]
+_ROUNDS, _STEPS = 2, 8  # of the first stage
+_SECONDS = 20.0  # of each episode, that the search for causes looks at
+_WHOLE_TURNS, _WHOLE_STEPS = 2, 6  # of the second: derivatives, and steps by them
+_FAR = 1.0  # widths of a belief, over which derivatives change
+_TRIED = 1.5  # widths of a belief, that make causes be tried
+_NOISY = 2e-3  # rad at rest: more than counts and a clock leave
+JOINTS_ALONE, CAUSES, WHOLE, INTERVALS = (
+    "where the search of single joints ends", "what may be the matter", "what the whole robot does", "intervals")
+
+
+@dataclass
+class Way:
+    """How far a fit has come.
+
+    Parameters
+    ----------
+    what : Problem
+    x : ndarray
+        The best so far.
+    noise : Noise
+    steps : ndarray, optional
+        For derivatives.
+    found : bool
+        Whether that is more than the start.
+    left_out : tuple of LeftOut
+    causes : tuple of ArmCause
+    doubts : Doubts, optional
+    missing : list of str
+        What is not known yet.
+    seconds : dict of str to float
+        CPU time that each stage took.
+    registers : RegisterSearch, optional
+        What stands in registers that nobody recorded.
+    """
+
+    what: Problem
+    x: Array
+    noise: Noise
+    steps: Array | None = None
+    found: bool = False
+    left_out: tuple[LeftOut, ...] = ()
+    causes: tuple[ArmCause, ...] = ()
+    doubts: Doubts | None = None
+    missing: list[str] = field(default_factory=list)
+    seconds: dict[str, float] = field(default_factory=dict)
+    registers: RegisterSearch | None = None
+
+    def keep(self, other: Way, best: Array) -> None:
+        """Take over what another one fits, with the best so far."""
+        self.what, self.x, self.noise, self.steps, self.found = other.what, best, other.noise, other.steps, True
+        self.left_out = other.left_out
+
+    def know(self, what: str) -> None:
+        """Note that something is no longer missing."""
+        self.missing = [one for one in self.missing if one != what]
+
+    @contextmanager
+    def timed(self, stage: str) -> Iterator[None]:
+        """Note the CPU time of a stage."""
+        began = clock.process_time()
+        try:
+            yield
+        finally:
+            self.seconds[stage] = clock.process_time() - began
+
+
+def searched(what: Problem, make: Callable[[Sequence[str], Mapping[str, Mount]], Numbers], course: Stops, *,
+             intervals: bool, diagnose: bool) -> Way:
+    """Return where a fit ends; a stop ends the stage that it meets, and those that come after it are left out."""
+    way = Way(what, what.numbers.start.copy(), Noise(np.zeros(0), 0.0))
+    way.missing = [JOINTS_ALONE, *([CAUSES] if diagnose else []), *([WHOLE, INTERVALS] if intervals else [])]
+    try:
+        with way.timed("registers"):
+            course(0.0, "registers")
+            way.registers, mounts = arm_registers(what, lambda having: make((), having))
+            what = what._replace(numbers=make((), mounts))
+        with way.timed("first"):
+            _first_stage(way, what, course)
+        if diagnose:
+            with way.timed("causes"):
+                _look_for_causes(way, lambda gains: make(gains, mounts), course)
+        with way.timed("second"):
+            _second_stage(way, course, intervals=intervals)
+    except KeyboardInterrupt:
+        pass
+    return way
+
+
+def _first_stage(way: Way, what: Problem, show: Show) -> None:
+    """Search with lanes of single joints, and leave out what no numbers explain."""
+    lanes, x, steps = what.lanes(), what.numbers.start.copy(), usual_steps(what.numbers)
+    windows: tuple[LeftOut, ...] = ()
+    for turn in range(_ROUNDS):
+        noise = noise_of(what.episodes, what.left(lanes, x), what.used)
+        now = Way(what, x, noise, left_out=windows)
+
+        def tell(step: int, best: Array, now: Way = now, turn: int = turn) -> None:
+            if turn or step:
+                way.keep(now, best)
+            show(0.4 * (turn + step / _STEPS) / _ROUNDS, "joints one by one")
+
+        search = what.search(lanes, noise, steps=steps)
+        x, steps = search.run(x, most=_STEPS, tell=tell), search.steps
+        if turn == 0:
+            left = what.left(lanes, x)
+            noise = noise_of(what.episodes, left, what.used)
+            windows = strange_windows(what.episodes, left, what.used, noise, what.numbers.joints)
+            what = what._replace(used=without(what.used, what.episodes, windows, what.numbers.joints))
+    way.keep(Way(what, x, noise_of(what.episodes, what.left(lanes, x), what.used), steps, left_out=windows), x)
+    way.know(JOINTS_ALONE)
+
+
+def _look_for_causes(way: Way, make: Callable[[Sequence[str]], Numbers], show: Show) -> None:
+    """Seek causes where a belief is pushed far, or what is left is no noise; a wrong gain is searched from then on."""
+    what, noise = way.what, way.noise
+    off = np.abs(way.x - what.numbers.start) * what.numbers.weight
+    if off.max() >= _TRIED or noise.positions.max() >= _NOISY:
+        show(0.4, "causes")
+        way.causes = causes_of(what.shorter(_SECONDS), noise, way.x, make)
+    if way.causes and way.causes[0].joints:  # what the wrong gain has bent is found anew with that gain searched
+        _first_stage(way, what._replace(numbers=make(way.causes[0].joints),
+                                        used=[used_rows(one) for one in what.episodes]), show)
+
+
+def _second_stage(way: Way, show: Show, *, intervals: bool) -> None:
+    """Search with the whole robot, and see what its derivatives say of the numbers."""
+    what = way.what
+    arm = what.whole()
+    way.x, way.noise = _nearest(what, arm, way.x)
+    noise = way.noise
+    if not intervals:
+        way.know(CAUSES)
+        return
+
+    for turn in range(_WHOLE_TURNS):
+        def tell(step: int, best: Array, turn: int = turn) -> None:
+            way.x = best
+            show(0.6 + 0.2 * turn + 0.05 * step / _WHOLE_STEPS, "the whole robot")
+
+        show(0.45 + 0.2 * turn, "the whole robot")
+        search, x = what.search(arm, noise, steps=way.steps), way.x
+        steps, linear = search.steps, search.linear(x, central=True)
+        slopes, shakes = _clean(what, linear, noise), [one.scatter * steps for one in linear]
+        way.steps = search.steps
+        way.x = search.along(x, slopes, most=_WHOLE_STEPS, tell=tell)
+        far = float(np.abs((way.x - x) * np.where(what.numbers.weight > 0.0, what.numbers.weight, 1.0)).max())
+        if far < _FAR:
+            break
+    way.know(WHOLE)
+    way.causes = confirmed(way.causes, what, arm, noise, way.x, slopes)
+    way.know(CAUSES)
+    show(0.85, "intervals")
+    found = what.left(arm, way.x)
+    way.noise = noise_of(what.episodes, found, what.used)
+    way.doubts = doubts_of(what, way.x, way.noise, found, slopes, shakes)
+    way.know(INTERVALS)
+
+
+def _nearest(what: Problem, arm: WholeArm, x: Array) -> tuple[Array, Noise]:
+    """Return which of some points the whole robot moves nearest by, and the noise that it leaves.
+
+    Joints that hang on others without servos, or that stick, do otherwise alone: what the search of single joints has
+    found may then be worse than what the files say.
+    """
+    late = np.where(np.array(what.numbers.names) == LATENCY, x, what.numbers.start)
+    points = (x, late, what.numbers.start)
+    found = [what.left(arm, point) for point in points]
+    best = int(np.argmin([spread_of(left, what.used) for left in found]))
+    return points[best], noise_of(what.episodes, found[best], what.used)
+
+
+def _clean(what: Problem, linear: Sequence[Linear], noise: Noise) -> list[Array]:
+    """Return derivatives without directions in which they are no more than their noise."""
+    tables = [[np.concatenate([part.shared for part in parts_of(episode, one.residual, some, noise, used)])
+               for episode, one, used, some in zip(what.episodes, linear, what.used, chosen, strict=True)]
+              for chosen in ([one.slopes for one in linear], [one.scatter for one in linear])]
+    kept = beyond_scatter(*(np.concatenate(one) for one in tables))
+    return [one.slopes @ kept for one in linear]
+
+# --- `identify_arm` ---------------------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 _HELD_OUT = 4  # episodes for each that is held out

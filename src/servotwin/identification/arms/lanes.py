@@ -13,10 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.arms.copies import Copies
 from servotwin.identification.arms.dynamics import Demand
-from servotwin.identification.arms.episodes import Episode
-from servotwin.identification.arms.numbers import Numbers, model_columns
+from servotwin.identification.arms.rows import Copies, Episode, Numbers, model_columns
 from servotwin.simulation import VectorSimulator
 
 Array = NDArray[np.float64]

@@ -8,14 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.arms.copies import Copies
-from servotwin.identification.arms.dynamics import Demand
-from servotwin.identification.arms.episodes import Episode
+from servotwin.identification.arms.dynamics import Demand, WholeArm
 from servotwin.identification.arms.lanes import JointLanes
-from servotwin.identification.arms.numbers import Numbers
-from servotwin.identification.arms.rows import Mask, Noise, residuals, used_rows
+from servotwin.identification.arms.rows import Copies, Episode, Mask, Noise, Numbers, residuals, used_rows
 from servotwin.identification.arms.search import ArmSearch
-from servotwin.identification.arms.whole import WholeArm
 from servotwin.identification.fitting.arrow import Loss, Prior
 from servotwin.identification.fitting.task import HUBER
 

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.arms.copies import Copies
-from servotwin.identification.arms.episodes import Episode
 from servotwin.identification.arms.rows import (
+    Copies,
+    Episode,
     Linear,
     Mask,
     Noise,

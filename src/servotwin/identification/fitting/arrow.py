@@ -9,16 +9,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.identification.fitting.case import STEP, LogPart, Point
 from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.point import STEP, LogPart, Point
+
+if TYPE_CHECKING:
+    from servotwin.identification.fitting.fit import Fit
+
+# --- Bounded nonlinear least squares whose normal matrix is an arrow --------------------------------------------------
 
 Array = NDArray[np.float64]
-
 _LEAST_STEP = 1e-7  # of a searched number
 _PATIENCE = 6  # small gains one after the other
 _LEAST_GAIN = 1e-3  # of the cost, half a sum of squares in units of noise: a twentieth of a standard error
@@ -316,3 +320,40 @@ class Search:
                 own[k] = point.own[k] + step
                 largest = max(largest, float(np.abs(step).max()))
         return point._replace(shared=x + change, own=tuple(own)), largest
+
+# --- How a search begins ----------------------------------------------------------------------------------------------
+
+class Begin(NamedTuple):
+    """Where a search begins, beside the values of its servo, and how closely it ends.
+
+    Parameters
+    ----------
+    searches : int
+        How many searches: one from the servo's values, the others from random ones.
+    shared : mapping of str to float
+        Numbers of the rig that all logs share (SI), as another fit found them; what is usual unless given.
+    own : tuple of ndarray
+        Each log's own numbers (scaled), as another fit found them; what was measured unless given.
+    others : tuple of mapping of str to float
+        Searched numbers (SI) with which further searches begin, the others being as the servo has them; where there
+        are none, the further searches begin at random.
+    exactly : bool
+        False ends the search where lanes that go nearly lead, if there are any; errors are of the engine either way.
+        Such a fit is one of several to choose from: it has no verdict.
+    """
+
+    searches: int = 1
+    shared: Mapping[str, float] = {}
+    own: tuple[Array, ...] = ()
+    exactly: bool = True
+    others: tuple[Mapping[str, float], ...] = ()
+
+    @classmethod
+    def after(cls, fit: Fit, *, exactly: bool = True) -> Begin:
+        """Return the beginning at the end of a fit: its rig, while its servo is given apart.
+
+        When pulses come is found anew: a law that lacks something takes other commands for the right ones.
+        """
+        if fit.phased:
+            return cls(exactly=exactly)
+        return cls(1, {name: fit.estimates[name] for name in fit.scales}, fit.own, exactly)

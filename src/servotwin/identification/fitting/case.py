@@ -1,4 +1,9 @@
-"""One log, made ready to be compared with a simulation."""
+"""One log, made ready to be compared with a simulation.
+
+A generator sends a pulse every frame; a command acts from the next pulse on. A log tells when commands were given, on a
+clock of its own, and nothing of the pulses. Their phase is therefore two things: a time, in which the motion is smooth,
+and an assignment of commands to pulses, which jumps wherever a command and the edge of a pulse pass each other.
+"""
 
 from __future__ import annotations
 
@@ -6,25 +11,279 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.frames import has_pulses
 from servotwin.identification.fitting.free import LUMPED, Space
-from servotwin.identification.fitting.loop_gain import with_loop_gain
 from servotwin.loads import Load
-from servotwin.logs.log import Log
-from servotwin.models import DigitalServo, Model
+from servotwin.logs.bam_actuators import writes_gain
+from servotwin.logs.log import KINDS, Log
+from servotwin.models import BoundedServo, DigitalServo, Model
+from servotwin.parameters import Servo
 from servotwin.parameters.output_side import N
+from servotwin.parameters.registers import REGISTER_FAMILIES
+from servotwin.signals.shapes import held_pulses, sampled
+from servotwin.units import is_finite
 
 if TYPE_CHECKING:
     from servotwin.signals import Signal
 
-Array = NDArray[np.float64]
+# --- Where a search stands, what a log says there, and the numbers that all logs share beside the parameters ----------
 
+NUISANCES = ("delay", "log_delay", "frame_phase", "frame_period", "control_phase", "angle_offset", "angle_sag",
+             "initial_state")
+SHARED = {"delay": (0.01, "s"), "angle_offset": (0.01, "rad"), "angle_sag": (0.1, "rad/V"), "frame_period": (1e-3, "s")}
+"""Nuisances that all logs share: the step that matters, and the unit."""
+DELAY_SCALE, OFFSET_SCALE, SAG_SCALE, PERIOD_SCALE = (SHARED[name][0] for name in SHARED)
+SPEED_SCALE = 0.1  # rad/s
+MOST_DELAY = 0.5  # s
+STEP = 1e-4  # of a searched number: over the kinks that sticking makes
+FINE = 1e-6  # so little that hardly a kink lies within
+WIDE = 0.03  # over many steps of counts and duties, and ticks at which a shaft just sticks, of a program that samples
+LATER = 1e-5  # s, for the time derivative of signals that are no angles
+
+
+class Frames(NamedTuple):
+    """Which command each pulse of a log carries, and each tick of a program takes.
+
+    Pulse k carries that of `phase` + k · `period`, from the first sample; ticks come by `tick` later after the first
+    pulse than the servo says [s]. When pulses and ticks themselves come is another matter, and continuous; here every
+    command changes at a jump.
+    """
+
+    phase: float
+    period: float
+    tick: float = 0.0
+
+
+class Point(NamedTuple):
+    """Where a search stands.
+
+    Parameters
+    ----------
+    shared : ndarray, shape (p,)
+        The searched numbers of `Space`, then those of `SHARED` that are nuisances (scaled).
+    own : tuple of ndarray
+        Of each log: angle and speed at its start, its own delay, when its first pulse comes (scaled), and when a
+        program without pulses looks at the shaft first (in ticks), as far as they are nuisances.
+    frames : tuple of Frames
+        Of each log, where pulses have a phase; those that a forecast begins with unless given.
+    """
+
+    shared: Array
+    own: tuple[Array, ...]
+    frames: tuple[Frames, ...] = ()
+
+
+class LogPart(NamedTuple):
+    """What one log says: simulated less measured, and the derivatives of that.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (m,)
+        In units of each sensor's noise.
+    shared : ndarray, shape (m, p) or (m, 0)
+    own : ndarray, shape (m, l) or (m, 0)
+    later : ndarray, shape (m,)
+        What a delay changes: derivative by a scaled delay. Of signals that are no angles only where derivatives or
+        rates were asked for.
+    """
+
+    residual: Array
+    shared: Array
+    own: Array
+    later: Array = np.zeros(0)
+
+
+def joined(parts: Sequence[LogPart]) -> Array:
+    """Return the derivatives of some logs in one matrix, by shared numbers and those of each log."""
+    from scipy.linalg import block_diag
+
+    return np.column_stack([np.concatenate([part.shared for part in parts]), block_diag(*(part.own for part in parts))])
+
+# --- The pulses of a log: when they come, and which command each of them carries --------------------------------------
+
+_EDGE = 1e-9  # of a frame: a command so close to an edge is at it
+_NARROW = 1e-6  # s: stamps do not tell commands apart that are nearer
+
+
+class Gap(NamedTuple):
+    """Phases from `low` to `high` [s] for which every pulse carries the same command; high − low is at most a frame."""
+
+    low: float
+    high: float
+
+    @property
+    def middle(self) -> float:
+        """The phase that is farthest from both ends [s]."""
+        return 0.5 * (self.low + self.high)
+
+    @property
+    def width(self) -> float:
+        """How far apart its ends are [s]."""
+        return self.high - self.low
+
+
+def has_pulses(model: Model) -> bool:
+    """Tell whether commands reach a model as pulses: not the mean voltage of the bounded servo, nor goals on a bus."""
+    return not isinstance(model, BoundedServo) and not (isinstance(model, DigitalServo) and model.takes_goals)
+
+
+def changes(log: Log) -> Array:
+    """Return when the command changes by a jump, or pulses begin or end, from the first sample [s].
+
+    Examples
+    --------
+    >>> log = Log(name="a", time=[1.0, 1.1, 1.2], command=[0.0, 0.5, 0.5], command_kind="angle",
+    ...           measured={"output_angle": [0.0, 0.1, 0.5]})
+    >>> [round(float(t), 3) for t in changes(log)]
+    [0.1]
+    """
+    if log.command_hold != "previous":
+        return np.zeros(0)
+    return np.asarray(log.time[log.changes] - log.time[0])
+
+
+def gaps(log: Log, period: float) -> tuple[Gap, ...]:
+    """Return the phases between which the assignment of commands to pulses jumps, in the order of their low ends.
+
+    Examples
+    --------
+    >>> log = Log(name="a", time=[0.0, 0.1, 0.205, 0.3], command=[0.0, 0.5, 1.0, 1.0], command_kind="angle",
+    ...           measured={"output_angle": [0.0, 0.1, 0.5, 1.0]})
+    >>> [(round(gap.low, 4), round(gap.high, 4)) for gap in gaps(log, 0.02)]
+    [(0.0, 0.005), (0.005, 0.02)]
+    """
+    return between(changes(log), period)
+
+
+def between(times: Array, period: float) -> tuple[Gap, ...]:
+    """Return the phases of a beat at which none of some times lies, in the order of their low ends."""
+    residues = np.sort(np.mod(times, period))
+    residues[residues > period * (1.0 - _EDGE)] = 0.0
+    residues = np.unique(residues)
+    if not len(residues):
+        return (Gap(0.0, period),)
+    ends = np.append(residues[1:], residues[0] + period)
+    wide = ends - residues > min(_NARROW, 0.5 * float((ends - residues).max()))
+    return tuple(Gap(float(low), float(high)) for low, high in zip(residues[wide], ends[wide], strict=True))
+
+
+def widest(log: Log, period: float) -> Frames:
+    """Return the frames in which commands are farthest from the edges of pulses."""
+    return Frames(max(gaps(log, period), key=lambda gap: gap.width).middle, period)
+
+
+def gap_of(log: Log, frames: Frames) -> Gap:
+    """Return how far the phase of some frames could go with the same assignment [s].
+
+    The low end is in it; the high end is the first phase at which a command comes a pulse earlier.
+    """
+    residues = np.mod(changes(log), frames.period)
+    if not len(residues):
+        return Gap(frames.phase - 0.5 * frames.period, frames.phase + 0.5 * frames.period)
+    back = np.mod(frames.phase - residues + _EDGE * frames.period, frames.period)
+    ahead = np.mod(residues - frames.phase - _EDGE * frames.period, frames.period)
+    return Gap(frames.phase - float(back.min()), frames.phase + float(ahead.min()))
+
+
+def latency(log: Log, frames: Frames) -> float:
+    """Return how long a command waits in the mean for its pulse, if pulses come at phase + k · period [s]."""
+    times = changes(log)
+    if not len(times):
+        return 0.0
+    k = np.ceil((times - frames.phase) / frames.period - _EDGE)
+    return float(np.mean(frames.phase + k * frames.period - times))
+
+
+def near_edges(log: Log, one: Frames, other: Frames) -> Array:
+    """Return when the commands were given that two assignments put into different pulses [s, on the log's clock]."""
+    times = changes(log)
+    which, also = (np.ceil((times - frames.phase) / frames.period - _EDGE) for frames in (one, other))
+    shift = np.median(also - which) if len(times) else 0.0
+    return np.asarray(times[also - which != shift] + log.time[0])
+
+
+def signal(log: Log, frames: Frames, first: float, period: float, lead: float = 0.0) -> Signal:
+    """Return the command of a log as pulses: the edges at first + k · period, k from −∞ on, carry those of `frames`.
+
+    Its t = 0 is the first sample, or by `lead` earlier [s], later where that is negative, from when on it is the first
+    command. A command that is
+    linear between samples is read at the edges themselves.
+    """
+    least = math.ceil(-(first + lead) / period - _EDGE)
+    k = np.arange(least, least + max(math.ceil((log.duration + lead) / period), 0) + 2)
+    edges = np.maximum(first + lead + k * period, 0.0)
+    time = log.time - log.time[0]
+    asked = frames.phase + k * frames.period
+    latest = np.maximum(np.searchsorted(time, asked + _EDGE * frames.period, side="right") - 1, 0)
+    unit = KINDS[log.command_kind]
+    if log.command_hold == "previous":
+        # Half a frame early, so that an edge that moves a little carries the same
+        return held_pulses(edges - 0.5 * period, log.held[latest], edges[log.sent[latest]], unit=unit,
+                           initial=float(log.held[0]))
+    made = sampled(time + lead, log.held, unit=unit, hold=log.command_hold)
+    return replace(made, initial=float(log.held[0]), edges=tuple(edges[log.sent[latest]].tolist()))
+
+# --- The gain that a log says its servo's loop had, as the firmware has it --------------------------------------------
+
+GAIN = "firmware.proportional_gain"
+_REGISTERS = {"feetech-sts": "P_Coefficient", "dynamixel-x": "Position_P_Gain", "dynamixel-mx": "P_Gain",
+              "dynamixel-xl320": "P_Gain"}
+_LOOP = ("electronics.stretcher_gain", "electronics.one_shot_slope", "electronics.frame_period")
+_OF_PULSES = ("electronics.", "potentiometer.")
+
+
+def with_loop_gain(log: Log, model: Model) -> Log:
+    """Return a log of a servo on a bus with the gain of its loop as a number of the firmware.
+
+    A log's condition `gain` is the register for P: of a servo whose sheet names its registers it makes the duty per
+    angle as they do, and of others as the log's convention of pulses does, times the error_gain_ratio of a file of
+    BAM. What stands for pulses in such a log is left out: a bus servo has none.
+
+    Parameters
+    ----------
+    log : Log
+    model : Model
+        Other models, and logs that say their gain themselves or none at all, are left as they are.
+
+    Raises
+    ------
+    ParameterError
+        If the register cannot have this value.
+    """
+    if not isinstance(model, DigitalServo) or not model.takes_goals:
+        return log
+    own = {name: value for name, value in log.parameters.items() if not name.startswith(_OF_PULSES)}
+    if GAIN not in own:
+        gain = _of_registers(model.servo, log)
+        gain = _of_pulses(log, model.servo) if gain is None else gain
+        own |= {} if gain is None else {GAIN: gain}
+    return log if len(own) == len(log.parameters) and GAIN in log.parameters else replace(log, parameters=own)
+
+
+def _of_registers(servo: Servo, log: Log) -> float | None:
+    written, family = log.conditions.get("gain"), str(servo.sheet.get("registers", ""))
+    if not is_finite(written) or family not in _REGISTERS or not writes_gain(log.conditions.get("motor")):
+        return None
+    value = REGISTER_FAMILIES[family]({_REGISTERS[family]: written}, servo=servo).get(GAIN)  # type: ignore[dict-item]
+    return float(value) if isinstance(value, int | float) else None
+
+
+def _of_pulses(log: Log, servo: Servo) -> float | None:
+    """Return the duty per angle of a chip that stretches K s_µ per angle in each frame [1/rad]."""
+    K, s_mu, T_f = (log.parameters.get(name) for name in _LOOP)
+    p = log.parameters.get("potentiometer.feedback_gain")
+    rig = servo.sheet.get("bam")
+    ratio = rig.get("error_gain_ratio", 1.0) if isinstance(rig, Mapping) else 1.0
+    return None if K is None or s_mu is None or T_f is None or p is None else K * s_mu * p / T_f * ratio
+
+# --- One log, made ready to be compared with a simulation -------------------------------------------------------------
+
+Array = NDArray[np.float64]
 _FRAME_PERIOD, _TICK = "electronics.frame_period", "firmware.control_period"
 _JUMPS = ("armature_current", "supply_current", "bus_voltage")
 _UNKNOWN = 0.1  # s, more than the delay of a servo and its bus

@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.baselines import fit_slew_lag
-from servotwin.identification.fitting.begin import Begin
+from servotwin.identification.fitting.arrow import Begin
+from servotwin.identification.fitting.case import Point
 from servotwin.identification.fitting.fit import Trace
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import LUMPED, Space
 from servotwin.identification.fitting.held_out import with_pulses_of
 from servotwin.identification.fitting.holdout import ErrorTable, LogError, log_error
-from servotwin.identification.fitting.point import Point
 from servotwin.identification.fitting.scatter import by_sensor
+from servotwin.identification.fitting.slew_lag import fit_slew_lag
 from servotwin.identification.fitting.task import Task
 from servotwin.logs.log import Log
 from servotwin.models import Model

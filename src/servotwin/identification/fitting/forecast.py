@@ -17,11 +17,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.identification.fitting.batches import Batch, Done, Running, batches, simulated
-from servotwin.identification.fitting.case import Case, case_like, make_case
-from servotwin.identification.fitting.frames import gaps, signal, widest
-from servotwin.identification.fitting.free import Space
-from servotwin.identification.fitting.lanes import LogLanes
-from servotwin.identification.fitting.point import (
+from servotwin.identification.fitting.case import (
     DELAY_SCALE,
     MOST_DELAY,
     NUISANCES,
@@ -30,10 +26,18 @@ from servotwin.identification.fitting.point import (
     SPEED_SCALE,
     STEP,
     WIDE,
+    Case,
     Frames,
     LogPart,
     Point,
+    case_like,
+    gaps,
+    make_case,
+    signal,
+    widest,
 )
+from servotwin.identification.fitting.free import Space
+from servotwin.identification.fitting.lanes import LogLanes
 from servotwin.logs.log import Log
 from servotwin.models import DigitalServo, Model
 from servotwin.parameters.output_side import output_value

@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.fitting.arrow import Loss
+from servotwin.identification.fitting.case import DELAY_SCALE, STEP, LogPart, Point, latency, widest
 from servotwin.identification.fitting.fit import Trace
 from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.frames import latency, widest
 from servotwin.identification.fitting.lanes import LogLanes
 from servotwin.identification.fitting.phases import PulseChoice, Scan, settled
-from servotwin.identification.fitting.point import DELAY_SCALE, STEP, LogPart, Point
 from servotwin.identification.fitting.scatter import by_sensor
 from servotwin.logs.log import ANGLES
 from servotwin.simulation.lanes.inputs import LOAD_NAMES

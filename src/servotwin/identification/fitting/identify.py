@@ -2,48 +2,430 @@
 
 from __future__ import annotations
 
+import math
 import time as clock
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.errors import InputError, ServotwinError
-from servotwin.identification.fitting import checks
-from servotwin.identification.fitting.arrow import Loss, Outcome
-from servotwin.identification.fitting.assumptions import HINTED, WANTED, Assumption, freed, most_wanted, plausible
+from servotwin.errors import InputError, PlausibilityWarning, ServotwinError
+from servotwin.identification.fitting import fit as checks
+from servotwin.identification.fitting.arrow import Begin, Loss, Outcome, Prior, Search
+from servotwin.identification.fitting.assumptions import (
+    HINTED,
+    WANTED,
+    Assumption,
+    Ends,
+    ends,
+    freed,
+    most_wanted,
+    plausible,
+    systematic,
+    with_assumptions,
+)
 from servotwin.identification.fitting.batches import FIT_ACCURACY, Running
-from servotwin.identification.fitting.begin import Begin
-from servotwin.identification.fitting.clocks import ticking
-from servotwin.identification.fitting.common_cause import common_cause
-from servotwin.identification.fitting.comparison import BESIDE, ErrorTables, compare
-from servotwin.identification.fitting.doubting import assumptions_at, doubts_of
-from servotwin.identification.fitting.doubts import Doubts
-from servotwin.identification.fitting.findings import BY_ITSELF, explained, first_looks, mended
-from servotwin.identification.fitting.fit import Fit, Start, Trace
+from servotwin.identification.fitting.case import (
+    DELAY_SCALE,
+    FINE,
+    NUISANCES,
+    OFFSET_SCALE,
+    SHARED,
+    STEP,
+    LogPart,
+    Point,
+    has_pulses,
+)
+from servotwin.identification.fitting.clocks import delay_range, phase_errors, ticking, unsure_commands
+from servotwin.identification.fitting.comparison import BESIDE, SLEW, ErrorTables, compare
+from servotwin.identification.fitting.diagnosis import diagnose
+from servotwin.identification.fitting.diagnosis.drifts import counted_stamps
+from servotwin.identification.fitting.fit import BY_ITSELF, Fit, Start, Trace, explained, first_looks, mended
 from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.foreseen import Foreseen, foreseen
-from servotwin.identification.fitting.frames import has_pulses
 from servotwin.identification.fitting.free import Bounds, Priors, Space
 from servotwin.identification.fitting.held_out import trace_of, with_pulses_of
 from servotwin.identification.fitting.holdout import split
-from servotwin.identification.fitting.judging import leaves_noise, with_verdict
-from servotwin.identification.fitting.linearised import LINEARISED, hurried
-from servotwin.identification.fitting.phases import settled
-from servotwin.identification.fitting.point import NUISANCES, SHARED, Point
+from servotwin.identification.fitting.noise import SensorSeries, noise_of
+from servotwin.identification.fitting.phases import credible, settled
 from servotwin.identification.fitting.record import identified_servo, stopped, with_record, with_what_logs_say
 from servotwin.identification.fitting.registers import RegisterSearch, as_logs_say, register_search
 from servotwin.identification.fitting.stopping import Course, Within
 from servotwin.identification.fitting.task import HUBER, Task
-from servotwin.identification.fitting.yielding import Dropped, Widened, Yielded, settle, widened, yielded
-from servotwin.logs.log import Log
+from servotwin.identification.fitting.uncertainty import (
+    Counts,
+    Rows,
+    Uncertainty,
+    explain,
+    rows_of,
+    simplest,
+    uncertainty,
+)
+from servotwin.identification.fitting.validate import common_cause
+from servotwin.identification.fitting.verdict import (
+    UNHELD,
+    Cause,
+    Rival,
+    Verdict,
+    against,
+    intervals_said,
+    judge,
+    rival,
+    shown,
+)
+from servotwin.identification.fitting.yielding import (
+    Doubts,
+    Dropped,
+    Foreseen,
+    Widened,
+    Yielded,
+    allowed,
+    foreseen,
+    prior_share,
+    settle,
+    sizes_at,
+    vague,
+    widened,
+    with_remedies,
+    yielded,
+)
+from servotwin.logs.column_values import step_of
+from servotwin.logs.log import ANGLES, Log
 from servotwin.models import DigitalServo, Model
 from servotwin.parameters import Servo
 from servotwin.simulation.progress import Crew
 from servotwin.simulation.start import accuracy_of
+
+# --- Instruments that count -------------------------------------------------------------------------------------------
+
+def counts_of(forecast: Forecast, k: int) -> Counts | None:
+    """Return which samples of a log share a reading; None where none of its instruments counts."""
+    case = forecast.cases[k]
+    steps = {name: step_of(values) for name, values in case.values.items()}
+    if not any(steps.values()):
+        return None
+    reading, power = [], []
+    first = 0
+    for name, values in case.values.items():
+        step = steps[name]
+        same = np.append(False, np.abs(np.diff(values)) < 0.5 * step)
+        found = first + np.cumsum(~same) - 1
+        first = int(found[-1]) + 1
+        reading.append(found)
+        power.append(np.full(len(values), step**2 / 12.0 / case.sigma(name, forecast.noise) ** 2))
+    names = forecast.names_of_own(case)
+    belief = np.zeros(len(names))
+    if "output_angle" in names and next(iter(case.values)) == "output_angle":
+        place = names.index("output_angle")
+        belief[place] = float(forecast.own_belief(case)[1][place]) * forecast.noise["output_angle"] / OFFSET_SCALE
+    return Counts(np.concatenate(reading), np.concatenate(power), belief)
+
+# --- The doubts of a fit: how surely it knows its numbers, and what the logs do not say of them -----------------------
+
+Told = Callable[[float, str], None]
+
+
+def doubts_of(task: Task, found: Outcome, level: float, show: Told) -> Doubts:
+    """Return covariance, ends of the intervals, what is not determined, and what is prior.
+
+    Where lanes may go nearly they do: what counts is how the cost rises, and it rises alike.
+
+    Parameters
+    ----------
+    task : Task
+    found : Outcome
+        Its end.
+    level : float
+        Of the intervals.
+    show : callable
+    """
+    with task.forecast.roughly():
+        return _doubts_of(task, found, level, show)
+
+
+def assumptions_at(task: Task, found: Outcome) -> tuple[Assumption, ...]:
+    """Return what a servo file leaves out or assumes, and what the logs say of it where a search ended."""
+    with task.forecast.roughly():
+        return systematic(task, found.point, *_straight(task, found)[:4]).numbers
+
+
+class _Straight(NamedTuple):
+    """The problem made straight at a point: what logs say there, and the covariance of the shared numbers.
+
+    Numbers that are not determined have flags, and directions in which nothing is known.
+    """
+
+    parts: list[LogPart]
+    beliefs: list[Prior]
+    rows: list[Rows]
+    doubt: Uncertainty
+    information: Array
+    flags: NDArray[np.bool_]
+    directions: Array
+
+
+def _straight(task: Task, found: Outcome) -> _Straight:
+    forecast = task.forecast
+    parts = forecast.at(found.point, central=True, cases=task.fitted)
+    beliefs = [Prior(*forecast.own_belief(forecast.cases[k])) for k in task.fitted]
+    rows: list[Rows] = [rows_of(part, task.loss, own, found.point.own[k], counts_of(forecast, k))
+                        for k, part, own in zip(task.fitted, parts, beliefs, strict=True)]
+    stuck = task.at_bound(found) | task.held
+    doubt = uncertainty(rows, task.prior, stuck)
+    information = _information(task, found, parts, beliefs)
+    flags, directions = vague(information, doubt.inflation, sizes_at(task, found), ~task.held)
+    directions = simplest(directions)
+    if flags.any():
+        doubt = uncertainty(rows, task.prior, stuck, directions)
+    return _Straight(parts, beliefs, rows, doubt, information, flags, directions)
+
+
+def _doubts_of(task: Task, found: Outcome, level: float, show: Told) -> Doubts:
+    forecast = task.forecast
+    parts, beliefs, rows, doubt, information, flags, directions = _straight(task, found)
+    stuck = task.at_bound(found) | task.held
+    names = (*forecast.space.names, *forecast.extra)
+    shares = [*forecast.space.shares(found.point.shared), *([math.nan] * len(forecast.extra))]
+    open_ = explain(names, shares, flags, directions)
+    which = [k for k in range(len(names)) if not flags[k] and not stuck[k]]
+    search = Search(forecast, task.loss, task.prior, task.lower, task.upper, task.fitted, held=stuck)
+    found = replace(found, cost=search.costs([found.point])[0]) if forecast.nearly else found
+    count = max(len(which), 1)
+    seen: list[Outcome] = []
+    reaching = ends(search, found, doubt, which, level, rows=rows, deeper=seen.append,
+                    tell=lambda done: show(0.76 + 0.18 * done / count, "intervals"))
+    more = systematic(task, found.point, parts, beliefs, rows, doubt)
+    return Doubts(doubt, with_assumptions(reaching, doubt, level, more),
+                  with_remedies(forecast, found.point, open_, names),
+                  prior_share(names, doubt, reaching, flags, directions, task.prior.weight),
+                  allowed(task, found, rows, directions, information, flags, doubt, reaching, level),
+                  _spans(task, found, parts, rows, doubt, level),
+                  min(seen, key=lambda there: there.cost, default=None), more)
+
+
+def _spans(task: Task, found: Outcome, parts: Sequence[LogPart], rows: Sequence[Rows], doubt: Uncertainty,
+           level: float) -> dict[str, tuple[float, float]]:
+    """Return the range of the delay (SI) where each log's pulses say when they take effect."""
+    if not task.held.any():
+        return {}
+    reach = doubt.quantile(1.0 - (1.0 - level) / len(task.fitted))  # all of the logs have to hold
+    errors = phase_errors(task.forecast, task.fitted, parts, rows, task.loss, doubt)
+    scan = task.scan(found.point)
+    pulses = credible(scan, task.fitted)
+    task.unsure = unsure_commands(scan, pulses)
+    return {"delay": delay_range(scan, pulses, [
+        reach * error + task.stamps_off.get(k, 0.0) for k, error in zip(task.fitted, errors, strict=True)])}
+
+
+def _information(task: Task, found: Outcome, central: Sequence[LogPart], beliefs: Sequence[Prior]) -> Array:
+    """Return what the logs say of the shared numbers, from differences so fine that what has no effect has none."""
+    jagged = task.forecast.step > STEP  # then fine differences are those of steps, not of what moves the shaft
+    parts = central if jagged else task.forecast.at(found.point, step=FINE, cases=task.fitted)
+    rows = [rows_of(part, task.loss, own, found.point.own[k])
+            for k, part, own in zip(task.fitted, parts, beliefs, strict=True)]
+    return np.asarray(np.sum([(r.slope * r.inside[:, None]).T @ r.slope for r in rows], axis=0))
+
+# --- The last stage of a fit: its verdict, and where that is bad the trials of what may be the matter -----------------
+
+_OUTLIERS = 0.005  # of the samples: then they are told
+_FINEST = 1e-9  # SI: what no simulation is told to be nearer
+_EFFORT = 3.0  # times that of the fit, for all trials: the verdict itself and their start are not counted
+
+
+def with_verdict(task: Task, point: Point, fit: Fit, course: Course, slew: Mapping[int, Array], *,
+                 trials: bool) -> Fit:
+    """Return a fit with its verdict, and with the causes that explain a bad one.
+
+    Parameters
+    ----------
+    task : Task
+    point : Point
+        Where it ended.
+    fit : Fit
+    course : Course
+        Told the share done, and what goes on.
+    slew : mapping of int to ndarray
+        What delay, slew and lag leave where each log is judged (SI); none where there is no such model beside.
+    trials : bool
+        Whether causes are tried.
+    """
+    effort = task.forecast.work
+    fitted = [trace for trace in fit.traces if not trace.held_out]
+    sensors = {trace.signal for trace in fitted}
+    if len(sensors) != 1:
+        return fit
+    sensor = sensors.pop()
+    verdict = judge([_series(trace) for trace in fitted], sensor, _rows(task, point), len(fit.names),
+                    max(task.forecast.running.accuracy, _FINEST))
+    verdict = against(replace(verdict, noise={**verdict.noise, **_others(task)}),
+                      _rival(fit.traces, slew, verdict.noise[sensor]), sensor)
+    causes: tuple[Cause, ...] = ()
+    try:
+        if trials:
+            causes = _outliers(verdict, fitted, sensor)
+        if trials and (verdict.undecided or not verdict.holds):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", PlausibilityWarning)  # what a trial tries is nobody's word
+                found = diagnose(task, point, fit.traces, verdict, sensor, _EFFORT * effort, _half_widths(fit),
+                                 lambda share, text: course(0.96 + 0.04 * share, text))
+            causes, verdict = (*causes, *found.causes), replace(verdict, moved=found.moved)
+            if not causes and not verdict.holds and (counted := counted_stamps(fitted, sensor, verdict.noise[sensor])):
+                causes = (counted,)
+    except KeyboardInterrupt:
+        trials, fit = False, replace(fit, warnings=("stopped: not all causes were tried", *fit.warnings))
+    if verdict.undecided and any(cause.name != "outliers" for cause in causes):
+        # What a number of the model tells of samples that it was not fitted to is no noise
+        verdict = replace(verdict, holds=False, sentence=f"residuals are {verdict.ratio:.2g} times the noise of "
+                          f"{shown(verdict.noise[sensor], sensor)} that neighbours show, and follow a better model: "
+                          f"this one lacks something; {UNHELD}")
+    said = intervals_said(verdict.moved, sought=bool(fit.ends))
+    verdict = replace(verdict, sentence=verdict.sentence.replace(UNHELD, said))
+    verdict = replace(verdict, causes=causes, sentence=_with_causes(verdict, causes, tried=trials))
+    if not verdict.holds or verdict.undecided:
+        return replace(fit, verdict=verdict, warnings=(verdict.sentence, *fit.warnings))
+    wanted = [f"the logs want {one.words} {one.mean:.2g} ± {one.std:.1g}{one.unit_shown} where {one.assumed:z.3g} is "
+              f"assumed ({one.wanted:.2g} standard errors): intervals allow for it"
+              for one in fit.assumptions if one.wanted > WANTED]
+    return replace(fit, verdict=verdict, warnings=(*fit.warnings, *wanted))
+
+
+def leaves_noise(task: Task, point: Point) -> bool:
+    """Tell whether what a point leaves of its fitted logs is noise of one sensor, without trials."""
+    parts = task.forecast.at(point, derivatives=False, cases=task.fitted)
+    fitted = [trace_of(task.forecast, point, k, part, held_out=False)
+              for k, part in zip(task.fitted, parts, strict=True)]
+    sensors = {trace.signal for trace in fitted}
+    if len(sensors) != 1:
+        return False
+    verdict = judge([_series(trace) for trace in fitted], sensors.pop(), _rows(task, point), task.forecast.size,
+                    max(task.forecast.running.accuracy, _FINEST))
+    return verdict.holds and not verdict.undecided
+
+
+def _rival(traces: Sequence[Trace], slew: Mapping[int, Array], noise: float) -> Rival | None:
+    """Return how delay, slew and lag stand beside the fit: on the logs that were held out, else on those fitted."""
+    held_out = any(trace.held_out for trace in traces)
+    judged = {k: trace for k, trace in enumerate(traces) if trace.held_out is held_out and k in slew}
+    if not judged:
+        return None
+    pairs = []
+    for k, trace in judged.items():
+        known = np.isfinite(slew[k])
+        pairs.append((trace.residual[trace.judged][known], slew[k][known]))
+    step = float(np.median(np.concatenate([np.diff(trace.time) for trace in judged.values()])))
+    return rival(SLEW, pairs, step, noise, held_out=held_out)
+
+
+def _half_widths(fit: Fit) -> dict[str, float]:
+    """Return the half widths of the intervals by name, on the scale of the search."""
+    if fit.doubt is None:
+        return {}
+    return {fit.names[k]: 0.5 * (ends.upper - ends.lower) * float(fit.doubt.std[k]) for k, ends in fit.ends.items()
+            if fit.names[k] not in fit.spans}
+
+
+def _with_causes(verdict: Verdict, causes: Sequence[Cause], *, tried: bool) -> str:
+    if verdict.holds or not tried:
+        return verdict.sentence
+    if not causes:
+        return f"{verdict.sentence}; none of the causes that were tried explains it"
+    return f"{verdict.sentence}; what explains most is {causes[0].sentence}"
+
+
+def _outliers(verdict: Verdict, traces: Sequence[Trace], sensor: str) -> tuple[Cause, ...]:
+    """Return samples that lie far off alone as a cause, without any trial."""
+    if verdict.outliers < _OUTLIERS:
+        return ()
+    every = np.concatenate([trace.residual for trace in traces])
+    before = float(np.sqrt(np.mean(every**2)))
+    after = verdict.ratio * verdict.noise[sensor]
+    if after >= before:
+        return ()  # they are the least of what is left
+    return (Cause("outliers", f"outliers: {100.0 * verdict.outliers:.2g} % of the samples lie far off alone; without "
+                  f"them the error is {shown(after, sensor)} instead of {shown(before, sensor)} (look for a loose "
+                  "contact of the sensor; loss \"huber\" bears them)", before, after, "leave these samples out"),)
+
+
+def _rows(task: Task, point: Point) -> list[Rows]:
+    """Return what each fitted log says of the shared numbers."""
+    forecast = task.forecast
+    (parts,) = forecast.at_all([point], derivatives=True, cases=task.fitted, leading=True)
+    return [rows_of(part, task.loss, Prior(*forecast.own_belief(forecast.cases[k])), point.own[k])
+            for k, part in zip(task.fitted, parts, strict=True)]
+
+
+def _others(task: Task) -> dict[str, float]:
+    """Return the noise of sensors that are no angles, as far as neighbours show it (SI)."""
+    found = {}
+    for name in task.forecast.sensors:
+        if name in ANGLES:
+            continue
+        cases = [case for case in (task.forecast.cases[k] for k in task.fitted) if name in case.places]
+        flat = [SensorSeries(case.log, case.times[case.places[name]] + case.log.start, case.values[name],
+                             np.zeros(len(case.values[name]))) for case in cases]
+        if flat:
+            found[name] = noise_of(flat).size
+    return found
+
+
+def _series(trace: Trace) -> SensorSeries:
+    return SensorSeries(trace.log, trace.time, trace.measured, trace.simulated)
+
+# --- Intervals of a fit that was stopped ------------------------------------------------------------------------------
+
+LINEARISED = "intervals (those here are of the problem made straight at the best so far, three times as wide)"
+"""What is not known, where there are such."""
+_UNKNOWN = 3.0  # times as wide, assumed: among kinks those of a finished fit are up to three times what is straight
+
+
+def hurried(task: Task, found: Outcome, level: float) -> tuple[Outcome, Doubts]:
+    """Return where a fit was stopped, in the noise that it leaves there, and what is known of its numbers by then.
+
+    The problem counts as straight there. How far its end is, and how it bends, is not known: intervals reach to either
+    side of where a whole step would lead, and are three times as wide.
+    """
+    forecast, nothing = task.forecast, Doubts()
+    try:
+        task.measure(found.point)
+        parts = forecast.at(found.point, central=True, cases=task.fitted)
+        beliefs = [Prior(*forecast.own_belief(forecast.cases[k])) for k in task.fitted]
+        rows: list[Rows] = [rows_of(part, task.loss, own, found.point.own[k], counts_of(forecast, k))
+                            for k, part, own in zip(task.fitted, parts, beliefs, strict=True)]
+        stuck = task.at_bound(found) | task.held
+        doubt = uncertainty(rows, task.prior, stuck)
+        flags, directions = vague(doubt.information, doubt.inflation, sizes_at(task, found), ~task.held)
+        if flags.any():
+            doubt = uncertainty(rows, task.prior, stuck, simplest(directions))
+    except (ServotwinError, np.linalg.LinAlgError, ValueError, ArithmeticError):
+        return found, nothing  # nothing is there to make straight
+    slope = (found.point.shared - task.prior.mean) * task.prior.weight**2 + np.sum(
+        [r.slope.T @ r.score for r in rows], axis=0)
+    ahead, std = np.abs(doubt.curvature @ slope), doubt.std
+    reaching = {k: Ends(-reach, reach, "linearised") for k in np.flatnonzero(~flags & ~stuck).tolist()
+                if std[k] > 0.0 and math.isfinite(reach := _UNKNOWN * (doubt.quantile(level, k) + ahead[k] / std[k]))}
+    spans = _pulses(task, found)
+    reaching = {k: reach for k, reach in reaching.items() if not (spans and k == _delay(task))}
+    return found, replace(nothing, doubt=doubt, ends=reaching, spans=spans) if reaching else nothing
+
+
+def _delay(task: Task) -> int:
+    """Return the place of the delay among the shared numbers; -1 where it is none."""
+    extra = task.forecast.extra
+    return len(task.forecast.space) + extra.index("delay") if "delay" in extra else -1
+
+
+def _pulses(task: Task, found: Outcome) -> dict[str, tuple[float, float]]:
+    """Return the range of the delay (SI) where pulses have not told yet which of them carries a command: a frame."""
+    k = _delay(task)
+    if k < 0 or not task.forecast.phased:
+        return {}
+    delay = float(found.point.shared[k]) * DELAY_SCALE
+    return {"delay": (max(delay - task.period, 0.0), delay + task.period)}
+
+# --- `identify` -------------------------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 _VALLEYS = 3  # that a fit goes on to, at most

@@ -10,34 +10,281 @@ was chosen are fitted once more with each; where one is chosen, so are the riche
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from servotwin.errors import InputError
-from servotwin.identification.fitting import checks
-from servotwin.identification.fitting.begin import Begin
-from servotwin.identification.fitting.choosing import (
-    Ladder,
-    Rung,
-    choice_of,
-    ladder_of,
-    rung_of,
-    with_criterion,
-)
-from servotwin.identification.fitting.fit import Fit
+from servotwin.identification.fitting import fit as checks
+from servotwin.identification.fitting.arrow import Begin, Loss
+from servotwin.identification.fitting.case import LogPart
+from servotwin.identification.fitting.fit import Fit, Trace
 from servotwin.identification.fitting.free import nominal, stated
+from servotwin.identification.fitting.holdout import LogError, pooled
 from servotwin.identification.fitting.identify import identify
+from servotwin.identification.fitting.phases import widening
 from servotwin.identification.fitting.stopping import Within
 from servotwin.logs.log import Log
 from servotwin.models.base import Model
 from servotwin.parameters import Servo
+
+# --- Why one fit of a ladder is chosen over a simpler one, in words: by how much, and in what motion ------------------
+
+Array = NDArray[np.float64]
+_STANDS = 0.02  # of a log's largest speed: below, it stands
+_WINDOW = 0.05  # s, over which that is told: counts of an encoder are no speed
+_LEAST = 0.02  # share of an error that is worth a word
+
+
+def gained(simpler: Fit, chosen: Fit, name: str) -> str:
+    """Return what a fit gains over a simpler one of the same logs, as half a sentence; empty where it gains nothing.
+
+    Judged are the logs that were held out; all of them where there are none.
+
+    Parameters
+    ----------
+    simpler, chosen : Fit
+    name : str
+        Of the simpler one.
+    """
+    before, after = (_squares(fit) for fit in (simpler, chosen))
+    if not before or set(before) != set(after):
+        return ""
+    whole = _change(before.values(), after.values())
+    if not whole < -_LEAST:
+        return ""
+    held = any(trace.held_out for trace in chosen.traces)
+    told = f"{_percent(whole)} less off than {name} on logs that were {'held out' if held else 'fitted'}"
+    states = {word: _change([x[k] for x in before.values()], [x[k] for x in after.values()])
+              for k, word in enumerate(("where the shaft stands", "where it moves"))}
+    parts = [f"{word} {_percent(x)} {'less' if x < 0.0 else 'more'}" for word, x in states.items() if abs(x) > _LEAST]
+    motions: dict[str, list[str]] = {}
+    for log, motion in {t.log.name: t.log.motion for t in chosen.traces if t.log.name in after}.items():
+        motions.setdefault(motion, []).append(log)
+    if len(motions) > 1:
+        each = {motion: _change([before[x] for x in some], [after[x] for x in some])
+                for motion, some in motions.items()}
+        best = min(each, key=lambda motion: each[motion])
+        if each[best] < -_LEAST:
+            parts.append(f"most in {best}, {_percent(each[best])}")
+    return told + (f" ({'; '.join(parts)})" if parts else "")
+
+
+def _percent(change: float) -> str:
+    return f"{100.0 * abs(change):.0f} %"
+
+
+def _change(before: Iterable[Array], after: Iterable[Array]) -> float:
+    """Return by which share the root mean square changes; of rows of sums of squares and counts."""
+    roots = []
+    for rows in (before, after):
+        total = np.sum([np.atleast_2d(row).sum(axis=0) for row in rows], axis=0)
+        roots.append(math.sqrt(total[0] / total[1]) if total[1] else math.nan)
+    return roots[1] / roots[0] - 1.0 if roots[0] > 0.0 else 0.0
+
+
+def _squares(fit: Fit) -> dict[str, Array]:
+    """Return sum of squares and number of the judged samples that stand and that move, by log."""
+    held = [trace for trace in fit.traces if trace.held_out] or list(fit.traces)
+    return {trace.log.name: _of(trace) for trace in held if trace.signal == "output_angle" and len(trace.time) > 2}
+
+
+def _of(trace: Trace) -> Array:
+    ahead, behind = (np.interp(trace.time + side * _WINDOW, trace.time, trace.measured) for side in (0.5, -0.5))
+    speed = np.abs(ahead - behind)
+    stands = speed <= _STANDS * float(np.max(speed))
+    squares: list[Sequence[float]] = []
+    for some in (stands & trace.judged, ~stands & trace.judged):
+        squares.append((float(np.sum(trace.residual[some] ** 2)), float(np.sum(some))))
+    return np.array(squares)
+
+# --- Which of several fits to the same logs the data pay for ----------------------------------------------------------
+
+_FEWEST = 3  # held out logs, whose scatter is believed
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One friction law, or one structure.
+
+    Parameters
+    ----------
+    name : str
+        "M1" to "M6", or such as "digital, diode, M1".
+    fit : Fit
+    training, holdout : float
+        Rms error over all samples [rad]; nan without logs that were held out.
+    criterion : float
+        Bayesian information criterion of the fitted logs, with their residuals counted as often as those of the rung
+        that leaves least are independent; smaller is better.
+    """
+
+    name: str
+    fit: Fit
+    training: float
+    holdout: float
+    criterion: float
+
+    @property
+    def overfits(self) -> bool:
+        """Whether it is much better on the logs that it was fitted to than on others."""
+        return self.holdout > 1.3 * self.training
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """All rungs, and the one that is chosen.
+
+    Parameters
+    ----------
+    rungs : tuple of Rung
+    chosen : str
+    reason : str
+    error : float
+        Rms error on logs that had no say in the choice [rad], smaller ones being luck: the logs that were held out are
+        halved, each half chooses a rung, and the other half tells its error. Where the criterion chose, that of all
+        logs that were held out; nan with fewer than two.
+    choices : tuple of str
+        The rungs that the halves chose: two that differ are a close call.
+    """
+
+    rungs: tuple[Rung, ...]
+    chosen: str
+    reason: str
+    error: float = math.nan
+    choices: tuple[str, ...] = ()
+
+    @property
+    def fit(self) -> Fit:
+        """That of the chosen rung."""
+        return self[self.chosen].fit
+
+    def __getitem__(self, name: str) -> Rung:
+        for rung in self.rungs:
+            if rung.name == name:
+                return rung
+        raise InputError("rung", got=name, allowed=", ".join(rung.name for rung in self.rungs))
+
+
+def ladder_of(rungs: Sequence[Rung], select: str) -> Ladder:
+    """Return fits to the same logs, the simplest first, with the one that is chosen.
+
+    Parameters
+    ----------
+    rungs : sequence of Rung
+    select : {"holdout", "criterion"}
+        As of `friction_ladder`.
+    """
+    rungs = with_criterion(rungs)
+    chosen, reason = choice_of(rungs, select)
+    told = told_of(rungs, select)
+    before = _simpler(rungs, chosen)
+    if before is not None:
+        words = gained(before.fit, next(rung for rung in rungs if rung.name == chosen).fit, before.name)
+        reason += f"; {words}" if words else ""
+    return Ladder(tuple(rungs), chosen, reason, told.error, told.choices)
+
+
+def _simpler(rungs: Sequence[Rung], chosen: str) -> Rung | None:
+    """Return the best of the rungs with fewer parameters than the one that is chosen; None where there is none."""
+    own = len(next(rung for rung in rungs if rung.name == chosen).fit.names)
+    fewer = [rung for rung in rungs if len(rung.fit.names) < own]
+    return min(fewer, key=lambda rung: rung.training if math.isnan(rung.holdout) else rung.holdout, default=None)
+
+
+def rung_of(name: str, fit: Fit) -> Rung:
+    """Return a fit as one of several, under a name."""
+    own = type(fit.model).__name__
+    training = fit.training.total()[own]
+    holdout = fit.holdout.total()[own] if fit.holdout else math.nan
+    return Rung(name, fit, training, holdout, math.nan)
+
+
+def with_criterion(rungs: Sequence[Rung]) -> list[Rung]:
+    """Return rungs with their information criterion.
+
+    All count the same residuals, as often as those of the rung that leaves least are independent: where each counted
+    its own, one whose residuals remember longer would have fewer, and so seem to explain more of them.
+    """
+    least = min(rungs, key=lambda rung: rung.training)
+    fitted = [trace for trace in least.fit.traces if not trace.held_out]
+    samples = sum(len(trace.time) for trace in fitted) / _memory([trace.residual for trace in fitted])
+    return [replace(rung, criterion=samples * math.log(max(rung.training, 1e-300) ** 2)
+                    + len(rung.fit.names) * math.log(max(samples, 1.0))) for rung in rungs]
+
+
+def _memory(residuals: Sequence[NDArray[np.float64]]) -> float:
+    """Return how many residuals stand for one that is independent, if each follows the one before it."""
+    return widening([LogPart(residual, residual, residual) for residual in residuals], Loss())
+
+
+class _Told(NamedTuple):
+    """An error that the choice did not see, and which rungs were chosen without it."""
+
+    error: float
+    choices: tuple[str, ...]
+
+
+def told_of(rungs: Sequence[Rung], select: str) -> _Told:
+    """Return the error on logs that did not choose: those held out in two halves, each told by the other's choice."""
+    if _by_criterion(rungs, select):
+        chosen, _ = choice_of(rungs, select)
+        return _Told(next(rung.holdout for rung in rungs if rung.name == chosen), ())
+    count = len(_errors(rungs[0]))
+    if count < 2:
+        return _Told(math.nan, ())
+    halves = [range(k, count, 2) for k in range(2)]  # logs of one kind of motion lie side by side
+    named = {rung.name: rung for rung in rungs}
+    choices = tuple(choice_of(rungs, select, half)[0] for half in halves)
+    told = [_errors(named[name])[k] for name, other in zip(choices, reversed(halves), strict=True) for k in other]
+    return _Told(pooled(told), choices)
+
+
+def _by_criterion(rungs: Sequence[Rung], select: str) -> bool:
+    return select == "criterion" or any(math.isnan(rung.holdout) for rung in rungs)
+
+
+def choice_of(rungs: Sequence[Rung], select: str, some: Sequence[int] | None = None) -> tuple[str, str]:
+    """Return the rung that some of the held out logs choose, or all, and why."""
+    if _by_criterion(rungs, select):
+        best = min(rungs, key=lambda rung: rung.criterion)
+        return best.name, "smallest information criterion"
+    best = min(rungs, key=lambda rung: pooled(_errors(rung, some)))
+    for rung in rungs:  # from the simplest on
+        worse, doubt = _difference(rung, best, some)
+        if worse <= doubt:
+            reason = "smallest error on logs that were held out" if rung is best else (
+                f"simplest within one standard error of {best.name}, the smallest error on logs that were held out")
+            return rung.name, reason
+    return best.name, "smallest error on logs that were held out"
+
+
+def _difference(rung: Rung, best: Rung, some: Sequence[int] | None) -> tuple[float, float]:
+    """Return by how much a rung's mean square error of held out logs is above the best, and its standard error.
+
+    Two logs do not say how logs scatter; with so few it is the standard error of a mean square of their samples.
+    """
+    theirs = _errors(best, some)
+    gaps = np.array([a.rms**2 - b.rms**2 for a, b in zip(_errors(rung, some), theirs, strict=True)])
+    if len(gaps) < _FEWEST:
+        return float(gaps.mean()), pooled(theirs) ** 2 * math.sqrt(2.0 / sum(e.samples for e in theirs))
+    return float(gaps.mean()), float(gaps.std(ddof=1) / math.sqrt(len(gaps)))
+
+
+def _errors(rung: Rung, some: Sequence[int] | None = None) -> tuple[LogError, ...]:
+    errors = rung.fit.holdout.errors[type(rung.fit.model).__name__]
+    return errors if some is None else tuple(errors[k] for k in some)
+
+# --- The friction laws M1 to M6 one after the other on the same logs, and which of them the data pay for --------------
 
 _BASE = ("output_coulomb_torque", "motor.motor_viscous_friction")
 _STRIBECK = ("friction.breakaway_ratio", "friction.stribeck_speed")
 _DIRECTED = ("friction.load_friction_motor", "friction.load_friction_external")
 _DIRECTED_STRIBECK = ("friction.load_friction_motor_stribeck", "friction.load_friction_external_stribeck")
 _QUAD = ("friction.load_friction_motor_quad", "friction.load_friction_external_quad")
-
 RUNGS: dict[str, tuple[str, ...]] = {
     "M1": _BASE,
     "M2": (*_BASE, *_STRIBECK),
@@ -47,7 +294,6 @@ RUNGS: dict[str, tuple[str, ...]] = {
     "M6": (*_BASE, *_STRIBECK, *_DIRECTED, *_DIRECTED_STRIBECK, *_QUAD),
 }
 """Searched friction parameters of each law (Duclusaud et al. 2025)."""
-
 _TERMS = tuple(dict.fromkeys(name for names in RUNGS.values() for name in names if name.startswith("friction.")))
 _FIRST = {  # where a term begins that the rung before does not have: little of it, so that the search is near there
     "friction.breakaway_ratio": 1.1, "friction.load_friction": 0.05, "friction.load_friction_stribeck": 0.05,
@@ -59,7 +305,6 @@ _ALIKE = {"friction.load_friction": _DIRECTED, "friction.load_friction_stribeck"
 EXTRAS: dict[str, str] = {
     "soft supply": "supply.internal_resistance", "soft bridge": "supply.bridge_drop_resistance"}
 """What gives way beside friction, and what is searched of it; the name of such a rung is "M4, soft supply"."""
-
 _ON_THE_BUS = "soft supply"
 _SOFT_SHARE = 0.2  # of the armature's resistance, where that of what gives way begins: nearer to 0 it may stay there
 _STIFFER = 0.9  # of the armature's resistance, that then begins lower
@@ -275,5 +520,3 @@ def _start(base: Servo, name: str, servo: Servo) -> Servo:
         R_a = float(nominal(base, "motor.armature_resistance") or 1.0)
         values |= {EXTRAS[extra]: _SOFT_SHARE * R_a, "motor.armature_resistance": _STIFFER * R_a}
     return base.replace(values, source="where a rung of the friction ladder begins")
-
-

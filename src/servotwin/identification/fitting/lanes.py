@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.fitting.batches import Bundle
-from servotwin.identification.fitting.frames import signal
-from servotwin.identification.fitting.point import (
+from servotwin.identification.fitting.case import (
     DELAY_SCALE,
     LATER,
     OFFSET_SCALE,
@@ -20,6 +19,7 @@ from servotwin.identification.fitting.point import (
     STEP,
     LogPart,
     Point,
+    signal,
 )
 from servotwin.simulation.lanes.inputs import LOAD_NAMES
 

@@ -2,26 +2,91 @@
 
 The cost is smooth in everything else, so it is scanned here and fitted there. A trial is one simulation of a log; when
 its pulses come is corrected to first order, by what a delay would change.
+
+A command acts from the first tick on that follows its pulse. Where ticks and pulses lie to each other is no more than
+that to a log: between two ends of pulses, later ticks cannot be told from earlier pulses.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.fitting.arrow import Loss
+from servotwin.identification.fitting.case import (
+    DELAY_SCALE,
+    Frames,
+    Gap,
+    LogPart,
+    Point,
+    between,
+    changes,
+    gap_of,
+    gaps,
+    latency,
+)
 from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.frames import Gap, changes, gap_of, gaps, latency
-from servotwin.identification.fitting.point import DELAY_SCALE, Frames, LogPart, Point
-from servotwin.identification.fitting.ticks import ticks_of
+
+if TYPE_CHECKING:
+    from servotwin.identification.fitting.forecast import Forecast
+
+# --- The ticks of a program that pulses command: which command each of them takes -------------------------------------
+
+_TICK, _PHASE = "firmware.control_period", "firmware.control_phase"
+
+
+class Ticks(NamedTuple):
+    """When pulses end that bring another command, after the tick that the servo's own phase says.
+
+    Parameters
+    ----------
+    period : float
+        T_c [s].
+    ends : ndarray
+        Of pulses, within a tick [s].
+    gaps : tuple of Gap
+        Later ticks, by up to T_c [s], between which one of them takes another command.
+    """
+
+    period: float
+    ends: Array
+    gaps: tuple[Gap, ...]
+
+    def wait(self, later: float) -> float:
+        """Return how long a command waits in the mean for its tick [s], if ticks come so much later."""
+        return float(np.mean(np.mod(later - self.ends, self.period))) if len(self.ends) else 0.0
+
+    def gap_of(self, later: float) -> Gap:
+        """Return how far ticks that come so much later could go with the same commands [s]."""
+        if not len(self.ends):
+            return Gap(later - 0.5 * self.period, later + 0.5 * self.period)
+        back = float(np.mod(later - self.ends, self.period).min())
+        ahead = float(np.mod(self.ends - later, self.period).min())
+        return Gap(later - back, later + ahead)
+
+
+def ticks_of(forecast: Forecast, point: Point, k: int) -> Ticks:
+    """Return which ticks take which commands of a log, as its pulses come at a point."""
+    case, model = forecast.cases[k], forecast.model
+    values: dict[str, Any] = {**forecast.space.columns(point.shared[None, :len(forecast.space)]),
+                              **case.log.parameters}
+    period, phase = (float(np.ravel(values.get(name, model.value_or(name, 0.0)))[0]) for name in (_TICK, _PHASE))
+    first = forecast.first_pulse(point, k)
+    command = forecast.command_at(point, k)
+    edges = np.array(command.edges)
+    widths = np.asarray(model.command(command)(edges))
+    brings = np.append(True, np.diff(widths) != 0.0) & (edges > 0.0)  # the first of all may be cut off
+    ends = np.mod((edges + widths)[brings] - first - forecast.lead_at(point, k) - phase, period)
+    return Ticks(period, ends, between(ends, period))
+
+# --- The search for what jumps ----------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 Mask = Callable[[int], NDArray[np.bool_]]
-
 _MOST_GAPS = 24  # of a log, that are tried at first
 _TIMES, _FINE_TIMES = 4, 16  # steps of a frame, either way
 _BEST = 3  # that are tried again where they then are best
@@ -359,4 +424,3 @@ def widening(parts: Sequence[LogPart], loss: Loss) -> float:
 def _wrapped(time: float, period: float) -> float:
     """Return a time moved by whole periods to within half of one about 0 [s]."""
     return (time + 0.5 * period) % period - 0.5 * period
-

@@ -21,8 +21,8 @@ from servotwin.parameters.quantity import Quantity
 from servotwin.simulation.lanes.inputs import LOAD_NAMES
 
 if TYPE_CHECKING:
-    from servotwin.identification.fitting.doubts import Doubts
     from servotwin.identification.fitting.fit import Fit
+    from servotwin.identification.fitting.yielding import Doubts
 
 Array = NDArray[np.float64]
 

@@ -18,10 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import ServotwinError
+from servotwin.identification.fitting.case import DELAY_SCALE, GAIN, Point, with_loop_gain
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Space
-from servotwin.identification.fitting.loop_gain import GAIN, with_loop_gain
-from servotwin.identification.fitting.point import DELAY_SCALE, Point
 from servotwin.identification.fitting.stopping import Within
 from servotwin.logs.bam_actuators import writes_gain
 from servotwin.logs.log import Log

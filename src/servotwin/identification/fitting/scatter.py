@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.identification.fitting.case import LogPart
 from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.point import LogPart
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

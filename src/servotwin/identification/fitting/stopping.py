@@ -12,11 +12,103 @@ from types import FrameType
 from typing import Any
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.time_left import TimeLeft
 from servotwin.units import is_finite
 
-Show = Callable[[float, str], None]
+# --- The time that a fit has left, by the time that its stages took so far and what those to come take beside them ----
 
+STAGES = (0.0, 0.42, 0.7, 0.76, 0.95, 0.96, 1.0)
+"""Where rough searches, the search, priors, intervals, errors and trials begin, as they say it."""
+ROUGH, SEARCH, PRIORS, INTERVALS, ERRORS, TRIALS = range(6)
+# The long side of what twenty fits took (benchmarks/identification/time_left.py): what is left shall fall
+_SEARCH = 16.0  # times the rough searches: when pulses come may have to be found first
+_INTERVALS = (5.0, 0.6)  # times the rough searches, and the search
+_PRIORS, _ERRORS, _BESIDE = 0.02, 0.04, 0.03  # of all before; the last for each simpler model
+_TRIALS = 0.9  # of all before
+_AT_LEAST = 0.4  # of what a stage has taken, that it may go on for
+_FROM = 1.0  # s: what is said earlier says nothing
+_RISES = 1.1  # times the least that was said
+
+
+class TimeLeft:
+    """What a fit has left, from what was measured of it.
+
+    Stages whose length nobody knows before, such as the search, count with the long side of what is usual, and causes
+    that may have to be tried count until they need not be.
+
+    Parameters
+    ----------
+    intervals : bool
+        Whether they are sought.
+    beside : int
+        How many simpler models are fitted too.
+    trials : bool
+        Whether causes may be tried.
+
+    Examples
+    --------
+    >>> left = TimeLeft(intervals=True, beside=2, trials=True)
+    >>> [round(left.at(share, now), 1) for share, now in ((0.0, 0.0), (0.42, 2.0), (0.76, 10.0), (0.95, 13.0))]
+    [0.0, 91.4, 23.4, 14.2]
+    """
+
+    def __init__(self, *, intervals: bool, beside: int, trials: bool) -> None:
+        self._intervals, self._errors, self._trials = intervals, _ERRORS + _BESIDE * beside, _TRIALS * trials
+        self._begun = [math.inf] * len(STAGES)
+        self._inner_begun = math.inf  # when the last search told its first step [s]
+        self._least = math.inf
+        self.longer = False
+        """Whether this stage takes longer than anybody could know, so that what was said last is too little."""
+
+    def at(self, share: float, now: float) -> float:
+        """Return what is left [s] at a time since the fit began [s]; stages say which share of theirs is done."""
+        stage = max(k for k in range(len(STAGES) - 1) if share >= STAGES[k])
+        for k in range(stage + 1):
+            self._begun[k] = min(self._begun[k], now)
+        inner = (share - STAGES[stage]) / (STAGES[stage + 1] - STAGES[stage])
+        left = self._ahead(stage, inner, now)
+        if now < _FROM:  # little was measured yet
+            return 2.0 * left
+        said = min(left, _RISES * self._least)
+        self.longer = said < left and stage > ROUGH and (
+            now - self._begun[stage] > self._usual(stage, self._begun[stage]))
+        self._least = min(self._least, said)
+        return said
+
+    def _ahead(self, stage: int, inner: float, now: float) -> float:
+        """Return what all stages from this one on are about to take [s]."""
+        left = self._of_stage(stage, inner, now)
+        for later in range(stage + 1, TRIALS + 1):
+            left += self._usual(later, now + left)
+        return left
+
+    def _of_stage(self, stage: int, inner: float, now: float) -> float:
+        spent = now - self._begun[stage]
+        if stage == ROUGH:
+            return spent * (1.0 - inner) / inner if inner > 0.0 else 0.0
+        usual = max(self._usual(stage, self._begun[stage]) - spent, _AT_LEAST * spent)
+        if stage == TRIALS or inner <= 0.0:
+            return usual
+        self._inner_begun = min(self._inner_begun, now) if stage == SEARCH else self._begun[stage]
+        return min(usual, (now - self._inner_begun + _ROUNDING) * (1.0 - inner) / inner)
+
+    def _usual(self, stage: int, before: float) -> float:
+        """Return what a stage usually takes [s] after all that came before took so long [s]."""
+        rough = self._begun[SEARCH] - self._begun[ROUGH]
+        if not math.isfinite(rough):
+            rough = before
+        if stage == SEARCH:
+            return _SEARCH * rough
+        if stage == INTERVALS:
+            whole = before if rough == 0.0 else min(_INTERVALS[0] * rough, _INTERVALS[1] * before)
+            return whole * self._intervals
+        return {PRIORS: _PRIORS, ERRORS: self._errors, TRIALS: self._trials}[stage] * before
+
+
+_ROUNDING = 1e-3  # s
+
+# --- How far a fit is, told by the work that it measured, and what stops it -------------------------------------------
+
+Show = Callable[[float, str], None]
 LONGER = ", longer than usual"
 _OFTEN = 0.2  # s, between two times that the same is told
 

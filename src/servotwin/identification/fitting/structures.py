@@ -13,11 +13,10 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting import checks
-from servotwin.identification.fitting.choosing import Ladder, Rung, ladder_of, rung_of
+from servotwin.identification.fitting import fit as checks
 from servotwin.identification.fitting.fit import Fit
 from servotwin.identification.fitting.free import LUMPED
-from servotwin.identification.fitting.ladder import RUNGS, friction_ladder
+from servotwin.identification.fitting.ladder import RUNGS, Ladder, Rung, friction_ladder, ladder_of, rung_of
 from servotwin.identification.fitting.stopping import Within
 from servotwin.loads import Flexible, Load
 from servotwin.logs.log import Log

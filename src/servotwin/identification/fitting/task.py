@@ -12,14 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.arrow import Loss, Outcome, Prior, Search, together
-from servotwin.identification.fitting.begin import Begin
-from servotwin.identification.fitting.case import TIME
-from servotwin.identification.fitting.clocks import ticking, with_clocks
-from servotwin.identification.fitting.first_offset import DELAYS, at_likely_delay, first_offset
-from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.phases import Scan, widening
-from servotwin.identification.fitting.point import (
+from servotwin.identification.fitting.arrow import Begin, Loss, Outcome, Prior, Search, together
+from servotwin.identification.fitting.case import (
     DELAY_SCALE,
     MOST_DELAY,
     OFFSET_SCALE,
@@ -27,9 +21,13 @@ from servotwin.identification.fitting.point import (
     SAG_SCALE,
     SHARED,
     STEP,
+    TIME,
     LogPart,
     Point,
 )
+from servotwin.identification.fitting.clocks import DELAYS, at_likely_delay, first_offset, ticking, with_clocks
+from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.phases import Scan, widening
 from servotwin.identification.fitting.scatter import scatter_of
 from servotwin.logs.log import ANGLES
 

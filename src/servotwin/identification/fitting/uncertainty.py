@@ -3,6 +3,9 @@
 Where the residuals of a log follow each other (a model never fits perfectly), their number overstates what they say.
 The covariance is then that of first-order autoregressive residuals, widened to that of Newey & West (1987) where these
 remember longer; with many logs it is what varies between them.
+
+A fit takes away what its numbers can imitate, mostly what is slow: what is left is smaller than the noise and remembers
+less. Both are known exactly for every correlation, so the one is found whose expectation is what is seen.
 """
 
 from __future__ import annotations
@@ -10,16 +13,138 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.fitting.arrow import Loss, Prior
-from servotwin.identification.fitting.memory import NoiseMemory, echo, memory_of
-from servotwin.identification.fitting.point import LogPart
+from servotwin.identification.fitting.case import LogPart
 
+# --- How long residuals remember --------------------------------------------------------------------------------------
+
+_GRID = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 0.96, 0.98])
+_LEAST = 0.2  # of the noise's power is left at least: beyond that the numbers follow the noise itself
+
+
+class NoiseMemory(NamedTuple):
+    """First-order autoregressive noise behind residuals.
+
+    Parameters
+    ----------
+    correlation : float
+        Of neighbours, at least 0.
+    power : float
+        Variance of the noise, in units of that of the residuals' scale.
+    excess : float
+        Correlation that is seen, less what independent noise would leave.
+    plain : float
+        The variance if the noise were independent.
+    """
+
+    correlation: float
+    power: float
+    excess: float
+    plain: float
+
+
+def memory_of(rows: Sequence[Rows], directions: Array) -> NoiseMemory:
+    """Return the noise that leaves such residuals.
+
+    Parameters
+    ----------
+    rows : sequence of Rows
+    directions : ndarray, shape (p, q)
+        Along which the shared numbers were fitted.
+
+    Examples
+    --------
+    >>> from servotwin.identification.fitting.uncertainty import Rows
+    >>> noise = np.random.default_rng(0).normal(size=400)
+    >>> rows = [Rows(part - part.mean(), np.ones((20, 0)), np.ones(20), alone=np.ones((20, 1)))
+    ...         for part in noise.reshape(20, 20)]  # of each log its mean is taken away
+    >>> found = memory_of(rows, np.zeros((0, 0)))
+    >>> abs(found.excess) < 0.1, abs(found.power - 1.0) < 0.15
+    (True, True)
+    """
+    power = sum(float(r.residual @ r.residual) for r in rows)
+    if power == 0.0:
+        return NoiseMemory(0.0, 0.0, 0.0, 0.0)
+    seen = sum(float(r.residual[1:] @ r.residual[:-1]) for r in rows) / power
+    bases = _bases(rows, directions)
+    left = np.array([_left(bases, rho) for rho in _GRID])
+    expected = np.maximum.accumulate(left[:, 1] / left[:, 0])
+    rho = float(np.interp(seen, expected, _GRID))
+    behind = power / np.interp([rho, 0.0], _GRID, left[:, 0])
+    return NoiseMemory(rho, float(behind[0]), seen - float(expected[0]), float(behind[1]))
+
+
+def _bases(rows: Sequence[Rows], directions: Array) -> list[tuple[Array, Array]]:
+    """Return orthonormal columns for each log: of the shared numbers, together with the other logs, and of its own."""
+    own = []
+    for r in rows:
+        own.append(_orthonormal(r.alone) if r.alone is not None else np.zeros((len(r.residual), 0)))
+    shared = [r.slope[:len(r.residual)] @ directions for r in rows]
+    shared = [s - u @ (u.T @ s) for s, u in zip(shared, own, strict=True)]
+    joint = np.split(_orthonormal(np.concatenate(shared)), np.cumsum([len(s) for s in shared])[:-1])
+    return list(zip(joint, own, strict=True))
+
+
+def echo(columns: Array, rho: float) -> Array:
+    """Return columns y of columns x that go on by y_k = x_k + ρ y_(k−1), as first-order noise does.
+
+    Examples
+    --------
+    >>> echo(np.array([[1.0], [0.0], [0.0], [1.0]]), 0.5)[:, 0].tolist()
+    [1.0, 0.5, 0.25, 1.125]
+    """
+    from scipy.linalg import solve_banded  # scipy.signal, which has a filter for it, takes 0.7 s to load
+
+    if not columns.size:
+        return columns.copy()
+    bands = np.ones((2, len(columns)))
+    bands[1] = -rho
+    return np.asarray(solve_banded((1, 0), bands, columns))
+
+
+def _orthonormal(columns: Array) -> Array:
+    size = np.sqrt(np.sum(columns**2, axis=0))
+    vectors, values, _ = np.linalg.svd(columns[:, size > 0.0] / size[size > 0.0], full_matrices=False)
+    return np.asarray(vectors[:, values > 1e-7 * values.max(initial=0.0)])
+
+
+def _left(bases: Sequence[tuple[Array, Array]], rho: float) -> Array:
+    """Return the expected sums of squares and of products of neighbours that noise of power 1 leaves.
+
+    With P = U Uᵀ the projection that a fit makes, R the noise's correlation and L the shift by one sample, they are the
+    traces of (1 − P) R and of L (1 − P) R (1 − P).
+    """
+    p = bases[0][0].shape[1]
+    squares, products = 0.0, 0.0
+    R_ss, L_ss = np.zeros((p, p)), np.zeros((p, p))
+    for shared, own in bases:
+        U = np.concatenate([shared, own], axis=1)
+        n = len(U)
+        ahead, back = echo(U, rho), echo(U[::-1], rho)[::-1]
+        RU = ahead + back - U
+        LU = np.zeros_like(U)
+        LU[:-1] = U[1:]
+        R, L = U.T @ RU, U.T @ LU
+        LR = float(np.sum(U[:-1] * RU[1:]))  # of Uᵀ L R U and of Uᵀ R L U
+        RL = float(np.sum(RU * LU))
+        squares += n - float(np.trace(R))
+        products += rho * (n - 1) - LR - RL
+        R_ss, L_ss = R_ss + R[:p, :p], L_ss + L[:p, :p]
+        products += float(np.sum(L * R.T)) - float(np.sum(L[:p, :p] * R[:p, :p].T))
+    products += float(np.sum(L_ss * R_ss.T))
+    total = sum(len(shared) for shared, _ in bases)
+    return np.array([max(squares, _LEAST * total), products])
+
+# --- How surely a fit knows its numbers -------------------------------------------------------------------------------
+
+# --- How surely a fit knows its numbers -------------------------------------------------------------------------------
 Array = NDArray[np.float64]
-
 _MANY_LOGS = 5  # as many logs for each number
 _HARDLY, _SURELY = 1.5, 3.0  # standard errors of a correlation of 0
 _NOTHING, _PART = 1e-11, 0.0025  # of the most that is known: nothing; the square of a part of a direction that counts
@@ -371,3 +496,177 @@ def _lag(scores: Sequence[Array]) -> int:
     while lag < longest // 2 and sum(float(s[lag:] @ s[:-lag]) for s in scores if len(s) > lag) > 0.1 * power:
         lag += 1
     return min(2 * lag, longest // 2)
+
+
+# --- What logs cannot say, in words: which numbers only appear together, and what would tell them apart ---------------
+_VAGUE = 1.0  # standard error of a direction that is not determined: a factor e, or as much as is typical
+_SHARE = 0.25  # what such a direction may add to the standard error of a number that counts as determined
+_WORDS_PART = 0.05  # of a direction
+_FAR = _SHARE / _WORDS_PART  # e-folds that anything may go at most in a direction that is open: the bounds are nearer
+_HIGHEST = 2  # power in a product that is put into words
+_NEAR = 0.03  # to such a power
+_GEAR = "gear.gear_reduction"  # what most products are with
+
+
+@dataclass(frozen=True)
+class Unidentifiable:
+    """A direction in which the searched numbers may go without the logs noticing.
+
+    Parameters
+    ----------
+    parameters : tuple of str
+        That go together, none of which gets an interval.
+    direction : tuple of float
+        How far each of them goes; of logarithms where a number is searched by its logarithm.
+    combinations : tuple of str
+        What is determined nevertheless, such as ``"motor.torque_constant · gear.gear_reduction"``.
+    remedies : tuple of str
+        What would tell them apart.
+    """
+
+    parameters: tuple[str, ...]
+    direction: tuple[float, ...]
+    combinations: tuple[str, ...]
+    remedies: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        if len(self.parameters) == 1:
+            text = f"{self.parameters[0]} is not determined by these logs"
+        elif self.combinations:
+            text = f"only {_and(self.combinations)} {'is' if len(self.combinations) == 1 else 'are'} determined, not " \
+                   f"{_and(self.parameters)} each"
+        else:
+            text = f"{_and(self.parameters)} are not determined each: a change of one is made up for by the others"
+        if not self.remedies:
+            return text
+        return f"{text}; {_or(self.remedies)} would {'tell' if len(self.parameters) == 1 else 'separate them'}"
+
+
+def vague_directions(information: Array, inflation: float = 1.0,
+                     sizes: Array | None = None) -> tuple[NDArray[np.bool_], Array]:
+    """Return which numbers are not determined by the data, and the directions that are not (columns of unit length).
+
+    Parameters
+    ----------
+    information : ndarray, shape (p, p)
+        Of the data alone, of scaled numbers.
+    inflation : float
+        Of standard errors, by correlated residuals.
+    sizes : ndarray, shape (p,), optional
+        What counts as the whole of a number; 1 unless given.
+
+    Examples
+    --------
+    >>> flags, directions = vague_directions(np.array([[1e4, -1e4], [-1e4, 1e4]]))
+    >>> flags.tolist(), directions.shape
+    ([True, True], (2, 1))
+    """
+    whole = np.ones(len(information)) if sizes is None else sizes
+    values, vectors = np.linalg.eigh(information * np.outer(whole, whole))
+    floor = 1e-11 * max(float(values[-1]), 1e-300)
+    std = inflation / np.sqrt(np.maximum(values, 1e-300))
+    vague = (std > _VAGUE) | (values < floor)
+    directions = vectors[:, vague]
+    added = np.sqrt(((directions * np.minimum(std[vague], _FAR)) ** 2).sum(axis=1))
+    moved = directions * whole[:, None]
+    return added > _SHARE, moved / np.maximum(np.linalg.norm(moved, axis=0), 1e-300)
+
+
+def explain(names: Sequence[str], shares: Sequence[float], flags: NDArray[np.bool_],
+            directions: Array) -> tuple[Unidentifiable, ...]:
+    """Return the undetermined directions in words, the simplest ones first.
+
+    Parameters
+    ----------
+    names : sequence of str
+    shares : sequence of float
+        By which share of its value a number changes with what is searched; nan where it may be 0. Only shares make
+        products.
+    flags, directions : ndarray
+        Of `vague_directions`.
+    """
+    if not flags.any() or not directions.shape[1]:
+        return ()
+    simple = simplest(directions)
+    parts = np.abs(simple) / np.abs(simple).max(axis=0)
+    members = (parts > _WORDS_PART) & flags[:, None]
+    for k in np.flatnonzero(flags & ~members.any(axis=1)):  # a little of several: none is left without words
+        members[k, np.argmax(parts[k])] = True
+    found = []
+    for v, those in zip(simple.T, members.T, strict=True):
+        which = np.flatnonzero(those).tolist()
+        if not which:
+            continue
+        combinations: tuple[str, ...] = ()
+        if len(which) > 1 and all(math.isfinite(shares[k]) for k in which):
+            combinations = _products([names[k] for k in which], [float(v[k]) * shares[k] for k in which])
+        found.append(Unidentifiable(tuple(names[k] for k in which), tuple(float(v[k]) for k in which), combinations))
+    return tuple(sorted(found, key=lambda item: (len(item.parameters), item.parameters)))
+
+
+def simplest(directions: Array) -> Array:
+    """Return directions that span the same space with few numbers in each: rows reduced one after the other.
+
+    Parameters
+    ----------
+    directions : ndarray, shape (p, q)
+
+    Examples
+    --------
+    >>> simplest(np.array([[1.0, 1.0], [1.0, -1.0], [0.0, 0.0]])).T.tolist()
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
+    """
+    basis = directions.T.copy()
+    for row in range(len(basis)):
+        pivot = row + int(np.argmax(np.abs(basis[row:]).max(axis=1)))
+        basis[[row, pivot]] = basis[[pivot, row]]
+        column = int(np.argmax(np.abs(basis[row])))
+        basis[row] /= basis[row, column]
+        for other in range(len(basis)):
+            if other != row:
+                basis[other] -= basis[other, column] * basis[row]
+    return np.asarray(basis.T)
+
+
+def _products(names: list[str], v: Sequence[float]) -> tuple[str, ...]:
+    """Return products of small whole powers that a direction leaves alone; none where there are none such."""
+    tried = [found for pivot in range(len(names)) if (found := _about(pivot, names, v)) is not None]
+    # With the reduction where that will do, else with the smallest powers, else with what moves least
+    order = sorted(tried, key=lambda f: (names[f.pivot] != _GEAR, f.powers, abs(v[f.pivot])))
+    return order[0].texts if order else ()
+
+
+class _Products(NamedTuple):
+    """Products of each number with one of them, the sum of their powers, and which one that is."""
+
+    texts: tuple[str, ...]
+    powers: int
+    pivot: int
+
+
+def _about(pivot: int, names: list[str], v: Sequence[float]) -> _Products | None:
+    """Return products of each other number with one; None where a power is no small whole number."""
+    texts, powers = [], 0
+    for k, name in enumerate(names):
+        if k == pivot:
+            continue
+        exact = -v[k] / v[pivot]
+        power = Fraction(exact).limit_denominator(_HIGHEST)
+        if not 0 < abs(power.numerator) <= _HIGHEST or abs(float(power) - exact) > _NEAR:
+            return None
+        sign = " / " if power < 0 else " · "
+        texts.append(f"{name}{_power(power.denominator)}{sign}{names[pivot]}{_power(abs(power.numerator))}")
+        powers += power.denominator + abs(power.numerator)
+    return _Products(tuple(texts), powers, pivot)
+
+
+def _power(power: int) -> str:
+    return "" if power == 1 else "⁰¹²³⁴⁵⁶⁷⁸⁹"[power]
+
+
+def _and(words: Sequence[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def _or(words: Sequence[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"

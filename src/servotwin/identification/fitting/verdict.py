@@ -15,8 +15,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.independence import CrossCorrelation, cross_correlation
-from servotwin.identification.fitting.noise import Noise, NoiseGuess, SensorSeries, isolated, noise_of
+from servotwin.identification.fitting.noise import (
+    CrossCorrelation,
+    Noise,
+    NoiseGuess,
+    SensorSeries,
+    cross_correlation,
+    isolated,
+    noise_of,
+)
 from servotwin.identification.fitting.uncertainty import Rows
 
 Array = NDArray[np.float64]

@@ -10,20 +10,303 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.arrow import Outcome, Prior, Search, together
-from servotwin.identification.fitting.doubts import Doubts
-from servotwin.identification.fitting.intervals import begins
-from servotwin.identification.fitting.point import Point
+from servotwin.errors import InputError
+from servotwin.identification.fitting.arrow import Loss, Outcome, Prior, Search, together
+from servotwin.identification.fitting.assumptions import Ends, Systematic, begins
+from servotwin.identification.fitting.case import Case, Point
+from servotwin.identification.fitting.draws import Allowed
+from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.free import nominal
+from servotwin.identification.fitting.suspicions.look import rough_noise
 from servotwin.identification.fitting.task import Task
-from servotwin.identification.fitting.uncertainty import Rows, Uncertainty, rows_of, uncertainty
+from servotwin.identification.fitting.uncertainty import (
+    Rows,
+    Uncertainty,
+    Unidentifiable,
+    rows_of,
+    uncertainty,
+    vague_directions,
+)
+from servotwin.loads import Inertia, Pendulum
+from servotwin.logs.log import Log
 
+# --- How surely a fit knows each number: intervals, what the logs leave open, and how much of it is prior -------------
+
+_RISE = 1.92  # of the cost at the ends of a 95 % interval of one number
+_PART = 0.05  # of a direction
+_WIDE = 6.0  # e-folds between usual bounds: a prior that is wider says nothing
+_DOUBTS_LEAST = 1e-12
+_WAY = (0.02, 0.05, 0.1, 0.2, 0.35, 0.55, 0.8, 1.0)  # of the way to the bounds, at which the cost is asked
+
+
+@dataclass(frozen=True)
+class Doubts:
+    """What a fit knows of its uncertainty.
+
+    Parameters
+    ----------
+    doubt : Uncertainty, optional
+        None where it was not sought.
+    ends : mapping of int to Ends
+        Of the intervals.
+    unidentifiable : tuple of Unidentifiable
+    prior_share : mapping of str to float
+        How much of each interval is prior.
+    allowed : Allowed, optional
+    spans : mapping of str to tuple of float
+        Ranges (SI) of what pulses tell.
+    systematic : Systematic, optional
+        What the servo file leaves out does to the numbers; `ends` hold it.
+    deeper : Outcome, optional
+        The best that was seen on the way, if that is clearly better than where the search ended.
+    """
+
+    doubt: Uncertainty | None = None
+    ends: Mapping[int, Ends] = field(default_factory=dict)
+    unidentifiable: tuple[Unidentifiable, ...] = ()
+    prior_share: Mapping[str, float] = field(default_factory=dict)
+    allowed: Allowed | None = None
+    spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    deeper: Outcome | None = None
+    systematic: Systematic | None = None
+
+
+def sizes_at(task: Task, found: Outcome) -> Array:
+    """Return by how much each shared number counts as changed much: by itself, of a logarithmic one by a factor e."""
+    searched = task.forecast.space.parameters
+    sizes = np.maximum(np.abs(found.point.shared), 1.0)
+    sizes[:len(searched)][[p.logarithmic for p in searched]] = 1.0
+    return sizes
+
+
+def vague(information: Array, inflation: float, sizes: Array, asked: NDArray[np.bool_]) -> tuple[Any, Array]:
+    """Return what is not determined of the numbers that are asked about, and the directions."""
+    flags, directions = vague_directions(information[np.ix_(asked, asked)], inflation, sizes[asked])
+    all_flags, all_directions = np.zeros(len(asked), np.bool_), np.zeros((len(asked), directions.shape[1]))
+    all_flags[asked], all_directions[asked] = flags, directions
+    return all_flags, all_directions
+
+
+def prior_share(names: Sequence[str], doubt: Uncertainty, reaching: Mapping[int, Ends], flags: NDArray[np.bool_],
+                directions: Array, weight: Array) -> dict[str, float]:
+    """Return how much of what is known of each number is prior: 1 less the variance with over that without priors.
+
+    Of a profile it is the part of the priors in the rise of the cost at its ends, which is the same for a parabola. Of
+    a number that the logs do not determine it is 1 if a prior does, and else 0; of one that does not vary, nan.
+    """
+    lengths = np.maximum(np.abs(directions).max(axis=0, initial=0.0), _DOUBTS_LEAST)
+    believed = ((weight[:, None] * directions / lengths) ** 2).sum(axis=0) > 1.0 / _WIDE**2
+    found = {}
+    for k, name in enumerate(names):
+        if flags[k]:
+            size = np.abs(directions[k])
+            found[name] = float(directions.shape[1] > 0 and bool(believed[int(np.argmax(size))]))
+        elif k in reaching and not math.isnan(reaching[k].prior):
+            found[name] = reaching[k].prior
+        elif doubt.alone[k, k] > 0.0:
+            found[name] = float(np.clip(1.0 - doubt.covariance[k, k] / doubt.alone[k, k], 0.0, 1.0))
+        else:
+            found[name] = math.nan
+    return found
+
+
+def allowed(task: Task, found: Outcome, rows: Sequence[Rows], directions: Array, information: Array,
+            flags: NDArray[np.bool_], doubt: Uncertainty, reaching: Mapping[int, Ends], level: float) -> Allowed:
+    """Return what logs, priors and bounds allow together.
+
+    Parameters
+    ----------
+    task : Task
+    found : Outcome
+        The end of its search.
+    rows : sequence of Rows
+        Of the fitted logs.
+    directions : ndarray, shape (p, q)
+        That the logs do not determine.
+    information : ndarray, shape (p, p)
+        Of the logs alone, from fine differences.
+    flags : ndarray of bool, shape (p,)
+        Numbers that are not determined.
+    doubt : Uncertainty
+    reaching : mapping of int to Ends
+        Of the intervals at `level`: a law that is no parabola is wider on one side.
+    """
+    inflation = doubt.inflation
+    x = found.point.shared
+    p, stuck = len(x), task.at_bound(found) | task.held
+    whole = uncertainty(rows, task.prior, task.held, directions)
+    score = np.sum([r.slope.T @ r.score for r in rows], axis=0) + task.prior.weight**2 * (x - task.prior.mean)
+    shift = -whole.curvature @ np.where(stuck, score, 0.0)
+    stretch = np.ones((2, p))
+    for k, ends in reaching.items():
+        reach = doubt.quantile(level, k)
+        stretch[:, k] = -ends.lower / reach, ends.upper / reach
+    axes, precision = _axes(directions, whole.covariance, task.prior.weight, information / inflation**2)
+    grows, adds = _in_proportion(task, x, directions) & flags & ~stuck, _in_sums(task, directions) & flags & ~stuck
+    made = Allowed(x, shift, axes, precision, task.lower, task.upper, grows, np.zeros(p, np.bool_), directions,
+                   np.zeros((2, directions.shape[1])), stretch)
+    tried = [made] if not adds.any() else [made, replace(made, by_logarithm=np.zeros(p, np.bool_), by_value=adds)]
+    reached = [_reach(task, found, one, inflation) for one in tried]
+    # What the logs leave open is straight where numbers are taken as they stand in it: in products, or in sums
+    best = int(np.argmax([way for _, way in reached]))
+    return replace(tried[best], reach=reached[best][0])
+
+
+def _in_proportion(task: Task, x: Array, directions: Array) -> NDArray[np.bool_]:
+    """Tell which numbers may be drawn by their logarithm although they are searched as they are.
+
+    What is in a product with others keeps it by moving in proportion; and of a size that nothing is known of, each
+    factor is as likely as any other.
+    """
+    space = task.forecast.space
+    found = np.zeros(len(x), np.bool_)
+    for direction in directions.T:
+        members = np.abs(direction) > _PART * np.abs(direction).max()
+        believed = (task.prior.weight[members] > 0.0).any()
+        if members.sum() > 1 or not believed:
+            found |= direction != 0.0
+    for k, p in enumerate(space.parameters):
+        found[k] &= not p.logarithmic and p.lower >= 0.0 and x[k] > _PART
+    found[len(space):] = False
+    return found
+
+
+def _in_sums(task: Task, directions: Array) -> NDArray[np.bool_]:
+    """Tell which numbers may be drawn as they are although they are searched by their logarithm."""
+    several = (np.abs(directions) > _PART * np.abs(directions).max(axis=0, initial=0.0)).sum(axis=0) > 1
+    found = (directions[:, several] != 0.0).any(axis=1)
+    for k, p in enumerate(task.forecast.space.parameters):
+        found[k] &= p.logarithmic
+    found[len(task.forecast.space):] = False
+    return np.asarray(found)
+
+
+def _axes(directions: Array, covariance: Array, weight: Array, information: Array) -> tuple[Array, Array]:
+    """Return axes along which what is known is independent, and the precision along each.
+
+    Those of what the logs determine first, each going along in the open directions as the priors there want; then those
+    of the open directions.
+    """
+    q = directions.shape[1]
+    basis = np.linalg.svd(directions)[0] if q else np.eye(len(weight))
+    V, Q = basis[:, :q], basis[:, q:]
+    beliefs = np.diag(weight**2)
+    variance, known = np.linalg.eigh(Q.T @ covariance @ Q)
+    precision, open_axes = np.linalg.eigh(V.T @ (beliefs + information) @ V)
+    follow = np.linalg.pinv(V.T @ (beliefs + information) @ V, hermitian=True) @ (V.T @ beliefs @ Q)
+    return (np.column_stack([(Q - V @ follow) @ known, V @ open_axes]),
+            np.append(1.0 / np.maximum(variance, _DOUBTS_LEAST**2), np.maximum(precision, 0.0)))
+
+
+def _reach(task: Task, found: Outcome, made: Allowed, inflation: float) -> tuple[Array, float]:
+    """Return how far the logs allow to go along each open direction, back and forth, and which part of all that is.
+
+    They may be open one way only.
+    """
+    farthest = np.zeros((2, made.open.shape[1]))
+    for k, direction in enumerate(made.directions.T):
+        moves = np.abs(direction) > _DOUBTS_LEAST
+        room = made.box[:, moves] / direction[moves]
+        farthest[:, k] = room.min(axis=0).max(), room.max(axis=0).min()
+    if not farthest.size:
+        return farthest, 1.0
+    steps = farthest[:, :, None] * np.array(_WAY)
+    points = made.points((steps[..., None] * made.directions.T[None, :, None, :]).reshape(-1, len(made.best)))
+    points = np.clip(np.vstack([made.best, points]), task.lower, task.upper)
+    search = Search(task.forecast, task.loss, task.prior, task.lower, task.upper, task.fitted, task.held)
+    with task.forecast.roughly():
+        costs = search.costs([found.point._replace(shared=x) for x in points])
+    of_logs = np.array([cost - task.prior.cost(x) for cost, x in zip(costs, points, strict=True)])
+    rises = ((of_logs[1:] - of_logs[0]) / inflation**2).reshape(steps.shape)
+    reach = np.array([[_until(steps[side, k], rises[side, k]) for k in range(steps.shape[1])] for side in (0, 1)])
+    way = np.ptp(reach, axis=0) / np.maximum(np.ptp(farthest, axis=0), _DOUBTS_LEAST)
+    return reach, float(way.mean())
+
+
+def _until(steps: Array, rises: Array) -> float:
+    """Return the step at which the cost has risen as far as it may; the last one if it never does."""
+    over = np.flatnonzero(~(rises <= _RISE))
+    if not over.size:
+        return float(steps[-1])
+    k = int(over[0])
+    last, before = (float(steps[k - 1]), max(float(rises[k - 1]), 0.0)) if k else (0.0, 0.0)
+    # About a parabola in between; none where a simulation failed
+    share = math.sqrt((_RISE - before) / (float(rises[k]) - before)) if math.isfinite(rises[k]) else 0.0
+    return last + share * (float(steps[k]) - last)
+
+
+# --- What would tell apart what logs cannot: further sensors and known loads, tried in simulation ---------------------
+_SENSORS = {"output_angle": "an encoder at the output", "feedback_voltage": "a potentiometer tap",
+            "armature_current": "a motor current measurement", "supply_current": "a supply current measurement"}
+_NOISE = 0.01  # of a sensor's largest value, assumed of a further one
+_STEP = 1e-3  # of a searched number
+_MOST = 6  # logs that are tried
+
+
+def with_remedies(forecast: Forecast, point: Point, items: Sequence[Unidentifiable],
+                  names: Sequence[str]) -> tuple[Unidentifiable, ...]:
+    """Return what is not determined, each with what would determine it."""
+    return tuple(replace(item, remedies=_remedies(forecast, point, item, names)) for item in items)
+
+
+def _remedies(forecast: Forecast, point: Point, item: Unidentifiable, names: Sequence[str]) -> tuple[str, ...]:
+    direction = np.zeros(len(names))
+    for name, part in zip(item.parameters, item.direction, strict=True):
+        direction[list(names).index(name)] = part
+    direction /= np.linalg.norm(direction)
+    some = range(0, len(forecast.cases), max(1, len(forecast.cases) // _MOST))
+    logs = [forecast.cases[k].log for k in some]
+    own = tuple(point.own[k] for k in some)
+    here = Point(point.shared, own, tuple(point.frames[k] for k in some) if point.frames else ())
+    found = [text for sensor, text in _SENSORS.items()
+             if sensor not in forecast.sensors and sensor in forecast.model.available
+             and _tells(forecast, [_measuring(log, sensor) for log in logs], sensor, here, direction)]
+    sensor = forecast.sensors[0]
+    inertia = _output_inertia(forecast)
+    loads: dict[str, Inertia | Pendulum] = {"a known inertia at the horn": Inertia(inertia),
+             "a known weight on an arm": Pendulum(mass=inertia / 0.1**2, length=0.1)}
+    for text, load in loads.items():
+        if not found and _tells(forecast, [replace(log, load=log.load + load) for log in logs], sensor, here,
+                                direction):
+            found.append(text)
+    return tuple(found[:2]) or ((f"a known {item.parameters[0]}",) if len(item.parameters) > 1 else ())
+
+
+def _output_inertia(forecast: Forecast) -> float:
+    reduction = forecast.model.value("gear.gear_reduction")
+    return float(reduction**2) * forecast.model.value("motor.rotor_inertia")
+
+
+def _measuring(log: Log, sensor: str) -> Log:
+    return replace(log, measured={**log.measured, sensor: np.zeros(len(log.time))})
+
+
+def _tells(forecast: Forecast, logs: Sequence[Log], sensor: str, point: Point, direction: Array) -> bool:
+    """Tell whether a signal of some logs would change visibly along a direction."""
+    try:
+        tried = Forecast(logs, forecast.model, forecast.space, forecast.nuisance, [sensor], forecast.running)
+        tried.strict = False
+        ends = [point._replace(shared=point.shared + side * _STEP * direction) for side in (1.0, -1.0)]
+        ahead, behind = ([part.residual for part in parts] for parts in tried.at_all(ends))
+    except InputError:
+        return False
+    change = np.concatenate([a - b for a, b in zip(ahead, behind, strict=True)]) / (2.0 * _STEP)
+    values = np.concatenate(ahead)
+    if not (np.isfinite(change).all() and np.isfinite(values).all()):
+        return False
+    noise = max(_NOISE * float(np.abs(values).max(initial=0.0)), 1e-12)
+    return float(np.linalg.norm(change)) / noise > 2.0  # standard errors of half such a step
+
+# --- Priors that yield ------------------------------------------------------------------------------------------------
+
+# --- Priors that yield ------------------------------------------------------------------------------------------------
 Array = NDArray[np.float64]
-
 APART = 3.5
 """Standard errors between logs and prior from which on the prior is not believed: 1 of 2000 that are right."""
 _REACH = 1.92  # rise of the cost at the ends of a 95 % interval
@@ -35,7 +318,6 @@ _FACTORS = (0.25, 0.4, 0.63, 0.8, 1.25, 1.6, 2.5, 4.0)  # of the value: where th
 _STEPS = 8  # of a search that only has to show whether it goes down
 _HINT = 0.5  # of the gain that counts: the noise is not known yet
 _HINTS = 0.1  # of that: what a parabola has to promise, for the cost need not be one
-
 Told = Callable[[float, str], None]
 
 
@@ -377,3 +659,98 @@ def _judged(task: Task, found: Outcome, k: int, end: Outcome, base: float) -> _T
         return None
     goes = off >= APART * std and 0.5 * apart**2 >= _OPEN
     return _Trial(Dropped(k, mean, std, apart, math.inf if goes else off), replace(end), gain, off / std)
+
+
+# --- Which searched numbers the logs can hardly tell, before any search -----------------------------------------------
+_FACTOR = 1.0  # standard error (scaled), a factor of e, beyond which a number without a prior is not told
+_LEAST = 1e-9  # SI
+_INERTIAS = ("output_inertia", "motor.rotor_inertia")
+
+
+@dataclass(frozen=True)
+class Foreseen:
+    """A searched number of which the logs say less than what is known without them.
+
+    Parameters
+    ----------
+    name : str
+    alone : float
+        Its standard error by the logs if all other numbers were known, relative to its value or to a typical one; inf
+        where they say nothing.
+    prior : float
+        The same by its prior; inf where there is none.
+    reason : str
+        Why, where a simple cause is seen.
+    """
+
+    name: str
+    alone: float
+    prior: float
+    reason: str = ""
+
+    def __str__(self) -> str:
+        """Return it as one line.
+
+        Examples
+        --------
+        >>> print(Foreseen("output_inertia", 3.0, 0.2, "samples are 500 ms apart, the motor settles in 20 ms"))
+        these logs hardly tell output_inertia (±300 % with all else known; prior ±20 %): samples are 500 ms apart, the \
+motor settles in 20 ms
+        """
+        told = f"±{100.0 * self.alone:.3g} %" if self.alone < 10.0 else "not even"
+        prior = f"; prior ±{100.0 * self.prior:.3g} %" if math.isfinite(self.prior) else ""
+        why = f": {self.reason}" if self.reason else ""
+        return f"these logs hardly tell {self.name} ({told} with all else known{prior}){why}"
+
+
+def foreseen(task: Task) -> tuple[Foreseen, ...]:
+    """Return which searched numbers the fitted logs can hardly tell, by the derivatives where the search begins.
+
+    A number is told if the logs alone, with all other shared numbers known, leave a standard error below that of its
+    prior, or below a factor of e where it has none. That is necessary, not enough: several numbers may still be told
+    together only, which the fit says at its end. Noise is that which neighbouring samples show.
+    """
+    forecast = task.forecast
+    noise, strict = forecast.noise, forecast.strict
+    cases = [forecast.cases[k] for k in task.fitted]
+    point = task.nominal()
+    try:
+        forecast.noise = {**noise, **{name: _noise(cases, name) for name in forecast.sensors}}
+        forecast.strict = False
+        with forecast.roughly():
+            parts = forecast.at(point, cases=task.fitted)
+        beliefs = [Prior(*forecast.own_belief(case)) for case in cases]
+    finally:
+        forecast.noise, forecast.strict = noise, strict
+    if not all(np.isfinite(part.residual).all() and np.isfinite(part.shared).all() for part in parts):
+        return ()
+    rows = [rows_of(part, Loss(math.inf), own, point.own[k])
+            for k, part, own in zip(task.fitted, parts, beliefs, strict=True)]
+    information = sum((row.slope**2).sum(axis=0) for row in rows)
+    found = []
+    for k, p in enumerate(forecast.space.parameters):
+        alone = 1.0 / math.sqrt(information[k]) if information[k] > 0.0 else math.inf
+        prior = math.inf if p.scaled_prior is None else p.scaled_prior[1]
+        if alone > min(prior, _FACTOR):
+            found.append(Foreseen(p.name, alone, prior, _reason(task, cases, p.name)))
+    return tuple(found)
+
+
+def _noise(cases: list[Case], name: str) -> float:
+    """Return the noise of a sensor that neighbours show, at least that of its counts (SI)."""
+    values = [case.values[name] for case in cases if name in case.values and len(case.values[name])]
+    if not values:
+        return 1.0
+    return max(float(np.median([rough_noise(each) for each in values])), _LEAST)
+
+
+def _reason(task: Task, cases: list[Case], name: str) -> str:
+    """Return a simple cause why a number cannot be told; nothing where none is seen."""
+    if not any(case.log.changes.size for case in cases):
+        return "the command never changes"
+    servo = task.forecast.model.servo
+    step = float(np.median([np.median(np.diff(case.log.time)) for case in cases]))
+    J, R, K = (nominal(servo, one) for one in ("output_inertia", "motor.armature_resistance", "output_torque_constant"))
+    if name in _INERTIAS and J and R and K and step > (settles := J * R / K**2):
+        return f"samples are {1e3 * step:.3g} ms apart, the motor settles in {1e3 * settles:.2g} ms"
+    return ""

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from servotwin.identification.report import pictures as report_pictures
+from servotwin.identification.report import pictures as report_traces
 from servotwin.identification.report import tables as report_tables
-from servotwin.identification.report import traces as report_traces
-from servotwin.identification.report.shown import error_shown, error_unit
+from servotwin.identification.report.pictures import error_shown, error_unit
 from servotwin.look import escape, number, pages, picture, to_bytes
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from servotwin.identification.fitting.fit import Trace
     from servotwin.identification.fitting.holdout import ErrorTable
-    from servotwin.identification.fitting.independence import CrossCorrelation
+    from servotwin.identification.fitting.noise import CrossCorrelation
 
 _MOST_LOGS = 21  # that are drawn folded
 STYLE = """

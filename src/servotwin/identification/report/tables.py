@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from servotwin.identification.fitting.holdout import fit_percent
-from servotwin.identification.report.shown import (
+from servotwin.identification.report.pictures import (
     MODELS,
     dimension_of_free,
     error_rows,
@@ -20,9 +20,9 @@ from servotwin.identification.report.shown import (
 from servotwin.look import MINUS, escape, figure_in, label_of, number, readable, table, unit_for
 
 if TYPE_CHECKING:
-    from servotwin.identification.fitting.choosing import Ladder
     from servotwin.identification.fitting.fit import Fit, Trace
     from servotwin.identification.fitting.holdout import ErrorTable
+    from servotwin.identification.fitting.ladder import Ladder
 
 _HOW = {"normal": "normal law", "profile": "profile of the cost", "at bound": "none: at a bound",
         "undetermined": "none: not determined", "not sought": "none: not asked for"}

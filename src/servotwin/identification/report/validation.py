@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from servotwin.identification.fitting.holdout import fit_percent
 from servotwin.identification.report import parts as report_parts
 from servotwin.identification.report.parts import STYLE, space
-from servotwin.identification.report.shown import error_shown, percent, rig_text
+from servotwin.identification.report.pictures import error_shown, percent, rig_text
 from servotwin.look import MINUS, document, escape, number
 from servotwin.parameters import write_file
 

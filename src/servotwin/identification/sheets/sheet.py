@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import json
+import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
+from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from servotwin import units
 from servotwin.errors import InputError, UnknownNameError
-from servotwin.parameters import REGISTER_FAMILIES
-from servotwin.parameters.sheet_table import check_voltages
+from servotwin.parameters import GROUPS, KINDS, REGISTER_FAMILIES, Quantity, Servo, dimension_of, unit_of, write_file
+from servotwin.parameters.sheet_table import ELSE, POINT, WHOLE, check_voltages, figure, printed
+from servotwin.tables import read_table
+from servotwin.text import checked_name
+
+# --- A data sheet: what a maker or a shop prints about a servo, at one or several supply voltages ---------------------
 
 MODULATIONS = ("analog", "digital", "bus", "")
 ENDLESS = ("endless", "continuous")
@@ -284,3 +292,355 @@ def _figures(given: SheetPoint | Sheet) -> Iterator[tuple[str, float]]:
         value = getattr(given, f.name)
         if f.name in _PLAUSIBLE and value is not None:
             yield f.name, value
+
+# --- The sheet inside a servo file ------------------------------------------------------------------------------------
+
+_FLAGS, _NOTE = "flags", "note"
+_WORDS = ("motor_type", "modulation", "continuous", "registers")
+# parameters whose SI unit makes awkward numbers
+_UNITS = {"motor.armature_inductance": "mH", "motor.torque_constant": "mN m/A", "motor.back_emf_constant": "mV s/rad",
+          "motor.rotor_inertia": "g cm2", "gear.backlash": "deg", "gear.output_inertia": "g cm2",
+          "friction.coulomb_torque_forward": "mN m", "friction.coulomb_torque_backward": "mN m",
+          "electronics.voltage_to_pulse_gain": "us/V", "electronics.command_pulse_offset": "us",
+          "electronics.one_shot_slope": "ms/V", "electronics.one_shot_offset": "ms",
+          "electronics.voltage_deadband": "mV", "electronics.deadband": "us", "electronics.frame_period": "ms",
+          "electronics.minimum_drive_time": "ms", "electronics.pulse_width_min": "us",
+          "electronics.pulse_width_max": "us", "stops.lower_angle": "deg", "stops.upper_angle": "deg"}
+
+
+def sheet_table(sheet: Sheet, flags: Iterable[str] = ()) -> dict[str, Any]:
+    """Return the table [sheet] of a servo file: facts as printed, each with unit and source.
+
+    Examples
+    --------
+    >>> point = SheetPoint(supply_voltage=6.0, stall_torque=0.4, no_load_speed=5.5)
+    >>> sheet_table(Sheet(name="a", points=(point,), deadband=8e-6, source="the box"))["deadband"]
+    {'value': 8.0, 'unit': 'us', 'source': 'the box'}
+    """
+    found: dict[str, Any] = {_FLAGS: list(flags)}
+    if sheet.note:
+        found[_NOTE] = sheet.note
+    found |= {name: getattr(sheet, name) for name in _WORDS if getattr(sheet, name)}
+    nominal = sheet.nominal
+    found |= _entries(nominal, POINT, {}, sheet.source_at(nominal))
+    found |= _entries(sheet, WHOLE, sheet.sources, sheet.source or "data sheet")
+    rest = [point for point in sheet.points if point is not nominal]
+    if rest:
+        found[ELSE] = [_entries(point, POINT, {}, sheet.source_at(point)) for point in rest]
+    return found
+
+
+def sheet_of(servo: Servo) -> Sheet:
+    """Return the sheet that a servo file holds, from which `servo_from_sheet` makes it again.
+
+    Raises
+    ------
+    InputError
+        If the file has no table [sheet], or something in it is not what a sheet prints.
+
+    Examples
+    --------
+    >>> from servotwin.parameters import load_servo
+    >>> round(sheet_of(load_servo("hitec-hs-755hb")).nominal.stall_torque, 4)
+    1.2945
+    """
+    table = servo.sheet
+    if not table:
+        raise InputError(f"servo {servo.name!r} has no table [sheet]")
+    known = (*POINT, *WHOLE, *_WORDS, _FLAGS, _NOTE, ELSE)
+    for key in table:
+        if key not in known:
+            raise InputError(f"[sheet] of {servo.name!r}", got=key, allowed=", ".join(known))
+    values, sources = _read(servo, table, WHOLE)
+    rows = table.get(ELSE, [])
+    if not isinstance(rows, list) or not all(isinstance(row, Mapping) for row in rows):
+        raise InputError(f"[sheet] {ELSE} of {servo.name!r}", got=rows, allowed=f"tables [[sheet.{ELSE}]]")
+    points = [_read_point(servo, row) for row in (table, *rows)]
+    source = points[0].source
+    values |= {name: str(table.get(name, "")) for name in _WORDS if name != "continuous"}
+    values["continuous"] = table.get("continuous") is True
+    return Sheet(
+        name=servo.name, title=servo.title, source=source, points=tuple(points),
+        sources={name: said for name, said in sources.items() if said != source}, note=str(table.get(_NOTE, "")),
+        **values)
+
+
+def _entries(given: Sheet | SheetPoint, keys: Mapping[str, tuple[str, str, str]], sources: Mapping[str, str],
+             source: str) -> dict[str, Any]:
+    found = {}
+    for key, (name, dimension, unit) in keys.items():
+        value = getattr(given, name)
+        if value is not None:
+            found[key] = {"value": float(f"{units.from_si(printed(key, value), unit, dimension):.10g}"), "unit": unit,
+                          "source": sources.get(name) or source}
+    return found
+
+
+def _read_point(servo: Servo, row: Mapping[str, Any]) -> SheetPoint:
+    values, sources = _read(servo, row, POINT)
+    if "supply_voltage" not in values:
+        raise InputError(f"[sheet] of {servo.name!r}", got="figures without supply_voltage", allowed="both")
+    return SheetPoint(**values, source=sources.get("stall_torque") or next(iter(sources.values())))
+
+
+def _read(servo: Servo, row: Mapping[str, Any], keys: Mapping[str, tuple[str, str, str]]
+          ) -> tuple[dict[str, Any], dict[str, str]]:
+    values, sources = {}, {}
+    for key, (name, _, _) in keys.items():
+        found = figure(servo.name, key, row[key]) if key in row else None
+        if found is not None:
+            values[name], sources[name] = found.value, found.source
+    return values, sources
+
+
+def servo_file_text(servo: Servo) -> str:
+    """Return a servo file as the catalog has them: one line for each value, units that people use, six digits.
+
+    Numbers of the firmware have all their digits.
+
+    Examples
+    --------
+    >>> from servotwin.parameters import servo_from_values
+    >>> print(servo_file_text(servo_from_values("mine", {"motor": {"torque_constant": 3.7e-3}})))
+    name = "mine"
+    title = ""
+    <BLANKLINE>
+    [motor]
+    torque_constant = { value = 3.7, unit = "mN m/A", origin = "assumed" }
+    <BLANKLINE>
+    """
+    lines = [f"name = {_text(servo.name)}", f"title = {_text(servo.title)}"]
+    if servo.kind != KINDS[0]:
+        lines += [f"kind = {_text(servo.kind)}"]
+    if servo.notes:
+        body = servo.notes.strip("\n").replace("\\", "\\\\").replace('"""', '""\\"')
+        lines += [f'notes = """\n{body}\n"""']
+    if servo.sheet:
+        lines += ["", *_sheet_lines(servo.sheet)]
+    for group in GROUPS:
+        names = [name for name in servo.names() if name.startswith(f"{group}.")]
+        if names:
+            lines += ["", f"[{group}]", *(_line(name, servo.source(name)) for name in names)]
+    return "\n".join(lines) + "\n"
+
+
+def write_servo_text(servo: Servo, path: str | Path, *, overwrite: bool = False) -> None:
+    """Write `servo_file_text` to a file, whole or not at all.
+
+    Raises
+    ------
+    OutputExistsError, OutputError
+        If the file exists and `overwrite` is false, or it cannot be written.
+    """
+    write_file(path, servo_file_text(servo), overwrite=overwrite)
+
+
+def _sheet_lines(table: Mapping[str, Any]) -> list[str]:
+    lines = ["[sheet]  # facts as printed"]
+    for key, entry in table.items():
+        if key != ELSE:
+            lines.append(f"{key} = {_toml(entry)}")
+    for row in table.get(ELSE, []):
+        lines += ["", f"[[sheet.{ELSE}]]", *(f"{key} = {_toml(entry)}" for key, entry in row.items())]
+    return lines
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_toml(item) for item in value) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return _text(value) if isinstance(value, str) else repr(value)
+
+
+def _text(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _line(name: str, quantity: Quantity) -> str:
+    dimension = dimension_of(name)
+    unit = _UNITS.get(name, unit_of(name))
+
+    def number(x: Any) -> Any:
+        if not isinstance(x, float):
+            return [number(item) for item in x] if isinstance(x, tuple) else x
+        if name.startswith("firmware."):  # of whole counts and steps: a digit less would change what it computes
+            return x
+        return float(f"{units.from_si(x, unit, dimension):.6g}") + 0.0  # a range may end at -0
+
+    entry: dict[str, Any] = {"value": number(quantity.value)}
+    if unit:
+        entry["unit"] = unit
+    entry["origin"] = quantity.origin
+    if quantity.source:
+        entry["source"] = quantity.source
+    entry |= {key: number(getattr(quantity, key)) for key in ("std", "lower", "upper")
+              if getattr(quantity, key) is not None}
+    return f"{name.partition('.')[2]} = {_toml(entry)}"
+
+# --- Lists of sheets: a CSV file with one row for each servo and supply voltage ---------------------------------------
+
+_DEG = math.pi / 180.0
+_POINT = {"V": ("supply_voltage", 1.0), "stall_torque_Nm": ("stall_torque", 1.0),
+          "noload_running_current_A": ("no_load_current", 1.0), "stall_current_A": ("stall_current", 1.0),
+          "idle_current_A": ("idle_current", 1.0), "speed_s_per_60deg": ("no_load_speed", 1.0)}
+_WHOLE = {"deadband_us": ("deadband", 1e-6), "travel_deg": ("travel", _DEG),
+          "deg_per_us": ("angle_per_pulse", _DEG * 1e6),
+          "mass_g": ("mass", 1e-3), "gear_ratio": ("gear_reduction", 1.0), "backlash_deg": ("backlash", _DEG),
+          "neutral_us": ("neutral_pulse", 1e-6), "stop_travel_deg": ("stop_travel", _DEG)}
+_RANGES = {"voltage_range_V": (("voltage_min", "voltage_max"), 1.0, "two voltages, such as 4.8-7.2"),
+           "pulse_range_us": (("pulse_min", "pulse_max"), 1e-6, "two pulse widths, such as 500-2500")}
+_TEXTS = ("maker", "model", "type", *_RANGES, "motor_type", "source", "note")
+_UNUSED = ("gear_material", "spline_teeth", "pot_drive", "bearing", "length_mm", "width_mm", "height_mm")
+COLUMNS = (*_TEXTS[:3], *_POINT, *_WHOLE, *_TEXTS[3:])
+
+
+@dataclass(frozen=True, kw_only=True)
+class SheetList:
+    """The sheets of a file, and what in it is no sheet.
+
+    Parameters
+    ----------
+    sheets : tuple of Sheet
+    left_out : tuple of str
+        Servos without torque and speed at any one voltage, each with the reason.
+    """
+
+    sheets: tuple[Sheet, ...]
+    left_out: tuple[str, ...]
+
+
+def read_sheets(path: str | Path) -> SheetList:
+    r"""Return the sheets of a CSV file.
+
+    Parameters
+    ----------
+    path : str or Path
+        A header, and one row for each servo and voltage; an empty cell is not printed. Columns: maker, model, type, V,
+        stall_torque_Nm, speed_s_per_60deg, noload_running_current_A, stall_current_A, idle_current_A,
+        voltage_range_V (4.8-7.2), deadband_us, pulse_range_us (500-2500), travel_deg (of a servo that turns without
+        end: endless), deg_per_us, mass_g, gear_ratio, backlash_deg, neutral_us,
+        stop_travel_deg, motor_type, source, note; model, V, stall_torque_Nm and speed_s_per_60deg are needed.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, lacks a column, has one that is not known, or a cell that is no such number.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> file = Path(tempfile.mkdtemp()) / "mine.csv"
+    >>> _ = file.write_text("maker,model,V,stall_torque_Nm,speed_s_per_60deg\nAcme,S 1,6.0,0.4,0.19\n")
+    >>> read_sheets(file).sheets[0].name
+    'acme-s-1'
+    """
+    rows = _rows(Path(path))
+    models: dict[tuple[str, str], list[tuple[int, Mapping[str, str]]]] = {}
+    for line, row in rows:
+        models.setdefault((row.get("maker", ""), row["model"]), []).append((line, row))
+    sheets, left_out, names = [], [], set[str]()
+    for (maker, model), own in models.items():
+        title = checked_name(f"{path}: line {own[0][0]}, maker and model", f"{maker} {model}".strip())
+        complete = [row for _, row in own if row["V"] and row["stall_torque_Nm"] and row["speed_s_per_60deg"]]
+        if not complete:
+            left_out.append(f"{title}: no torque and speed at one voltage")
+            continue
+        sheet = _sheet(Path(path), title, own)
+        if sheet.name in names:
+            raise InputError(f"{path}: line {own[0][0]}, model", got=title, allowed="one that gives another name than "
+                             f"{sheet.name!r}, which is taken")
+        names.add(sheet.name)
+        sheets.append(sheet)
+    return SheetList(sheets=tuple(sheets), left_out=tuple(left_out))
+
+
+def short_name(title: str) -> str:
+    """Return an id for a servo.
+
+    Examples
+    --------
+    >>> short_name("Miuzei MS18 (SG90 class)")
+    'miuzei-ms18-sg90-class'
+    """
+    return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-") or "servo"
+
+
+def _sheet(path: Path, title: str, rows: list[tuple[int, Mapping[str, str]]]) -> Sheet:
+    source, whole = "", dict[str, Any]()
+    points = []
+    for line, row in rows:
+        where = f"{path}: line {line}"
+        source = source or row.get("source", "")
+        for column, (name, by) in _WHOLE.items():
+            if column == "travel_deg" and row.get(column, "").lower() in ENDLESS:
+                whole["continuous"] = True
+            elif row.get(column) and name not in whole:
+                whole[name] = _number(where, column, row[column]) * by
+        for name in ("motor_type", "note"):
+            whole.setdefault(name, row.get(name, ""))
+        if row.get("type"):
+            whole.setdefault("modulation", "digital" if row["type"].startswith("digital") else "analog"
+                             if row["type"].startswith("analog") else "")
+        for column, (ends, by, allowed) in _RANGES.items():
+            if row.get(column):
+                for name, value in zip(ends, _two(f"{where}, {column}", row[column], allowed), strict=True):
+                    whole.setdefault(name, value * by)
+        if row["V"]:
+            points.append(_point(where, row, source))
+    try:
+        return Sheet(name=short_name(title), title=title, points=tuple(points), source=source, **whole)
+    except InputError as error:
+        raise InputError(f"{path}: line {rows[0][0]}: {error.what}", got=error.got, allowed=error.allowed) from None
+
+
+def _point(where: str, row: Mapping[str, str], source: str) -> SheetPoint:
+    values: dict[str, Any] = {name: _number(where, column, row[column]) * by for column, (name, by) in _POINT.items()
+                              if row.get(column)}
+    if values.get("no_load_speed", 0.0) > 0.0:
+        values["no_load_speed"] = math.pi / 3.0 / values["no_load_speed"]
+    other = row.get("source", "")
+    try:
+        return SheetPoint(**values, source=other if other and other != source else "")
+    except InputError as error:
+        raise InputError(f"{where}: {error.what}", got=error.got, allowed=error.allowed) from None
+
+
+def _number(where: str, column: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f"{where}, {column}", got=text, allowed="a number")
+    return value
+
+
+def _two(what: str, text: str, allowed: str) -> tuple[float, float]:
+    found = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*-\s*(\d+(?:\.\d+)?)\s*", text)
+    if found is None:
+        raise InputError(what, got=text, allowed=allowed)
+    return float(found[1]), float(found[2])
+
+
+def _rows(path: Path) -> list[tuple[int, Mapping[str, str]]]:
+    table = read_table(path, lambda name: name in COLUMNS)
+    header = table.header
+    for column in header:
+        if column not in COLUMNS and column not in _UNUSED:
+            raise InputError(f"{path}: {UnknownNameError('column', column, COLUMNS)}")
+    for needed in ("model", "V", "stall_torque_Nm", "speed_s_per_60deg"):
+        if needed not in header:
+            raise InputError(f"{path}: columns", got=", ".join(header), allowed=f"also {needed}")
+    table.check_lengths(shorter=True)
+    n = len(header)
+    return [(line, {name: _plain(cell) if table.decimal == "," else cell
+                    for name, cell in zip(header, [*cells, *[""] * (n - len(cells))][:n], strict=True)})
+            for line, cells in table.rows]
+
+
+def _plain(cell: str) -> str:
+    """Return a number, or a range, with decimal points; texts stay as they are."""
+    return cell.replace(",", ".") if re.fullmatch(r"[+-]?\d*,\d+|\d+(,\d+)?\s*-\s*\d+(,\d+)?", cell) else cell

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from servotwin.identification.report.shown import sensor_shown
+from servotwin.identification.report.pictures import sensor_shown
 from servotwin.logs.columns import COMMANDS, SWITCH, TIME, own_columns
 from servotwin.logs.impossible import PULSES
 from servotwin.logs.log_checks import FEWEST, LIMITS

@@ -10,7 +10,7 @@ import numpy as np
 
 from servotwin.identification.fitting.fit import Trace
 from servotwin.identification.fitting.validate import Validation, validate
-from servotwin.identification.report.shown import rig_text, sensor_shown
+from servotwin.identification.report.pictures import rig_text, sensor_shown
 from servotwin.loads import Load
 from servotwin.logs import Log
 

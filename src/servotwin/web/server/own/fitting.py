@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from servotwin.identification import Fit, Log, identify
-from servotwin.identification.report.shown import error_shown, estimate_lines
+from servotwin.identification.report.pictures import error_shown, estimate_lines
 from servotwin.parameters.servo_file import servo_text
 from servotwin.simulation.progress import HERE
 from servotwin.text import file_stem
