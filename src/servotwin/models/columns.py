@@ -19,6 +19,7 @@ from servotwin.physics.pieces import Piece, Pieces, piece_value
 if TYPE_CHECKING:
     from servotwin.parameters import Servo
 
+
 # --- Many lanes at once -----------------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
@@ -163,6 +164,7 @@ class LaneSignal:
     edges: tuple[()] | None
     lanes: Indices
     silences: tuple[()] = ()  # they are edges by then
+
 
 # --- States of a run at many times, the input of every output signal --------------------------------------------------
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from servotwin.models.terms.firmware import Firmware
     from servotwin.models.terms.numbers import Numbers
 
+
 # --- What a digital servo that stands draws at a duty, its limit of current included ----------------------------------
 
 _ROUNDS = 30  # until a soft supply and a limit of current agree
@@ -54,6 +55,7 @@ def _at(numbers: Numbers, d: float) -> float:
         return 0.0
     plant = duty.at_duty(numbers, d)
     return math.copysign(currents.stall_current(plant, plant.source.V), d)
+
 
 # --- Where the travel of a servo has its middle -----------------------------------------------------------------------
 

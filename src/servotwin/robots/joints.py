@@ -106,6 +106,7 @@ def complain(instance: Words, code: int, culprit: int) -> None:
     if instance[place.CODE] == WELL:
         instance[place.CODE], instance[place.CULPRIT] = code, culprit
 
+
 # --- What is kept of a run of servos at joints: rows of what shows, and books of energy -------------------------------
 
 def keep(drive: Words, instance: Words, room: Rows, torque: Numbers, time: float, again: bool) -> None:
@@ -216,6 +217,7 @@ def note_forces(d: int, drive: Words, instance: Words, block: Numbers, total: Nu
     for i in range(n):
         force[speed_at[i]] += block[place.HEAD + i]
 
+
 # --- Servos at joints: where they stand, what they are told, and how they go on for a tick ----------------------------
 
 def stand(d: int, drive: Words, room: Rows) -> int:
@@ -294,6 +296,7 @@ def go_on(instance: Words, room: Rows, dt: float, watched: bool) -> int:
             if status[n] != 0:
                 lost = int(which[n])
     return lost
+
 
 # --- What joints would do without their servos, and the torques of all servos that follow from it ---------------------
 
@@ -425,6 +428,7 @@ def learn(speed_at: Words, gain: Numbers, inverse: Rows, known: Numbers, room: R
             known[2 * n + i] = min(max((known[i] - found[i]) / other * inverse[i, speed_at[i]], 0.0), 1.0)
         known[i], known[n + i] = found[i], a[i]
     return missed
+
 
 # --- Servos at the joints of a rigid-body engine ----------------------------------------------------------------------
 

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from servotwin.simulation.lanes.inputs import LaneInputs
     Array = NDArray[np.float64]
 
+
 # --- The supply that several servos share -----------------------------------------------------------------------------
 
 Indices = NDArray[np.int64]
@@ -162,6 +163,7 @@ def _lanes_of(k: int, some: Any, count: int) -> Indices:
     if not len(lanes) or some is None:
         raise InputError(f"lanes of bus {k}", got=some if some is None else "none", allowed="at least one lane")
     return lanes
+
 
 # --- `simulate_bus`: several servos on one supply, joined by its voltage ----------------------------------------------
 

@@ -320,6 +320,7 @@ def _records_of(memories: Sequence[Memory]) -> Memories:
         put_fields(firm, own if hasattr(own, "_fields") else control.frozen(own))
     return found
 
+
 # --- The rows that a run of servos on a bus leaves behind, as motions and events of each ------------------------------
 
 _WORDS = {DRIVES + 1: "drive forward", DRIVES - 1: "drive backward", DRIVES: "drive ends",
@@ -342,6 +343,7 @@ def events_of(plans: Sequence[Plan], rows: Rows) -> list[tuple[Event, ...]]:
         name = _WORDS.get(kind) or event_name(int(kind), Mode(int(zone), int(contact), 0, 0, 0))
         found[int(unit)].append(Event(time, name, angle))
     return [tuple(events) for events in found]
+
 
 # --- Servos on one supply that stop and go on, in plain Python, and are looked at on the way --------------------------
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
+
 # --- Signals of many runs at the same times as tables of pandas and xarray --------------------------------------------
 
 def dataframe(axis: str, labels: Sequence[Any], time: NDArray[np.float64], signals: Mapping[str, NDArray[Any]],
@@ -68,6 +69,7 @@ def dataset(axis: str, labels: Sequence[Any], time: NDArray[np.float64], signals
             for name, values in signals.items()}
     return xr.Dataset(data | dict(more), coords={axis: labels, "time": ("time", time, {"units": "s"}), **coords},
                       attrs=dict(attrs))
+
 
 # --- The instants at which a run shows what it did, as a call asks for them -------------------------------------------
 

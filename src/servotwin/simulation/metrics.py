@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from servotwin.simulation.result import Result
     from servotwin.simulation.trajectory import Trajectory
 
+
 # --- When a shaft has arrived where a step sends it -------------------------------------------------------------------
 
 _SHARE = 0.05  # of the step
@@ -90,6 +91,7 @@ def arrival_band(way: float, finest: float) -> float:
     [1.0, 1.0, 0.15]
     """
     return float(min(_NEAR, tolerance(way, finest), 0.5 * abs(way)))
+
 
 # --- Metrics of a step response, read from the continuous solution and not from samples -------------------------------
 _LOOK = 0.1  # s, five usual frames

@@ -123,6 +123,7 @@ def shown(progress: Progress, total: int, what: str) -> Iterator[Callable[[int],
         if bar.live.is_started:
             bar.stop()
 
+
 # --- Whoever does pieces of work --------------------------------------------------------------------------------------
 
 _MANY = 32  # workers of an executor that does not say

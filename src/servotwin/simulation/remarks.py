@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from servotwin.simulation.result import Result
     from servotwin.simulation.trajectory import Trajectory
 
+
 # --- How far the supply falls -----------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
@@ -157,6 +158,7 @@ def floor_of(servo: Servo) -> Floor:
 def watches_its_supply(model: Model) -> bool:
     """Tell whether a protection of the servo's program acts where its supply is low."""
     return isinstance(model, DigitalServo) and model.servo.firmware.undervoltage is not None
+
 
 # --- What a completed run leaves to be said ---------------------------------------------------------------------------
 
@@ -466,6 +468,7 @@ def of_columns(table: Mapping[str, NDArray[np.float64]]) -> tuple[LaneRemark, ..
     found = [LaneRemark(lane, kind, float(table[name][lane]))
              for kind, name in COLUMNS.items() for lane in np.flatnonzero(~np.isnan(table[name])).tolist()]
     return tuple(sorted(found, key=lambda remark: remark.lane))
+
 
 # --- What is possible but odd in what is to be simulated: one warning for each, before anything runs ------------------
 

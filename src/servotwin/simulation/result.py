@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from servotwin.signals import Signal
     from servotwin.simulation.engine import Event
 
+
 # --- CSV files of signals: one header line, the unit of each column in its name, angles in degrees --------------------
 
 # SI unit -> (suffix of the column, unit in the file, dimension)
@@ -159,6 +160,7 @@ def save_lanes(path: str | Path, time: NDArray[np.float64], signals: Mapping[str
                 stream.write(text if first == 0 else text[text.index(b"\n") + 1:])
 
     write_file(path, write, overwrite=overwrite)
+
 
 # --- What a simulation gives back: named signals, events, metrics and energy, and the ways out to files ---------------
 

@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from servotwin.models import Model
     from servotwin.signals import Signal
 
+
 # --- `Simulator`, which goes from state to state ----------------------------------------------------------------------
 
 _MOST_OTHERS = 64  # servos with other numbers that a simulator keeps
@@ -344,6 +345,7 @@ def _seed(seed: int) -> int:
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer):
         raise InputError("seed", got=seed, allowed="a whole number")
     return int(seed)
+
 
 # --- `simulate`: a run of one servo from start to end -----------------------------------------------------------------
 

@@ -75,6 +75,7 @@ def check_start(places: Sequence[Place], plant: Numbers, y: Vector) -> None:
                          allowed=f"{N * (y.q - plant.play.half):.6g} to {N * (y.q + plant.play.half):.6g} rad, "
                          "within the play of the gear")
 
+
 # --- How a simulation ended -------------------------------------------------------------------------------------------
 
 class Status(Enum):

@@ -216,6 +216,7 @@ class ArmFit:
 
         return write_arm_report(self, Path(path), overwrite=overwrite)
 
+
 # --- What would explain more of a robot's episodes --------------------------------------------------------------------
 
 _LEAST_GAIN = 8.0  # of the cost
@@ -382,6 +383,7 @@ def _mass_words(numbers: Numbers, x: Array, loose: Sequence[int]) -> str:
 
 _WORDS: dict[str, Callable[[Numbers, Array, Sequence[int]], str]] = {
     _GAIN: _gain_words, _SUPPLY: _supply_words, _MASSES: _mass_words}
+
 
 # --- How surely the numbers of a robot are known ----------------------------------------------------------------------
 

@@ -167,6 +167,7 @@ def asked_of(model: Any, joints: Sequence[str], links: Sequence[int], angle: Arr
     torque, inertia = (some[..., :-1] - some[..., -1:] for some in (torque, inertia))
     return Asked(torque - inertia * acceleration[:, :, None], np.maximum(inertia, 0.0))
 
+
 # --- The second stage: goals drive the whole arm, with every number moved in a copy of it -----------------------------
 
 _SETTLE = 0.5  # s, at the first goals

@@ -159,6 +159,7 @@ def supply_of(bus: Supply | None, mounts: Mapping[str, Mount]) -> Supply | None:
     return Supply(open_circuit_voltage=volts, internal_resistance=model.value_or("supply.internal_resistance", 0.0)
                   or None) if volts > 0.0 else None
 
+
 # --- Registers of a robot's servos that nobody recorded, tried as whole lanes of its joints before its fit ------------
 
 Make = Callable[[Mapping[str, Mount]], Numbers]
@@ -242,6 +243,7 @@ def arm_registers(what: Problem, make: Make) -> tuple[RegisterSearch | None, dic
     servos = [search.joints[joint].servo if joint in search.joints else servo
               for joint, servo in zip(mounts, servos, strict=True)]
     return search, with_servos(mounts, servos)
+
 
 # --- The two stages of the fit of a robot, of which each keeps the best that it has found wherever it is stopped ------
 
@@ -424,6 +426,7 @@ def _clean(what: Problem, linear: Sequence[Linear], noise: Noise) -> list[Array]
               for chosen in ([one.slopes for one in linear], [one.scatter for one in linear])]
     kept = beyond_scatter(*(np.concatenate(one) for one in tables))
     return [one.slopes @ kept for one in linear]
+
 
 # --- `identify_arm` ---------------------------------------------------------------------------------------------------
 

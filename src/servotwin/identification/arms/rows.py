@@ -159,6 +159,7 @@ def _smooth(time: Array, measured: Array) -> tuple[Array, Array, Array]:
         found.append(np.stack([np.interp(time, even, column) for column in smooth.T], axis=1))
     return found[0], found[1], found[2]
 
+
 # --- Numbers ----------------------------------------------------------------------------------------------------------
 
 VOLTAGE, RESISTANCE, LATENCY, CLOCK = (
@@ -420,6 +421,7 @@ def model_columns(models: Sequence[Model], columns: Sequence[Mapping[str, Array]
         made[QUANTUM] = np.tile(np.array(counts) / FINER, copies)
     return made
 
+
 # --- Copies of a robot, at points of the numbers that are searched ----------------------------------------------------
 
 class Copies(ABC):
@@ -445,6 +447,7 @@ class Copies(ABC):
 
         nan where a simulation failed; `fine` without the counts of the servos.
         """
+
 
 # --- Residuals of a robot's joints in units of noise, and how they change with every number ---------------------------
 
@@ -624,6 +627,7 @@ def parts_of(episode: Episode, residual: Array, slopes: Array | None, noise: Noi
     s = np.zeros((*residual.shape, 0)) if slopes is None else whitened(slopes, episode, noise, used)
     return [LogPart(r[mask, j], s[mask, j], np.zeros((int(mask.sum()), 0))) for j, mask in enumerate(used.T)
             if mask.any()]
+
 
 # --- Windows of an episode that no numbers explain: contact, a hand, an object between the fingers --------------------
 

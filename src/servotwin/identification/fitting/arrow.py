@@ -20,6 +20,7 @@ from servotwin.identification.fitting.forecast import Forecast
 if TYPE_CHECKING:
     from servotwin.identification.fitting.fit import Fit
 
+
 # --- Bounded nonlinear least squares whose normal matrix is an arrow --------------------------------------------------
 
 Array = NDArray[np.float64]
@@ -320,6 +321,7 @@ class Search:
                 own[k] = point.own[k] + step
                 largest = max(largest, float(np.abs(step).max()))
         return point._replace(shared=x + change, own=tuple(own)), largest
+
 
 # --- How a search begins ----------------------------------------------------------------------------------------------
 

@@ -242,6 +242,7 @@ def _end(search: Search, best: Outcome, doubt: Uncertainty, k: int, side: float,
             at = low + (high - low) * min(max((1.0 - of_low) / (of_high - of_low), 0.1), 0.9)
     return at, share
 
+
 # --- What a servo file leaves out or only assumes ---------------------------------------------------------------------
 
 Array = NDArray[np.float64]

@@ -31,6 +31,7 @@ from servotwin.units import is_finite
 if TYPE_CHECKING:
     from servotwin.signals import Signal
 
+
 # --- Where a search stands, what a log says there, and the numbers that all logs share beside the parameters ----------
 
 NUISANCES = ("delay", "log_delay", "frame_phase", "frame_period", "control_phase", "angle_offset", "angle_sag",
@@ -103,6 +104,7 @@ def joined(parts: Sequence[LogPart]) -> Array:
     from scipy.linalg import block_diag
 
     return np.column_stack([np.concatenate([part.shared for part in parts]), block_diag(*(part.own for part in parts))])
+
 
 # --- The pulses of a log: when they come, and which command each of them carries --------------------------------------
 
@@ -228,6 +230,7 @@ def signal(log: Log, frames: Frames, first: float, period: float, lead: float = 
     made = sampled(time + lead, log.held, unit=unit, hold=log.command_hold)
     return replace(made, initial=float(log.held[0]), edges=tuple(edges[log.sent[latest]].tolist()))
 
+
 # --- The gain that a log says its servo's loop had, as the firmware has it --------------------------------------------
 
 GAIN = "firmware.proportional_gain"
@@ -280,6 +283,7 @@ def _of_pulses(log: Log, servo: Servo) -> float | None:
     rig = servo.sheet.get("bam")
     ratio = rig.get("error_gain_ratio", 1.0) if isinstance(rig, Mapping) else 1.0
     return None if K is None or s_mu is None or T_f is None or p is None else K * s_mu * p / T_f * ratio
+
 
 # --- One log, made ready to be compared with a simulation -------------------------------------------------------------
 

@@ -33,6 +33,7 @@ from servotwin.models import DigitalServo, Model
 if TYPE_CHECKING:
     from servotwin.identification.fitting.task import Task
 
+
 # --- Other commands for the ticks of all logs at once, judged by where all numbers would go with them -----------------
 
 _RANDOM, _ALIKE = 24, 8  # choices that descents begin with: random ones, and ticks alike in all logs
@@ -167,7 +168,6 @@ def _descent(parabolas: Mapping[int, Parabolas], about: Parabolas,
         if not cost < before - 1e-9 * abs(before):
             return chosen, cost
 
-# --- The clocks of logger and generator -------------------------------------------------------------------------------
 
 # --- The clocks of logger and generator -------------------------------------------------------------------------------
 Told = Callable[[float, str], None]

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from servotwin.identification.fitting.yielding import Foreseen, Widened, Yielded
     from servotwin.signals import Signal
 
+
 # --- The arguments of `identify`, checked before anything runs, and what a reader has to know afterwards --------------
 
 _KINDS = (PulseServo, PulseServoInductive, BoundedServo, DigitalServo)
@@ -288,6 +289,7 @@ def shown(progress: Any) -> Iterator[Callable[[float, str], None]]:
     finally:
         with contextlib.suppress(OSError):  # a terminal that was closed takes nothing along that was found
             bar.stop()
+
 
 # --- What a fit found -------------------------------------------------------------------------------------------------
 
@@ -626,6 +628,7 @@ class Fit:
         from servotwin.identification.report.page import write_report
 
         return write_report(self, Path(path), ladder=ladder, overwrite=overwrite)
+
 
 # --- What is wrong with logs before any fit ---------------------------------------------------------------------------
 

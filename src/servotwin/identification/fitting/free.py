@@ -46,6 +46,7 @@ JUMPS = (  # what acts by jumps, where no search finds its way
     "firmware.control_phase",
 )
 
+
 # --- What is searched -------------------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]

@@ -123,6 +123,7 @@ def counts_of(forecast: Forecast, k: int) -> Counts | None:
         belief[place] = float(forecast.own_belief(case)[1][place]) * forecast.noise["output_angle"] / OFFSET_SCALE
     return Counts(np.concatenate(reading), np.concatenate(power), belief)
 
+
 # --- The doubts of a fit: how surely it knows its numbers, and what the logs do not say of them -----------------------
 
 Told = Callable[[float, str], None]
@@ -227,6 +228,7 @@ def _information(task: Task, found: Outcome, central: Sequence[LogPart], beliefs
     rows = [rows_of(part, task.loss, own, found.point.own[k])
             for k, part, own in zip(task.fitted, parts, beliefs, strict=True)]
     return np.asarray(np.sum([(r.slope * r.inside[:, None]).T @ r.slope for r in rows], axis=0))
+
 
 # --- The last stage of a fit: its verdict, and where that is bad the trials of what may be the matter -----------------
 
@@ -374,6 +376,7 @@ def _others(task: Task) -> dict[str, float]:
 def _series(trace: Trace) -> SensorSeries:
     return SensorSeries(trace.log, trace.time, trace.measured, trace.simulated)
 
+
 # --- Intervals of a fit that was stopped ------------------------------------------------------------------------------
 
 LINEARISED = "intervals (those here are of the problem made straight at the best so far, three times as wide)"
@@ -424,6 +427,7 @@ def _pulses(task: Task, found: Outcome) -> dict[str, tuple[float, float]]:
         return {}
     delay = float(found.point.shared[k]) * DELAY_SCALE
     return {"delay": (max(delay - task.period, 0.0), delay + task.period)}
+
 
 # --- `identify` -------------------------------------------------------------------------------------------------------
 

@@ -101,6 +101,7 @@ def _of(trace: Trace) -> Array:
         squares.append((float(np.sum(trace.residual[some] ** 2)), float(np.sum(some))))
     return np.array(squares)
 
+
 # --- Which of several fits to the same logs the data pay for ----------------------------------------------------------
 
 _FEWEST = 3  # held out logs, whose scatter is believed
@@ -277,6 +278,7 @@ def _difference(rung: Rung, best: Rung, some: Sequence[int] | None) -> tuple[flo
 def _errors(rung: Rung, some: Sequence[int] | None = None) -> tuple[LogError, ...]:
     errors = rung.fit.holdout.errors[type(rung.fit.model).__name__]
     return errors if some is None else tuple(errors[k] for k in some)
+
 
 # --- The friction laws M1 to M6 one after the other on the same logs, and which of them the data pay for --------------
 

@@ -320,6 +320,7 @@ def _repeats(series: Sequence[SensorSeries]) -> float:
     every = np.concatenate(found)
     return _NORMAL * float(np.median(np.abs(every)))
 
+
 # --- Do residuals follow the command of some time before? Their cross-correlation with its past changes ---------------
 
 _REACH = 1.0  # s: a servo has followed a command by then, assumed

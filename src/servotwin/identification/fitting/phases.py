@@ -34,6 +34,7 @@ from servotwin.identification.fitting.forecast import Forecast
 if TYPE_CHECKING:
     from servotwin.identification.fitting.forecast import Forecast
 
+
 # --- The ticks of a program that pulses command: which command each of them takes -------------------------------------
 
 _TICK, _PHASE = "firmware.control_period", "firmware.control_phase"
@@ -82,6 +83,7 @@ def ticks_of(forecast: Forecast, point: Point, k: int) -> Ticks:
     brings = np.append(True, np.diff(widths) != 0.0) & (edges > 0.0)  # the first of all may be cut off
     ends = np.mod((edges + widths)[brings] - first - forecast.lead_at(point, k) - phase, period)
     return Ticks(period, ends, between(ends, period))
+
 
 # --- The search for what jumps ----------------------------------------------------------------------------------------
 

@@ -238,6 +238,7 @@ def _left(error: Array, span: Array, numbers: LagNumbers) -> tuple[Array, Array,
     slewing = np.minimum(np.maximum(size / rate - numbers.lag, 0.0), span)
     return size, (size - rate * slewing) * np.exp((slewing - span) / numbers.lag), way, rate
 
+
 # --- Small bounded least squares from several starts at once ----------------------------------------------------------
 
 Seen = tuple[Array, Array]  # residuals (N,) and their derivatives (N, p)
@@ -344,6 +345,7 @@ def _step(x: Array, g: Array, H: Array, lower: Array, upper: Array) -> Array:
         step[over] = np.clip(there, lower, upper)[over] - x[over]
         stays = stays | over
     return np.clip(x + step, lower, upper) - x
+
 
 # --- The model without physics that every servo model has to beat -----------------------------------------------------
 

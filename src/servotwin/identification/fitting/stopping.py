@@ -106,6 +106,7 @@ class TimeLeft:
 
 _ROUNDING = 1e-3  # s
 
+
 # --- How far a fit is, told by the work that it measured, and what stops it -------------------------------------------
 
 Show = Callable[[float, str], None]

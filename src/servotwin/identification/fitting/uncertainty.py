@@ -141,7 +141,6 @@ def _left(bases: Sequence[tuple[Array, Array]], rho: float) -> Array:
     total = sum(len(shared) for shared, _ in bases)
     return np.array([max(squares, _LEAST * total), products])
 
-# --- How surely a fit knows its numbers -------------------------------------------------------------------------------
 
 # --- How surely a fit knows its numbers -------------------------------------------------------------------------------
 Array = NDArray[np.float64]

@@ -186,6 +186,7 @@ def _as_measured(forecast: Forecast, point: Point, start: Point) -> Point:
         own.append(np.where(keeps, found, first))
     return point._replace(own=tuple(own))
 
+
 # --- `validate`: how far a servo that is known is off logs, without fitting any parameter -----------------------------
 
 Array = NDArray[np.float64]
@@ -426,6 +427,7 @@ def _failures(forecast: Forecast, parts: Sequence[LogPart]) -> None:
 def _noise(forecast: Forecast, parts: Sequence[LogPart]) -> dict[str, float]:
     """Return how far the residuals of each sensor scatter (SI)."""
     return {**forecast.noise, **scatter_of(forecast, parts, range(len(parts)))}
+
 
 # --- Common cause -----------------------------------------------------------------------------------------------------
 

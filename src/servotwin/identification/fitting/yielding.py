@@ -303,7 +303,6 @@ def _tells(forecast: Forecast, logs: Sequence[Log], sensor: str, point: Point, d
     noise = max(_NOISE * float(np.abs(values).max(initial=0.0)), 1e-12)
     return float(np.linalg.norm(change)) / noise > 2.0  # standard errors of half such a step
 
-# --- Priors that yield ------------------------------------------------------------------------------------------------
 
 # --- Priors that yield ------------------------------------------------------------------------------------------------
 Array = NDArray[np.float64]

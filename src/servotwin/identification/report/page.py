@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from servotwin.identification.fitting.ladder import Ladder
     from servotwin.robots import RobotValidation
 
+
 # --- The report of a fit: one HTML page that needs nothing but itself -------------------------------------------------
 
 def write_report(fit: Fit, path: Path, *, ladder: Ladder | None = None, overwrite: bool = False) -> Path:
@@ -224,6 +225,7 @@ only. What does not beat them is not worth its parameters.</li>
 servo.</li>
 <li><b>Rig.</b> Delay and angle offset describe how the logs were taken. A start angle belongs to each log.</li></ul>
 """
+
 
 # --- The report of a robot's fit: one HTML page that needs nothing but itself -----------------------------------------
 

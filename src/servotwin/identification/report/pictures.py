@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from servotwin.identification.fitting.holdout import ErrorTable
     from servotwin.identification.fitting.noise import CrossCorrelation
 
+
 # --- The numbers of a fit as people read them -------------------------------------------------------------------------
 
 _LUMPED = {"output_torque_constant": "torque per current", "output_inertia": "inertia",
@@ -239,7 +240,6 @@ def share_text(value: float) -> str:
         return "–"
     return f"{100.0 * value:.2g} %" if abs(value) < 1.0 else f"{100.0 * value:.0f} %"
 
-# --- The pictures of a fit's numbers: intervals, correlation, and errors beside those of simpler models ---------------
 
 # --- The pictures of a fit's numbers: intervals, correlation, and errors beside those of simpler models ---------------
 VALUES_A_PAGE = 12  # of a label, whose errors a picture shows at once; assumed

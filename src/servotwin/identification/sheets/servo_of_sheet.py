@@ -104,6 +104,7 @@ def rotor_source(motor_type: str, time_60: float) -> str:
             f"{1e3 * usual.value:g} ms ({1e3 * usual.lower:g} to {1e3 * usual.upper:g}) for {kind} motors, at most "
             f"{SHARE:g} ({MOST_SHARE:g}) of the printed time for 60 degrees")
 
+
 # --- The firmware of a digital RC servo: no sheet says any of it, so it is assumed, with wide ranges ------------------
 
 _GUESS = "no source: guess for digital servos"
@@ -153,6 +154,7 @@ def _deadband(sheet: Sheet, rate: float, said: str) -> tuple[str, Range, str]:
 def _six(x: float) -> float:
     """Return six digits: a guess has no more."""
     return float(f"{x:.6g}")
+
 
 # --- From a sheet to a servo: every parameter with its origin, its source and its range -------------------------------
 

@@ -293,6 +293,7 @@ def _figures(given: SheetPoint | Sheet) -> Iterator[tuple[str, float]]:
         if f.name in _PLAUSIBLE and value is not None:
             yield f.name, value
 
+
 # --- The sheet inside a servo file ------------------------------------------------------------------------------------
 
 _FLAGS, _NOTE = "flags", "note"
@@ -479,6 +480,7 @@ def _line(name: str, quantity: Quantity) -> str:
     entry |= {key: number(getattr(quantity, key)) for key in ("std", "lower", "upper")
               if getattr(quantity, key) is not None}
     return f"{name.partition('.')[2]} = {_toml(entry)}"
+
 
 # --- Lists of sheets: a CSV file with one row for each servo and supply voltage ---------------------------------------
 

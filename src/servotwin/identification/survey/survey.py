@@ -22,6 +22,7 @@ from servotwin.units.words import unit_shown
 if TYPE_CHECKING:
     from servotwin.logs.log import Log
 
+
 # --- The clock of a log: its beat, how far stamps lie off it, and where rows are missing ------------------------------
 
 Array = NDArray[np.float64]
@@ -92,6 +93,7 @@ def _unit(steps: Array, period: float) -> float:
         if np.abs(steps / unit - np.round(steps / unit)).max() < 1e-4 * max(1.0, float(np.abs(steps / unit).max())):
             return unit if unit > _COARSE * period and np.ptp(steps) > 0.5 * unit else 0.0
     return 0.0
+
 
 # --- What cannot be right in a log, and which experiment it lacks: sentences, each with what to do --------------------
 
@@ -269,6 +271,7 @@ def missing_of(log: Log, clock: Clock, motion: Motion) -> Iterator[str]:
     if clock.period > 0.021:
         yield f"more rows: one each {1e3 * clock.period:.0f} ms hides what happens within a frame; 5 to 20 ms tell it"
 
+
 # --- How the motion of a log goes with its command: gain and zero, dead time, speed -----------------------------------
 
 _HELD = 0.3  # s of one command, after which a shaft has arrived or is on its way for long
@@ -411,6 +414,7 @@ def _speed(time: Array, angle: Array) -> float:
     smooth = np.median(np.lib.stride_tricks.sliding_window_view(np.pad(angle, 2, mode="edge"), 5), axis=1)
     return float(np.abs((smooth[apart:] - smooth[:-apart]) / (time[apart:] - time[:-apart])).max())
 
+
 # --- What the values of a measured signal say of its sensor: noise, steps, ends of its range --------------------------
 
 _FEW = 8  # different values, at least, that show steps
@@ -495,6 +499,7 @@ def _flat(seen: Array, end: float) -> int:
     edges = np.flatnonzero(np.diff(at))
     runs = (edges[1::2] - edges[::2])[edges[::2] > 0]
     return int(runs[runs >= _FLAT].sum())
+
 
 # --- All that a log says by itself ------------------------------------------------------------------------------------
 

@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from servotwin.models.engine.lanes import Floats, Indices, Lanes, Smalls
     from servotwin.models.engine.memory import Memories
 
+
 # --- What another simulator decides of a servo, as changes of its numbers and of where it stands ----------------------
 
 def possible(given: float, followed: float, low: float, high: float, least: float, most: float) -> bool:
@@ -124,6 +125,7 @@ def carried(follows: float, angle: float, half_play: float) -> float:
     """Return an angle [rad] that goes along with another one as far as the play between them."""
     return min(max(follows, angle - half_play), angle + half_play)
 
+
 # --- From servos side by side to servos one by one, and back: the same memory, told in two ways -----------------------
 
 def remembered(tile: Any, j: int, firm: Programs) -> Memory:
@@ -169,6 +171,7 @@ def put_beside(memory: Memory, period: float, tile: Any, j: int) -> None:
     clock.period[j], clock.edge[j], clock.since[j], clock.length[j] = (
         period, (number - 1) * period, period - to_next, period)
     tile.count.number[j], tile.count.first_draw[j] = number, chip.draws - number
+
 
 # --- One tick as a program in C asks for it, in loops over lanes ------------------------------------------------------
 
@@ -275,6 +278,7 @@ def follow(has: Indices, given: Floats, wanted: Floats, base: Floats, command: F
         for k in range(command.size):
             torque[k] = given[TORQUE, k]
             total[k] = base[k] + torque[k]
+
 
 # --- The sets of lanes of which a tick consists, in tiles or in records -----------------------------------------------
 
@@ -399,6 +403,7 @@ def break_up(joined: Indices, shared: Any, rows: Any) -> None:
         joined[k], rows[k].point.anchor_time = -1, math.inf
     for k in range(len(shared)):
         shared[k].phase, shared[k].jumped = APART, 1
+
 
 # --- What a user should know of how a run ended: of its last pulses, of end stops, and of the load --------------------
 

@@ -97,6 +97,7 @@ def in_linear_zone(zone: int) -> bool:
     """Tell whether the armature voltage follows the error in this zone."""
     return zone == LINEAR or zone == LINEAR_BACKWARD
 
+
 # --- What rounding leaves of a number ---------------------------------------------------------------------------------
 
 UNIT = 2e-16  # relative to it

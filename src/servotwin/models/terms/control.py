@@ -57,6 +57,7 @@ def follow(firmware: Firmware, firm: Any) -> None:
         firm.rate = way * speed
         firm.r += firm.rate * T_c
 
+
 # --- The protections of a digital servo: overload, current, heat, supply; what they leave of the duty -----------------
 
 NONE, OVERLOAD, CURRENT, HEAT, UNDERVOLTAGE = range(5)  # as `trip` shows them
@@ -130,6 +131,7 @@ def _judge_overload(firmware: Firmware, firm: Any, w: float, limp: bool) -> None
 
 def _start(firm: Any, w: float) -> None:
     firm.overload_clock, firm.overload_y, firm.overload_sign = 0.0, firm.y, 1.0 if w > 0.0 else -1.0
+
 
 # --- One tick of a digital servo: measure, follow the profile, compute the law, limit, protect ------------------------
 

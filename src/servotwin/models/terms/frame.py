@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+
 # --- The chip of a pulse servo: what it measures with, what it ignores, and how long it drives ------------------------
 
 READS = (
@@ -90,6 +91,7 @@ def _edges_first(timeout: float, period: float) -> float:
         return timeout
     frames = max(math.floor(timeout / period + 0.5), 1.0)
     return timeout * (1.0 + 1e-11) if abs(timeout - frames * period) <= 1e-9 * period else timeout
+
 
 # --- What the chip does with each pulse -------------------------------------------------------------------------------
 

@@ -16,6 +16,7 @@ from servotwin.parameters.groups import GROUPS
 if TYPE_CHECKING:
     from servotwin.loads import Load
 
+
 # --- What is given of a servo, as numbers alone -----------------------------------------------------------------------
 
 if TYPE_CHECKING:
@@ -99,6 +100,7 @@ def _words() -> dict[str, tuple[str, ...]]:
     groups: dict[str, type[Group]] = GROUPS
     return {f"{title}.{f.name}": f.metadata["rule"] for title, group in groups.items() for f in fields(group)
             if isinstance(f.metadata["rule"], tuple)}
+
 
 # --- What hangs on the shaft, as numbers alone ------------------------------------------------------------------------
 

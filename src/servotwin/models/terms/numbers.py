@@ -68,6 +68,7 @@ def warm(numbers: Numbers, y: Vector) -> Numbers:
     """Return the numbers at the temperatures of a state; the numbers themselves where they stay."""
     return at_temperature(numbers, y.T_w, y.T_h) if numbers.heat.C_w > 0.0 else numbers
 
+
 # --- All terms --------------------------------------------------------------------------------------------------------
 
 ROOMS: dict[str, Any] = {**dict(fields_of(Numbers)), "chip": Chip, "firmware": Firmware}

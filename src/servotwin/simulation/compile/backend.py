@@ -126,6 +126,7 @@ _INSTEAD: dict[str, Callable[..., Any]] = {
     "engine_observe__observed": _nothing_seen, "engine_cosim__marks": _no_marks,
     "robots_joints___solve": _no_solution}
 
+
 # --- How kernels run --------------------------------------------------------------------------------------------------
 
 _VARIABLE = "SERVOTWIN_BACKEND"

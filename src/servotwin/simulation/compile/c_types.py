@@ -69,6 +69,7 @@ ROUNDED = {"floor": "FLOOR", "ceil": "CEIL"}
 """Functions of `math` that return a whole number."""
 TRUTHS = {"isfinite": "isfinite", "isnan": "isnan", "isinf": "isinf"}
 
+
 # --- Types of C for kinds of values, and what changes one into another ------------------------------------------------
 
 _TAKEN = frozenset(

@@ -374,6 +374,7 @@ def local_names(node: ast.FunctionDef) -> set[str]:
     names = {argument.arg for argument in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)}
     return names | {n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
 
+
 # --- Derive one module from the kernels and laws, mechanically --------------------------------------------------------
 
 _PRIMITIVES = ("fma", "two_power", "binary_exponent", "scaled", "nearest", "floor")  # single instructions

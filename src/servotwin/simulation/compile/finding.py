@@ -147,6 +147,7 @@ def system() -> str:
         return {"win32": "windows", "darwin": "macos"}.get(sys.platform, sys.platform)
     return "linux" if platform.libc_ver()[0] == "glibc" else "linux-musl"
 
+
 # --- Find the libraries of recipes: in the package, or in the user's cache --------------------------------------------
 
 problems: list[str] = []  # why there is no library, as far as this process has found out

@@ -128,6 +128,7 @@ def _blocks(statement: ast.stmt) -> list[list[ast.stmt]]:
         return [statement.body, statement.orelse]
     return [statement.body] if isinstance(statement, (ast.For, ast.While)) else []
 
+
 # --- Print the calls in a derived function as C99 ---------------------------------------------------------------------
 
 class CallExpressions(Expressions):
@@ -262,6 +263,7 @@ def _number(node: ast.expr) -> float | None:
     if isinstance(node, ast.Attribute) and node.attr == "inf":
         return math.inf
     return None
+
 
 # --- Print one function of a derived module as C99 --------------------------------------------------------------------
 

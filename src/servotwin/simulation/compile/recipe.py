@@ -71,6 +71,7 @@ class Recipe:
         """Numbers of terms that are positive in all that will run ("firmware.T_c")."""
         return frozenset(certain(self.always))
 
+
 # --- C of doubles as C of floats: the same text with other types, literals and functions of the library ---------------
 
 _FUNCTIONS = re.compile(rf"\b({'|'.join((*MATH, 'fabs', 'floor', 'ceil', 'rint'))})\(")

@@ -143,6 +143,7 @@ def advance(tick: int) -> int:
     _show(t, h, lanes)
     return DONE
 
+
 # --- Bring the words of a call up to date, in compiled code -----------------------------------------------------------
 
 def renew(at: int) -> int:

@@ -67,6 +67,7 @@ _ENTRIES = tuple(f"servotwin.models.engine.run.runs:{name}" for name in ("start"
 _DIGITAL = PROGRAM | BEYOND | AT_COMMANDS | PWM | ONE_WAY
 _EVERYWHERE = STRAIGHT | DRY | AT_STOPS | SHOWN
 
+
 # --- Lanes side by side -----------------------------------------------------------------------------------------------
 BANDED = BY_SHARE | FADING | REGULATED
 STRIDING = ON_HEAT | CURVED_Q | ON_Q
@@ -91,6 +92,7 @@ def _side(name: str, form: str, single: bool = False) -> Recipe:
 _BY_FORMULA = {dtype: _side(f"side_by_side_{dtype}", "ONE_FORMULA", dtype == "float32")
                for dtype in ("float64", "float32")}
 _BY_FORM = {getattr(tiles, form): _side(f"by_{form.lower()}", form) for form in _FORMS[1:]}
+
 
 # --- Lanes one by one -------------------------------------------------------------------------------------------------
 _PLAIN = _EVERYWHERE | DROPS | SILENCE | FREE_RUNNING | STEPS | TABLE | ON_Q
@@ -124,6 +126,7 @@ _LEFT_BY_TICKS = _LEFT_TO_RUNS | BEYOND | ONE_WAY
 _BY_TICKS = (replace(BY_TICKS, name="ticks_by_loops", knows=BY_TICKS.knows & ~_LEFT_BY_TICKS, leaves=_LEFT_BY_TICKS),
              tuple(f"servotwin.models.engine.batch.digital_batch:{name}" for name in (
                  "enter", "watch", "decide", "move", "move_on", "follow")))
+
 
 # --- Lanes between calls ----------------------------------------------------------------------------------------------
 LOOK = Recipe("look", tuple(f"servotwin.models.engine.batch.observe_batch:{name}" for name in ("side_by_side",
@@ -173,6 +176,7 @@ def side_by_side(form: int, dtype: str) -> Recipe:
 KERNELS = tuple(sorted((*(one.name for one in (RUNS, DIGITAL, BY_TICKS, *_BY_FORMULA.values(), *_BY_FORM.values())),
                         RUNS.name + IN_GENERAL)))
 """Names of all kernels in which lanes run."""
+
 
 # --- Which lanes run in which form: the fastest that can follow what their terms do, else the general one -------------
 

@@ -131,6 +131,7 @@ def _unchecked(kind: type[Kind], numbers: Mapping[str, Any]) -> Kind:
         object.__setattr__(item, name, value)
     return item
 
+
 # --- The arguments of `simulate_many`, checked before anything runs ---------------------------------------------------
 
 Array = NDArray[np.float64]

@@ -42,6 +42,7 @@ from servotwin.units import is_finite, is_masked
 if TYPE_CHECKING:
     from servotwin.models import Model
 
+
 # --- What lanes are told at a tick, as the engine follows it: pulse width [s] or control voltage [V] ------------------
 
 _KINDS = {"pulse_width": "pulse_width", "command_angle": "angle", "command_voltage": "voltage"}
@@ -183,6 +184,7 @@ def _bounds(name: str, model: Model) -> _Bounds:
 def _signal(name: str, rows: Array, lanes: Any, low: Any, high: Any) -> LaneSignal:
     first = np.arange(len(lanes)) if len(rows) > 1 or len(lanes) == 1 else np.zeros(len(lanes), np.int64)
     return LaneSignal(_KINDS[name], LanePieces(rows, first, np.ones_like(first), low=low, high=high), None, None, lanes)
+
 
 # --- What the lanes of a `VectorSimulator` are ------------------------------------------------------------------------
 

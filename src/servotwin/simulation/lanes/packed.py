@@ -221,6 +221,7 @@ def empty_raw(work: Work) -> Raw:
                np.ascontiguousarray(work.packed.lanes.start[[0, 1, 3, 4]].T), np.full(lanes, np.nan),
                np.zeros(lanes, np.int8), np.zeros(lanes, np.int8), np.full((lanes, 2), np.nan))
 
+
 # --- A law for one servo asked of many lanes --------------------------------------------------------------------------
 
 _Which = list[NDArray[np.int64]]

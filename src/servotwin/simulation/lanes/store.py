@@ -48,6 +48,7 @@ from servotwin.simulation.vector_buses import BusSet
 if TYPE_CHECKING:
     from servotwin.simulation.lanes.lane_numbers import LaneNumbers
 
+
 # --- Lanes that stop and go on, in sets of one form: in tiles side by side, or in records one by one ------------------
 
 SHAFT = {"output_angle": "q", "output_speed": "w"}  # where tiles and records have them
@@ -279,6 +280,7 @@ def _cuts(count: int, parts: int) -> list[slice]:
     """Return so many parts of things in a row, one at the least."""
     ends = [count * k // max(parts, 1) for k in range(max(parts, 1) + 1)]
     return [slice(a, b) for a, b in pairwise(ends)]
+
 
 # --- Where the lanes of a `VectorSimulator` are kept and moved --------------------------------------------------------
 

@@ -139,6 +139,7 @@ def piece_of(array: NDArray[Any]) -> Piece:
     """Return an array as one row."""
     return Piece(array.ctypes.data, 1, array.nbytes, array.nbytes)
 
+
 # --- Run a chunk of lanes through the compiled kernels, from start to end ---------------------------------------------
 
 Indices = NDArray[np.int64]

@@ -91,6 +91,7 @@ def gain(before: Sequence[Array], after: Sequence[Array], noise: float, *, alter
     errors = [float(np.sqrt(np.mean(np.minimum(np.abs(v), far)**2))) for v in (b, a)]
     return Gain(errors[0], errors[1], sure if math.isfinite(sure) else 0.0)
 
+
 # --- Where candidates are tried ---------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]

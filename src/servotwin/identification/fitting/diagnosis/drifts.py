@@ -263,6 +263,7 @@ class _Drift:
             first += len(place)
         return np.zeros(0)
 
+
 # --- Single events in logs, pulses that never came and rows that were not written, kept where they pay ----------------
 
 _EVENTS_MOST = 0.5  # of the places of a log: more events tell nothing apart
@@ -502,6 +503,7 @@ def _worth(bench: TrialBench, scale: float, before: Array, after: Array, first: 
     teaches = teaching(np.arange(len(before), dtype=np.float64), alternate=True)[soon]
     costs = [bench.task.loss.cost(r[soon][teaches] / scale) for r in (before, after)]
     return costs[0] - costs[1]
+
 
 # --- Stamps that count the turns of a loop: k/30 s says nothing of turns that were late -------------------------------
 

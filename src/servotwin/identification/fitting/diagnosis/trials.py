@@ -169,6 +169,7 @@ def _costs(bench: TrialBench, setting: Setting) -> Array:
     costs = np.array([bench.task.loss.cost(part.residual) for part in parts])
     return np.where(np.isfinite(costs), costs, np.inf)
 
+
 # --- The table of what may be the matter ------------------------------------------------------------------------------
 
 _EXACT, _OFF = 2e-3, 0.12  # of a clock: as good as any, and more than any is off
@@ -392,6 +393,7 @@ def mended_logs(bench: TrialBench, mended: Mapping[str, Log]) -> Sequence[Settin
         return ()
     return [replace(bench.setting, logs=logs, afresh=True)]
 
+
 # --- Two servos, or one before and after something happened, among the logs -------------------------------------------
 
 _SERVOS_LOGS = 8  # among which two groups are sought
@@ -456,7 +458,6 @@ def _groups(bench: TrialBench) -> tuple[list[int], list[int]]:
               for count in range(2, len(pieces) // 2 + 1) for group in combinations(everything, count)]
     return max(splits, key=lambda split: explained(split[0]) + explained(split[1]))
 
-# --- The trials -------------------------------------------------------------------------------------------------------
 
 # --- Holds ------------------------------------------------------------------------------------------------------------
 Array = NDArray[np.float64]

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from servotwin.logs.reading import Reading
     from servotwin.models import Model
 
+
 # --- Commands that the shaft did not follow: stretches in which it did as if it were not driven -----------------------
 
 _BIN = 0.02  # s: a frame, and the bins that commands and speeds are averaged over
@@ -241,6 +242,7 @@ def _lasting(time: Array, off: Mask) -> bool:
     """Tell whether a command stayed away for so long that a servo would have moved."""
     return any(time[last] - time[first] >= _STILL - _DELAY for first, last in _runs(off))
 
+
 # --- Commands that count from an end of the travel, as `servo.write(90)` does -----------------------------------------
 
 _CENTRES = (90.0, 135.0)  # deg: of servo.write, and of servos of 270 degrees
@@ -369,6 +371,7 @@ def _refused(log: Log, model: Model, low: float, high: float) -> InputError:
                       allowed=f"{math.degrees(low):.4g} to {math.degrees(high):.4g} deg, the travel of "
                       f'{model.servo.name}; --columns "command=COLUMN:deg-90" moves the zero of a command')
 
+
 # --- Angles that turn against the command -----------------------------------------------------------------------------
 
 _LAGS = np.arange(0.0, 0.301, 0.02)  # s: delay and slew of a servo that follows at all
@@ -430,6 +433,7 @@ def _correlation(x: Array, y: Array) -> float:
     if len(x) < _SIGN_FEWEST or min(float(np.std(x)), float(np.std(y))) < 1e-9:
         return 0.0
     return float(np.corrcoef(x, y)[0, 1])
+
 
 # --- Angles whose span does not fit the commanded one: another unit, scale or travel ----------------------------------
 
@@ -515,6 +519,7 @@ def _beyond(one: Look) -> list[Finding]:
     return [Finding("span", one.log.name, (
         f"log {one.log.name!r}: the shaft goes through {span:.3g} rad, and the servo file's stops are {travel:.3g} rad "
         "apart; check the unit of the angle, and stops.lower_angle and stops.upper_angle"), None)]
+
 
 # --- Angles that jump by a constant that no servo could turn so fast --------------------------------------------------
 

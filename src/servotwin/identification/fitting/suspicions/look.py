@@ -198,6 +198,7 @@ def _top_speed(model: Model) -> float:
     gain: float = model.value("gear.gear_reduction") * model.value("motor.back_emf_constant")
     return float(model.value("supply.open_circuit_voltage") / gain)
 
+
 # --- The beat of a log's time stamps ----------------------------------------------------------------------------------
 
 _BEAT_FEWEST = 20  # stamps
@@ -309,6 +310,7 @@ def _places(time: Array, number: NDArray[np.int64], on: Mask, period: float) -> 
     drift = time - number * period
     place = np.where(on, time, number * period + np.interp(number, number[on], drift[on]))
     return place if (np.diff(place) > 0.0).all() else None
+
 
 # --- Time stamps that lie off the beat of the others, and rows that are missing ---------------------------------------
 
@@ -422,6 +424,7 @@ def _some_left(one: Look, windows: Sequence[tuple[float, float]]) -> bool:
     for start, stop in windows:
         out |= (one.log.time >= start) & (one.log.time < stop)
     return bool((one.counts & ~out).sum() > 0.5 * one.counts.sum())
+
 
 # --- Commands that the servo's chip would refuse ----------------------------------------------------------------------
 

@@ -177,6 +177,7 @@ def rested(numbers: Numbers, mode: Mode, torque: float, u: float, y: Vector, tim
     after = legs.mode_from(warm(numbers, y), torque, u, y, mode.mesh)
     return y, 1.0 if MARGIN * to.error <= tolerance and stands(after) else 0.0
 
+
 # --- How lanes with play in the gear go through a phase ---------------------------------------------------------------
 
 def phase(size: int, tile: Any, plan: Any) -> None:

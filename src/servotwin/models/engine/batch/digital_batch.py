@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from servotwin.models.engine.lanes import Floats, Indices, Lanes
     from servotwin.models.engine.memory import Memories
 
+
 # --- Tiles of digital servos that go from tick to tick side by side ---------------------------------------------------
 
 _GIVEN = Piece()  # what a servo follows that a program drives
@@ -309,6 +310,7 @@ def leave(lanes: Lanes, durations: Floats, first_output: Indices, memories: Memo
         first_output[k] = tile.place.output[j]
         status[k] = UNDERWAY
 
+
 # --- How digital servos go through a tick, all lanes of a tile in one formula -----------------------------------------
 
 _CLOSE = 0.99  # of a limit: so near to it a lane decides alone
@@ -517,6 +519,7 @@ def tick_over(tile: Any, size: int) -> None:
                 clock.tick[j] -= FRAMES
                 clock.hears[j] -= FRAMES
                 clock.output[j] -= FRAMES
+
 
 # --- Digital servos side by side: a tile of lanes goes from tick to tick ----------------------------------------------
 

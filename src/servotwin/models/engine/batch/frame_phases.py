@@ -32,6 +32,7 @@ from servotwin.physics.pieces import Piece, piece_value
 if TYPE_CHECKING:
     from servotwin.models.engine.lanes import Floats
 
+
 # --- How a tile of lanes moves through the phases of a window ---------------------------------------------------------
 
 def phases(size: int, keep: bool, form: int, slack: bool, tile: Any, plan: Any) -> None:
@@ -222,6 +223,7 @@ def _by_law(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
         inductive_batch.phase(size, slack, tile, plan)
     elif form == GAPS:
         backlash_batch.phase(size, tile, plan)
+
 
 # --- Windows ----------------------------------------------------------------------------------------------------------
 

@@ -289,6 +289,7 @@ def free_mode(zone: int, contact: int, share: int) -> Mode:
     """Return the mode of one body."""
     return Mode(zone, contact, RIGID, FREE, share)
 
+
 # --- Slots ------------------------------------------------------------------------------------------------------------
 
 SLOTS = 8

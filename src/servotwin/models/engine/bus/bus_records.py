@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+
 # --- What servos on a bus work with while they go on ------------------------------------------------------------------
 
 ROOM = 42  # coefficients of a series at most
@@ -180,6 +181,7 @@ def drive_of(seat: Any) -> float:
         return math.copysign(1.0, seat.shown.duty) if duty.drives(seat.shown.duty) else 0.0
     drive: float = seat.decided.drive
     return drive
+
 
 # --- What a run of servos on a bus leaves behind ----------------------------------------------------------------------
 

@@ -161,6 +161,7 @@ def behind(mate: Any, V_bus: float) -> float:
     sign: float = mate.sign
     return sign * (V_bus if V_bus != 0.0 else 5e-324)
 
+
 # --- How servos on one source move together ---------------------------------------------------------------------------
 
 BY_SERIES = -1  # how mates move: beside LONG_STEP, which a recipe may leave out

@@ -183,6 +183,7 @@ def fading_coefficients(numbers: Numbers, mode: Mode, u: float) -> tuple[float, 
     rate = -motor.armature_current_rate(0.0, 1.0, 0.0, R, L, K_b)
     return rate, motor.armature_current_rate(v, 0.0, 0.0, R, L, K_b) / rate
 
+
 # --- The rates of the state in each mode, and how they depend on it ---------------------------------------------------
 
 def rates_of(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> Vector:

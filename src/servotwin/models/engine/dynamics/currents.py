@@ -142,6 +142,7 @@ def stall_current(numbers: Numbers, V: float) -> float:
         return min(i, numbers.source.I_max)
     return motor.steady_armature_current(numbers.follower.V_max, 0.0, numbers.motor.R, numbers.motor.K_b)
 
+
 # --- A servo whose bus voltage is given -------------------------------------------------------------------------------
 
 _BLOCKS = 1e300  # V

@@ -161,6 +161,7 @@ def _with_current_at_edge(numbers: Numbers, zone: int, kind: int, u: float, y: V
     i = high if kind == ZONE_UP else low
     return Vector(y.q, y.w, 0.0 if i == 0.0 else i, y.T_w, y.T_h, y.q_m, y.w_m)
 
+
 # --- What events are called: by a number in compiled code, by words everywhere else -----------------------------------
 
 NAMES = (

@@ -123,6 +123,7 @@ def _pressing(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, w: 
     """Return how motor and output in contact would close in [rad/s²] at a speed."""
     return contacts.pressing_along(numbers, mode, u, tau, moving(y, y.q, w, w))
 
+
 # --- When a mode ends: the first time at which one of its guards falls below zero -------------------------------------
 
 _INSTANT = 1e-18  # s: between two times

@@ -46,8 +46,6 @@ from servotwin.models.terms.friction import core_speed
 from servotwin.models.terms.numbers import warm
 from servotwin.physics.motor import back_emf
 
-# --- What ends the mode of a servo on a coupled leg, and when: guards along power series, and their roots -------------
-
 # --- Guards that look at places and speeds alone, along a coupled leg -------------------------------------------------
 BY_PLACE = 1 << guards.SPEED | 1 << guards.MOTOR_SPEED | guards.MEETINGS | guards.STOPS
 _STEPS = 100  # of a search, which takes four
@@ -319,6 +317,7 @@ def _crossing(unit: Any, common: Any, kind: int, a: float, f_a: float, b: float,
                     + (third - new) / (old - new) * f_new / (f_third - f_new) * f_old / (f_third - f_old))
         part = min(max(part, least), 1.0 - least)
     return new if f_new <= 0.0 else old
+
 
 # --- Legs of servos on one supply -------------------------------------------------------------------------------------
 

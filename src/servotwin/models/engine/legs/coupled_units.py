@@ -151,6 +151,7 @@ unit_state = record_reader("unit_state", Vector)
 put_unit_state = record_writer("put_unit_state", Vector)
 put_unit_law = record_writer("put_unit_law", Law)
 
+
 # --- The law of a servo on a coupled leg ------------------------------------------------------------------------------
 
 _NEXT = REFERENCE_TEMPERATURE + 1.0  # K
@@ -249,6 +250,7 @@ def share_of(numbers: Numbers, mode: Mode, tau: float) -> Line:
     still = contacts.through_gear(numbers, mode.mesh, 0.0, tau, NOWHERE)
     per_torque = sign * share(numbers.friction, 1.0, 0.0)
     return Line(sign * still, per_torque, per_torque, sign * per_speed)
+
 
 # --- Servos behind one supply between two events ----------------------------------------------------------------------
 

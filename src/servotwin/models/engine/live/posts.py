@@ -24,6 +24,7 @@ from servotwin.physics.pieces import piece_value
 if TYPE_CHECKING:
     from servotwin.models.engine.live.screen import Floats
 
+
 # --- What sends the pulses: a frame clock whose rate may change, and frames that get lost -----------------------------
 
 _SAME = 1e-9  # of a frame: instants that are nearer are one
@@ -69,7 +70,6 @@ def pass_edge(sender: Any) -> None:
     """Let the next frame begin."""
     sender.passed, sender.number = sender.passed + 1, sender.number + 1
 
-# --- Servos at a bench as kernels keep them ---------------------------------------------------------------------------
 
 # --- Servos at a bench as kernels keep them ---------------------------------------------------------------------------
 UNITS = ("us", "deg", "V")

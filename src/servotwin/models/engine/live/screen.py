@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Indices = NDArray[np.int64]
 
+
 # --- What shows of a servo at a bench ---------------------------------------------------------------------------------
 
 USED, NEXT, LEFT = 5, 3, 4
@@ -165,6 +166,7 @@ def taken_up(screen: Screen, low: Low, voltage: float) -> None:
 def is_before(time: float, end: float, program: bool) -> bool:
     """Tell whether a time comes before the end of a motion [s]; that of a program's is the tick that is next to it."""
     return time * (1.0 + _LATE) < end if program else time < end
+
 
 # --- The shapes of commands that a bench can be given, as rows of pieces ----------------------------------------------
 

@@ -132,6 +132,7 @@ def _through_gear(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector)
         return tau_m, 0.0
     return tau_m, torque_on_gear(external_torque(numbers.load, tau, y.q), y.w, numbers.shaft.b_out)
 
+
 # --- Which motion begins in a mode: in closed form wherever that is linear, else one integrator step ------------------
 
 _WITH_HEAT = ON_HEAT | ON_I | BY_SHARE | TWO_BODIES | FADING  # what may be asked of a step beside the straight law

@@ -56,6 +56,7 @@ def time_to(rate: float, f: float, w0: float, w1: float) -> float:
         return time * (log1p(y) / y)
     return time * (1.0 - 0.5 * y)
 
+
 # --- Two courses of first order beside each other: when one has gone so far beyond the other --------------------------
 
 _BEYOND = 1e-13  # rad: so little is rounding

@@ -133,6 +133,7 @@ def suits(law: Law) -> bool:
     """Tell whether a law can be followed: the rates of a shaft and a current that both move have to be apart."""
     return law.per_ampere == 0.0 or law.apart > 0.0
 
+
 # --- How a servo that warms up moves where its law is a straight line otherwise, with or without inductance -----------
 
 POINTS = 5

@@ -33,6 +33,7 @@ from servotwin.physics.pieces import Piece, piece_value
 if TYPE_CHECKING:
     from servotwin.models.engine.lanes import Floats
 
+
 # --- A servo alone, as a program in C has it --------------------------------------------------------------------------
 
 READY, NOT_FINITE, NOT_POSSIBLE, BEFORE = 0, -1, -2, -3  # what a call is answered, beside the codes of a step
@@ -122,6 +123,7 @@ def at_motor(shown: Observed, N: float) -> Observed:
         shown.motor_torque / N, shown.load_torque, N * shown.motor_angle, N * shown.motor_speed, shown.load_angle,
         shown.feedback_voltage, shown.error_time, shown.drive, shown.winding_temperature, shown.housing_temperature,
         shown.duty, shown.goal_angle, shown.reference_angle, shown.trip)
+
 
 # --- A servo alone, made of what is given of it and of what hangs on its shaft ----------------------------------------
 
