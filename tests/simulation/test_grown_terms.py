@@ -102,7 +102,7 @@ NUMBERS = {
                (HOLDS, HOLDS.replace("forward)\n", "forward) + friction.new\n", 1))],
     "models/terms/shaft.py": [("    b_out: float\n", "    b_out: float\n    new: float = 0.0\n"),
                               ("B_L, reduction), J_L, B_L)", f"B_L, reduction), J_L, B_L, {value('new_shaft')})"),
-                              ("import Given\n", "import Given, either\n"),
+                              ("import Given, Hung, inertia_on\n", "import Given, Hung, either, inertia_on\n"),
                               ("dry, against, shaft.b, shaft.J)", "dry, against, shaft.b + shaft.new, shaft.J)")],
     "models/engine/dynamics/coefficients.py": [("damping = (own.b + of_load", "damping = (own.b + own.new + of_load"),
                                       ("0.0, 0.0) - tau[0] -", "0.0, 0.0) - tau[0] - numbers.load.new -")],

@@ -26,7 +26,6 @@ OTHERS = {
     ("simulation/lanes/c_entry.py", "shaft"): "a word of the C struct: where the shaft is",
     ("simulation/compile/layout.py", "shaft"): "the same",
     ("simulation/compile/tick.py", "shaft"): "the same",
-    ("simulation/compile/joints_layout.py", "load"): "a number of a joint",
     ("simulation/lanes/inputs.py", "load"): "an argument of simulate_many",
     ("simulation/lanes/lane_numbers.py", "load"): "the same",
     ("simulation/lanes/packed.py", "motor"): "what is recorded of the motor's contact",
