@@ -10,7 +10,7 @@ from pathlib import Path
 import servotwin as st
 from reference import kitchen_tables
 from servotwin.bench import calibrate_loads, calibrate_table
-from servotwin.bench.fits import wide
+from servotwin.bench.table_columns import wide
 
 N = 100.0
 _NAMES = {"compliance": "sag per torque", "first sag": "sag without load", "torque constant": "voltage per speed"}

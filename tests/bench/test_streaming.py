@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from servotwin.bench.backends import EmulatedBackend
-from servotwin.bench.backends.mock import StillPins
+from servotwin.bench.backends.emulated import StillPins
 from servotwin.bench.emulator.build import harness
 from servotwin.bench.wire import Board, protocol
 from servotwin.errors import BenchError

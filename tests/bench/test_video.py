@@ -13,11 +13,16 @@ cv2 = pytest.importorskip("cv2", reason="the extra `video` is not installed")
 import servotwin as st  # noqa: E402
 from bench.clips import Scene, corners, cut_in_front, film, pictures, with_times  # noqa: E402
 from servotwin.bench.video import mark_bytes, read_clip, write_film_log  # noqa: E402
-from servotwin.bench.video.corners import Finder  # noqa: E402
-from servotwin.bench.video.edges import sharpened  # noqa: E402
 from servotwin.bench.video.film_log import film_log  # noqa: E402
+from servotwin.bench.video.filmed import (  # noqa: E402
+    SQUARE,
+    Finder,
+    fit_plane,
+    mapped,
+    sharpened,
+    turned,
+)
 from servotwin.bench.video.instant import jump  # noqa: E402
-from servotwin.bench.video.plane import SQUARE, fit_plane, mapped, turned  # noqa: E402
 from servotwin.errors import InputError, MissingExtraError, OutputExistsError  # noqa: E402
 
 RATE = 30.0

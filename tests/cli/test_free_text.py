@@ -100,7 +100,7 @@ WRITERS = {
     "cli/robot_validate.py", "cli/web.py", "export/c_text.py", "export/fmu.py", "export/fmu_binary.py",
     "identification/report/page.py", "identification/report/parts.py",
     "identification/report/validation.py", "identification/sheets/sheet.py", "logs/csv_logs.py",
-    "logs/json_file.py", "look/files.py", "paper/report.py", "parameters/output_file.py", "parameters/servo_file.py",
+    "logs/sidecar.py", "look/files.py", "paper/report.py", "parameters/output_file.py", "parameters/servo_file.py",
     "plotting/files.py", "plotting/formula.py", "simulation/compile/building.py", "simulation/compile/storage.py",
     "simulation/result.py", "simulation/lanes/c_entry.py", "studies/folder.py", "tables/columns.py",
     "web/alone/kernel.py", "web/server/own/reading.py", "web/server/own/work.py", "wire/keeping.py", "wire/traffic.py",

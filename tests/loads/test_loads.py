@@ -14,7 +14,7 @@ import servotwin
 from servotwin import loads
 from servotwin.errors import InputError, LoadError
 from servotwin.loads import Constant, Coulomb, Flexible, Free, Inertia, Load, Pendulum, Recorded, Spring, Viscous
-from servotwin.logs.load_words import load_from_words, words_of_load
+from servotwin.logs.sidecar import load_from_words, words_of_load
 
 sizes = st.one_of(st.just(0.0), st.floats(1e-6, 10.0))
 angles = st.floats(-7.0, 7.0)

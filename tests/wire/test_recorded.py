@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import servotwin as st
-from servotwin.bench.bus import BusRig, bus, port, sdk_wire
+from servotwin.bench.bus import BusRig, bus, sdk_wire
 from servotwin.bench.bus.ticks import Ticks
 from servotwin.bench.recording import About, Limits, experiments, record
 from wire_talk import STS
@@ -50,7 +50,7 @@ class Stepped:
 
 def recorded(servo, folder, monkeypatch, seed):
     backend = Stepped(st.wire.Bus({1: servo}, seed=seed))
-    for module in (bus, port, sdk_wire):
+    for module in (bus, sdk_wire):
         monkeypatch.setattr(module, "time", backend.time)
     monkeypatch.setattr(bus, "Ticks", partial(Ticks, clock=backend.time.perf_counter, sleep=backend.go_on))
     for one in experiments("steps,prbs", LIMITS, duration=4.0, frame_period=0.01, seed=seed):

@@ -4,29 +4,42 @@ V_i → 10-bit converter → pulse generator (16 µs steps, a frame of 16.384 ms
 converter → V_i, ADC_i, V_o, ADC_o, f, q, t_a.
 """
 
-from servotwin.bench.bench import Bench, BenchRun, bench_servo
+from servotwin.bench.bench import (
+    FEEDBACK_CONVERTER,
+    INPUT_CONVERTER,
+    Bench,
+    BenchRun,
+    Comparison,
+    Converter,
+    ModelShares,
+    Reading,
+    Shares,
+    TableRow,
+    bench_servo,
+    compare,
+    measured_shares,
+    model_shares,
+)
 from servotwin.bench.calibration import Interval, command_voltage_interval, zero_offset_interval
 from servotwin.bench.control_supply import ControlSupply, run_on_one_supply
-from servotwin.bench.converter import FEEDBACK_CONVERTER, INPUT_CONVERTER, Converter
-from servotwin.bench.fits import CurvatureTest, LineFit, TableFit, curvature_test, fit_line, table_fits
 from servotwin.bench.generator import PulseGenerator
 from servotwin.bench.instruments import InstrumentPair, instrument_pairs
 from servotwin.bench.lift_records import Lifts, is_pattern, lifts
 from servotwin.bench.load_calibration import LoadCalibration, calibrate_loads
 from servotwin.bench.load_columns import LoadTable, is_load_table, load_table
-from servotwin.bench.reading import Reading, TableRow
-from servotwin.bench.residuals import (
-    Comparison,
-    ModelShares,
-    Shares,
-    compare,
-    measured_shares,
-    model_shares,
-)
 from servotwin.bench.standing import Standing, standing
-from servotwin.bench.table_calibration import TableCalibration, calibrate_table
-from servotwin.bench.table_columns import BenchTable, TableColumn, bench_table
-from servotwin.bench.table_rows import RowFinding, row_findings
+from servotwin.bench.table_columns import (
+    BenchTable,
+    CurvatureTest,
+    LineFit,
+    TableColumn,
+    TableFit,
+    bench_table,
+    curvature_test,
+    fit_line,
+    table_fits,
+)
+from servotwin.bench.table_rows import RowFinding, TableCalibration, calibrate_table, row_findings
 
 __all__ = [
     "FEEDBACK_CONVERTER",

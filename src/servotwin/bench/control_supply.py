@@ -18,8 +18,7 @@ from servotwin.simulation.trajectory import Motions, Trajectory
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from servotwin.bench.bench import Bench, BenchRun
-    from servotwin.bench.converter import Converter
+    from servotwin.bench.bench import Bench, BenchRun, Converter
     from servotwin.signals import Signal
     from servotwin.simulation import State
 

@@ -8,8 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from servotwin.bench.fits import LineFit, TableFit
-from servotwin.bench.table_columns import BenchTable, TableColumn
+from servotwin.bench.table_columns import BenchTable, LineFit, TableColumn, TableFit
 from servotwin.bench.table_words import plus_minus
 
 LEVEL = 0.005

@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.bench.fits import fit_line
 from servotwin.bench.load_columns import LEAST_ROWS, LoadTable, Reading, arm_beside, load_table
+from servotwin.bench.table_columns import fit_line
 from servotwin.errors import InputError
-from servotwin.logs.column_names import meaning_of
+from servotwin.logs.column_values import meaning_of
 from servotwin.logs.column_words import Wanted, column_said, wanted_columns
 from servotwin.tables import TextTable, read_table
 from servotwin.units import to_si

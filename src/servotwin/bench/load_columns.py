@@ -17,7 +17,7 @@ from servotwin.bench import load_names as names
 from servotwin.bench.load_names import Name, name_of
 from servotwin.bench.table_columns import last_place
 from servotwin.errors import InputError
-from servotwin.logs.column_names import COMMAND, COMMAND_ANGLE, PULSE, TIME, meaning_of
+from servotwin.logs.column_values import COMMAND, COMMAND_ANGLE, PULSE, TIME, meaning_of
 from servotwin.logs.sidecar import FOLDER_FILE, sidecar_path
 from servotwin.tables import read_table
 from servotwin.units import is_finite

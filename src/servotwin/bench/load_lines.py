@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.bench.fits import LineFit, fit_line
 from servotwin.bench.load_columns import LEAST_ROWS, LoadTable, Reading
+from servotwin.bench.table_columns import LineFit, fit_line
 from servotwin.errors import InputError
 
 CURRENT, SPEED, SAG, VOLTAGE = "current(load)", "speed(load)", "sag(load)", "speed(voltage)"

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from servotwin import units
 from servotwin.errors import InputError
-from servotwin.logs.column_names import meaning_of, words_and_unit
+from servotwin.logs.column_values import meaning_of, words_and_unit
 from servotwin.units.quantities import bare_unit
 from servotwin.units.words import unit_word
 

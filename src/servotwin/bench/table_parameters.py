@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
-from servotwin.bench.fits import LineFit, TableFit
+from servotwin.bench.table_columns import LineFit, TableFit
 from servotwin.errors import InputError
 from servotwin.parameters import Quantity, Servo, unit_of
 

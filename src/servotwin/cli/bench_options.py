@@ -104,7 +104,7 @@ def about_from(servo: str, licence: str, author: str, note: str, load: list[str]
     """Return what the logs say of themselves."""
     from servotwin.bench.recording import About
     from servotwin.cli.load_words import load_from
-    from servotwin.logs.load_words import words_of_load
+    from servotwin.logs.sidecar import words_of_load
 
     return About(servo=servo, licence=licence, author=author, note=note, load=words_of_load(load_from(load or [])))
 

@@ -39,7 +39,7 @@ def calibrate_of_loads(path: Path, servo: Servo | None, arm: str | None, columns
 
 def show_loads(found: LoadCalibration, records: Sequence[LiftRecord], out: Path | None) -> None:
     """Show figures with their intervals, what is set of the servo, and all that is worth a sentence."""
-    from servotwin.bench.load_words import figure_words, record_words
+    from servotwin.bench.load_calibration import figure_words, record_words
     from servotwin.cli.fit_table import parameter_table
 
     names = ", ".join(column.name for column in found.table.columns)

@@ -97,7 +97,7 @@ def calibration_facts(found: TableCalibration, out: Path | None = None) -> dict[
     >>> list(facts["parameters"])
     ['potentiometer.feedback_gain', 'potentiometer.feedback_offset']
     """
-    from servotwin.bench.both_ways import ways_facts
+    from servotwin.bench.table_rows import ways_facts
 
     return {
         "source": found.source, "servo": found.servo.name, "rows": found.table.rows,

@@ -12,7 +12,7 @@ import typer
 from servotwin.cli.terminal import patience, show, table
 from servotwin.errors import one_line
 from servotwin.logs.formats import FORMATS, LOG_FORMATS
-from servotwin.logs.mend_names import MENDS
+from servotwin.logs.mends import MENDS
 from servotwin.logs.reading import read_alike
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ def columns_said(columns: Sequence[str] | None, rate: str | None, commanded: str
     'angle=1:deg time=50Hz command=153deg@0s'
     """
     from servotwin.logs.column_words import with_signals
-    from servotwin.logs.defined import checked_definition
+    from servotwin.logs.log_checks import checked_definition
 
     words = [] if not columns else [with_signals("--columns", " ".join(columns))]
     for option, signal, text in (("--rate", "time", rate), ("--commanded", "command", commanded)):

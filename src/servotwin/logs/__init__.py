@@ -9,8 +9,8 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from servotwin.logs.bam_actuators import BAM_ACTUATORS as BAM_ACTUATORS
-    from servotwin.logs.bam_actuators import BamActuator as BamActuator
+    from servotwin.logs.bam_convention import BAM_ACTUATORS as BAM_ACTUATORS
+    from servotwin.logs.bam_convention import BamActuator as BamActuator
     from servotwin.logs.bam_convention import BamConvention as BamConvention
     from servotwin.logs.bam_logs import read_bam_log as read_bam_log
     from servotwin.logs.bam_logs import write_bam_log as write_bam_log
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 # public name -> module that defines it
 _LAZY = {
-    "BAM_ACTUATORS": "bam_actuators", "BamActuator": "bam_actuators", "BamConvention": "bam_convention",
+    "BAM_ACTUATORS": "bam_convention", "BamActuator": "bam_convention", "BamConvention": "bam_convention",
     "LOG_FORMATS": "formats", "Log": "log", "LogFormat": "formats", "ReadColumn": "reading", "Reading": "reading",
     "keep_columns": "keep", "read_bam_log": "bam_logs", "read_bam_parameters": "bam_parameters",
     "read_csv_log": "csv_logs", "read_lerobot_logs": "lerobot", "read_logs": "readers", "read_miuzei_logs": "miuzei",

@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.loads import Pendulum
-from servotwin.logs.bam_actuators import BAM_ACTUATORS
-from servotwin.logs.bam_convention import BamConvention
+from servotwin.logs.bam_convention import BAM_ACTUATORS, BamConvention
 from servotwin.logs.csv_logs import in_file
-from servotwin.logs.json_file import read_json, write_json
 from servotwin.logs.log import Log
 from servotwin.logs.reading import ReadColumn, Reading
+from servotwin.logs.sidecar import read_json, write_json
 from servotwin.units import is_finite
 
 GRAVITY = 9.80665  # m/s², as in BAM's test bench

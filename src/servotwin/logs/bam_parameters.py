@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from servotwin.errors import InputError, ParameterError, UnknownNameError
-from servotwin.logs.bam_actuators import BAM_ACTUATORS, bam_actuator, bam_name_of
-from servotwin.logs.bam_convention import BamConvention
-from servotwin.logs.json_file import read_json, write_json
+from servotwin.logs.bam_convention import BAM_ACTUATORS, BamConvention, bam_actuator, bam_name_of
+from servotwin.logs.sidecar import read_json, write_json
 from servotwin.parameters import GROUPS, Quantity, Servo, unit_of
 from servotwin.parameters.firmware import MOST_WAITING
 from servotwin.units import is_finite

@@ -2,15 +2,283 @@
 
 from __future__ import annotations
 
+import re
+import unicodedata
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.logs import column_names as names
-from servotwin.logs.stamps import stamps_of
 from servotwin.tables import TextTable
+from servotwin.units.words import COUNTS, unit_word
+
+# --- Dates and times of day as time stamps ----------------------------------------------------------------------------
+
+_ISO = re.compile(r"(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d(?::\d\d(?:[.,]\d{1,9})?)?)(Z|[+-]\d\d:?\d\d)?", re.IGNORECASE)
+_CLOCK = re.compile(r"(?:(\d{1,2}[./-]\d{1,2}[./-]\d{2,4}),?[ T])?"  # of which day, whatever comes first
+                    r"(\d{1,2}):(\d\d):(\d\d)(?:[.,](\d{1,9}))?(?: ?([AP])\.?M\.?)?", re.IGNORECASE)
+_SECOND = 1_000_000_000  # ns
+_DAY = 86400 * _SECOND
+CLOCKS = {"iso": "dates such as 2024-05-03T12:00:01.250", "clock": "times such as 12:00:01.250"}
+
+
+class Stamps(NamedTuple):
+    """Times from the first row on [s], and what they were written as: "iso" or "clock"."""
+
+    unit: str
+    time: NDArray[np.float64]
+
+    @property
+    def form(self) -> str:
+        """What they are, in words."""
+        return "dates" if self.unit == "iso" else "times of day"
+
+
+def clock_of(cell: str) -> str:
+    """Return what a cell is as a time: "iso" for a date, "clock" for a time of day, else nothing.
+
+    Examples
+    --------
+    >>> clock_of("12:00:01.25"), clock_of("3.5.2024 12:00:01"), clock_of("2024-05-03T12:00"), clock_of("1.25")
+    ('clock', 'clock', 'iso', '')
+    """
+    if ":" not in cell:
+        return ""
+    return "iso" if _ISO.fullmatch(cell) else "clock" if _CLOCK.fullmatch(cell) else ""
+
+
+def stamps_of(table: TextTable, column: str) -> Stamps | None:
+    """Return the times of a column of ISO 8601 dates or times of day, None where its first cell is neither.
+
+    Raises
+    ------
+    InputError
+        If a further cell is none: names the line.
+    """
+    cells = table.cells(column)
+    unit = clock_of(cells[0])
+    return Stamps(unit, (_iso if unit == "iso" else _clock)(table, column, cells)) if unit else None
+
+
+def _iso(table: TextTable, column: str, cells: Sequence[str]) -> NDArray[np.float64]:
+    found = [_matched(_ISO, table, k, column, cell, "iso") for k, cell in enumerate(cells)]
+    plain = [f"{match[1]}T{match[2].replace(',', '.')}" for match in found]
+    try:
+        stamps = np.array(plain, dtype="datetime64[ns]")
+    except ValueError as error:
+        raise InputError(f"{table.path}: {column}", got=str(error), allowed=CLOCKS["iso"]) from None
+    nanoseconds = (stamps - stamps[0]).astype(np.int64)
+    zones = [match[3] or "" for match in found]
+    if len(set(zones)) > 1:
+        if "" in zones:
+            k = zones.index("") if zones[0] else next(k for k, zone in enumerate(zones) if zone)
+            raise InputError(f"{table.path}: line {table.rows[k].line}, {column}", got=cells[k],
+                             allowed="a time zone in all rows, or in none")
+        shift = np.array([_zone(zone) for zone in zones], dtype=np.int64) * 60 * _SECOND
+        nanoseconds = nanoseconds - (shift - shift[0])
+    return np.asarray(nanoseconds / _SECOND)
+
+
+def _zone(text: str) -> int:
+    """Return minutes from UTC."""
+    if text.upper() == "Z":
+        return 0
+    return (1 if text[0] == "+" else -1) * (60 * int(text[1:3]) + int(text[-2:]))
+
+
+def _clock(table: TextTable, column: str, cells: Sequence[str]) -> NDArray[np.float64]:
+    found = [_matched(_CLOCK, table, k, column, cell, "clock") for k, cell in enumerate(cells)]
+    times = np.array([(3600 * _hour(m[2], m[6]) + 60 * int(m[3]) + int(m[4])) * _SECOND
+                      + int((m[5] or "0").ljust(9, "0")) for m in found], dtype=np.int64)
+    dated = all(m[1] for m in found)
+    later = np.array([a[1] != b[1] for a, b in pairwise(found)], bool) if dated else np.diff(times) < -_DAY // 2
+    days = np.cumsum(np.append(0, later))  # past midnight
+    return np.asarray((times + _DAY * days - times[0]) / _SECOND)
+
+
+def _hour(hour: str, half: str | None) -> int:
+    """Return the hour of the day; of its halves the first begins with 12 AM, the second with 12 PM."""
+    return int(hour) if half is None else int(hour) % 12 + 12 * (half.upper() == "P")
+
+
+def _matched(form: re.Pattern[str], table: TextTable, k: int, column: str, cell: str, unit: str) -> re.Match[str]:
+    match = form.fullmatch(cell)
+    if match is None:
+        raise InputError(f"{table.path}: line {table.rows[k].line}, {column}", got=cell or "nothing",
+                         allowed=CLOCKS[unit])
+    return match
+
+# --- What the name of a foreign column says: a role, and perhaps a unit. Names in English and German ------------------
+
+TIME, PULSE, COMMAND, COMMAND_ANGLE = "time", "pulse", "command", "command angle"
+ANGLE, FEEDBACK, SOME_TIME = "angle", "feedback", "some time"
+UNIT_IN_NAME = "its name"
+SUPPLY_CURRENT, ARMATURE_CURRENT, VOLTAGE, SPEED = "supply_current", "armature_current", "bus_voltage", "output_speed"
+_ROLES: dict[str, frozenset[str]] = {name: frozenset(words.split()) for name, words in {
+    TIME: "time timestamp stamp ts zeit zeitstempel uhrzeit clock elapsed date datetime datum temps tiempo",
+    COMMAND: "cmd command commanded target setpoint set sp goal desired demand demanded ref reference soll sollwert "
+             "sollwinkel vorgabe befehl input action request requested",
+    PULSE: "pwm pulse pulses pulsewidth pw ppm puls pulsbreite pulsweite impuls impulsbreite impulslaenge",
+    ANGLE: "angle ang winkel istwinkel sollwinkel pos position theta phi rotation encoder enc angulo angolo",
+    "measured": "actual ist istwert measured meas feedback fb present",
+    COUNTS: "adc raw analog analogread pot poti potentiometer wiper ticks counts",
+    "current": "current curr strom stromaufnahme amperage corriente corrente courant",
+    VOLTAGE: "voltage spannung vcc vbat vin vbus vsupply battery",
+    SPEED: "speed velocity vel omega drehzahl geschwindigkeit",
+}.items()}
+_LEROBOT = frozenset(("observation", "state"))
+_ALONE = {"t": TIME, "q": ANGLE, "i": "current"}  # letters that mean this where they stand alone
+_MOTOR = frozenset(("motor", "armature", "winding", "anker"))
+_OTHER = frozenset((
+    "error err fehler index idx id sample samples number nr no frame seq sequence checksum crc temp temperature "
+    "temperatur load torque last drehmoment acc accel acceleration mode state status gain kp ki kd duty count delta dt "
+    "period frequency freq").split())
+_BRACKETS = re.compile(r"(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\)|\{([^}]*)\}|<([^>]*)>)\s*")
+_DIVIDED = re.compile(r"(.+?)\s*(?:/|\bin\b)\s*(\S+)")
+_ARDUINO = re.compile(r"[Aa][0-7]")  # its analog inputs
+_PARTS = re.compile(r"[^\W_]+|[°%]")
+_CAMEL = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^\W\d_]+|[°%]")
+
+
+class Meaning(NamedTuple):
+    """What a name says.
+
+    Parameters
+    ----------
+    role : str
+    unit : str
+        As `servotwin.units` writes it, or one that is none there; empty where the name has none.
+    dimension : str
+        Of the unit; empty where it is not known.
+    """
+
+    role: str
+    unit: str
+    dimension: str
+
+
+def meaning_of(column: str, below: str = "") -> Meaning | None:
+    """Return what a column's name says, None where it says nothing.
+
+    Parameters
+    ----------
+    column : str
+    below : str
+        Its unit, where a line below the header has units.
+
+    Examples
+    --------
+    >>> meaning_of("Angle [deg]"), meaning_of("millis")
+    (Meaning(role='angle', unit='deg', dimension='angle'), Meaning(role='time', unit='ms', dimension='time'))
+    >>> meaning_of("Strom / mA").role, meaning_of("target_us").role, meaning_of("note")
+    ('supply_current', 'pulse', None)
+    """
+    if _ARDUINO.fullmatch(column.strip()):
+        return Meaning(COUNTS, "", "")
+    words, unit = _parts(column, below)
+    if words and words <= _LEROBOT:  # "observation.state": where the joint is
+        words = frozenset(("position",))
+    dimension = (unit_word(unit) or ("", ""))[1]
+    if words & _OTHER:
+        return None
+    role = _role(words, dimension)
+    return None if role is None else Meaning(role, (unit_word(unit) or (unit, ""))[0], dimension)
+
+
+def words_and_unit(column: str, below: str = "") -> tuple[frozenset[str], str]:
+    """Return the words of a name in small letters, and its unit; empty where it has none.
+
+    Examples
+    --------
+    >>> words_and_unit("Weight [kg]")
+    (frozenset({'weight'}), 'kg')
+    """
+    return _parts(column, below)
+
+
+def _parts(column: str, below: str) -> tuple[frozenset[str], str]:
+    """Return the words of a name in small letters, and its unit."""
+    text, unit = column.strip(), below.strip().strip("[](){}")
+    if match := _BRACKETS.fullmatch(text):
+        inside = next(group for group in match.groups()[1:] if group is not None).strip()
+        text = match[1]
+        if unit_word(inside) or match[2] is not None:
+            unit = inside or unit
+        else:
+            text = f"{text} {inside}"
+    elif not unit and (match := _DIVIDED.fullmatch(text)) and unit_word(match[2]):
+        both = f"{match[1].split()[-1]}/{match[2]}"  # "speed deg/s"
+        text, unit = (text.removesuffix(both), both) if unit_word(both) and text.endswith(both) else match.groups()
+    words = [word for part in _PARTS.findall(text) for word in ([part] if unit_word(part) else _CAMEL.findall(part))]
+    if not unit:
+        for count in (3, 2, 1):  # "deg per s" before "s"
+            last = " ".join(words[-count:])
+            if len(words) >= count and (found := unit_word(last)) and (
+                    len(words) > count or found[1] != COUNTS) and _is_a_unit(last, alone=len(words) == count):
+                words, unit = words[:-count], last
+                break
+    return frozenset(_plain(word) for word in words if not word.isdigit()), unit
+
+
+def _is_a_unit(word: str, *, alone: bool) -> bool:
+    """Return whether a last word is a unit and not a part of the name: "pos_m" and "q_a" may be either."""
+    return len(word) > 1 or word in ("s", "V", "A", "K", "°", "%") or (alone and word in ("v", "S"))
+
+
+def _plain(word: str) -> str:
+    folded = unicodedata.normalize("NFKD", word.casefold().replace("ä", "ae").replace("ö", "oe").replace("ü", "ue"))
+    return "".join(c for c in folded if not unicodedata.combining(c)).rstrip("0123456789")
+
+
+def _role(words: frozenset[str], dimension: str) -> str | None:
+    if not words:
+        return {"time": TIME, "angle": ANGLE, "current": SUPPLY_CURRENT, "voltage": VOLTAGE,
+                "speed": SPEED}.get(dimension)
+    if len(words) == 1 and (alone := _ALONE.get(next(iter(words)))):
+        words = frozenset((*words, {"current": "current", TIME: "time", ANGLE: "angle"}[alone]))
+    has = {name for name, known in _ROLES.items() if words & known}
+    if PULSE in has:
+        return PULSE
+    if COMMAND in has:
+        return _command(has, dimension)
+    if SPEED in has:
+        return SPEED
+    if ANGLE in has:
+        return ANGLE  # "current position" is no current
+    if COUNTS in has or "measured" in has:
+        return _measured(has, words, dimension)
+    if "current" in has:
+        return ARMATURE_CURRENT if words & _MOTOR else SUPPLY_CURRENT
+    if VOLTAGE in has:
+        return VOLTAGE
+    if TIME in has:
+        return TIME
+    return SOME_TIME if dimension == "time" else None
+
+
+def _command(has: set[str], dimension: str) -> str | None:
+    if TIME in has or SPEED in has or "current" in has:
+        return None
+    if dimension == "time":
+        return PULSE
+    return COMMAND_ANGLE if ANGLE in has or dimension == "angle" else COMMAND
+
+
+def _measured(has: set[str], words: frozenset[str], dimension: str) -> str | None:
+    if "current" in has or dimension == "current":
+        return ARMATURE_CURRENT if words & _MOTOR else SUPPLY_CURRENT
+    if dimension == "voltage":
+        return FEEDBACK
+    if dimension in ("time", "torque", "temperature"):
+        return None
+    if COUNTS in has and dimension != "angle":
+        return COUNTS
+    return ANGLE
+
+# --- What the values of a column say ----------------------------------------------------------------------------------
 
 _SINCE_1970 = 1e8  # s; times that are larger count from no start of a run
 MOST_DEGREES = 400.0
@@ -34,24 +302,24 @@ class Guess(NamedTuple):
 
 def guess(table: TextTable, column: str, role: str) -> Guess | None:
     """Return the unit that the values of a column can be in, None where that is in doubt."""
-    if role in (names.TIME, names.SOME_TIME):
+    if role in (TIME, SOME_TIME):
         return _time(table, column)
     values = _values(table, column)
     if values is None:
         return None
     largest = float(np.max(np.abs(values)))
     unit: tuple[str, str] | None = None
-    if role in (names.PULSE, names.COMMAND):
+    if role in (PULSE, COMMAND):
         sent = values[values != 0.0]
         unit = next((("time", name) for name, by in (("us", 1.0), ("ms", 1e3), ("s", 1e6))
                      if sent.size and _PULSES[0] <= by * sent.min() and by * sent.max() <= _PULSES[1]
-                     and (role == names.PULSE or name == "us")), None)
-    if unit is None and role in (names.COMMAND, names.COMMAND_ANGLE, names.ANGLE):
+                     and (role == PULSE or name == "us")), None)
+    if unit is None and role in (COMMAND, COMMAND_ANGLE, ANGLE):
         unit = ("angle", "deg") if _TURN < largest <= MOST_DEGREES else None
-    elif role in (names.SUPPLY_CURRENT, names.ARMATURE_CURRENT):
+    elif role in (SUPPLY_CURRENT, ARMATURE_CURRENT):
         whole = bool((values == np.round(values)).all())
         unit = ("current", "mA") if largest > 30.0 else None if whole else ("current", "A")
-    elif role == names.VOLTAGE:
+    elif role == VOLTAGE:
         unit = ("voltage", "mV") if largest > 1000.0 else ("voltage", "V") if 1.0 < largest < 60.0 else None
     return None if unit is None else Guess(unit[1], unit[0], f"its values, {_shown(values)}")
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from servotwin import units
 from servotwin.errors import InputError, UnitError
-from servotwin.logs.stamps import CLOCKS
+from servotwin.logs.column_values import CLOCKS
 from servotwin.models.outputs import SIGNALS
 from servotwin.units.words import unit_word
 

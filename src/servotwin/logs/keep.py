@@ -9,10 +9,9 @@ from typing import Any
 from servotwin.errors import InputError
 from servotwin.logs.column_words import SAID
 from servotwin.logs.columns import Column, si_unit_of
-from servotwin.logs.json_file import read_json, write_json
 from servotwin.logs.log import Log
 from servotwin.logs.register_columns import OPTION
-from servotwin.logs.sidecar import FOLDER_FILE, FORMAT, column_entries, sidecar_path
+from servotwin.logs.sidecar import FOLDER_FILE, FORMAT, column_entries, read_json, sidecar_path, write_json
 from servotwin.units.words import unit_shown
 
 

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, MissingExtraError
-from servotwin.logs.json_file import read_json
+from servotwin.logs.sidecar import read_json
 from servotwin.text import checked_name
 
 ACTION, STATE = "action", "observation.state"

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError
 from servotwin.loads import Load, Pendulum
 from servotwin.logs.csv_logs import in_file
-from servotwin.logs.json_file import read_json
 from servotwin.logs.log import Log
+from servotwin.logs.sidecar import read_json
 from servotwin.units import is_finite
 
 PERIOD = 0.02  # s, nominal: there are no time stamps

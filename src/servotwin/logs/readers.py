@@ -8,11 +8,9 @@ from typing import Any
 
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.logs.formats import FORMATS, LOG_FORMATS, formats_that_hold
-from servotwin.logs.json_file import read_json
 from servotwin.logs.log import Log
 from servotwin.logs.mends import checked_mends
-from servotwin.logs.name_values import values_in
-from servotwin.logs.sidecar import FOLDER_FILE, FORMAT, patterns_of
+from servotwin.logs.sidecar import FOLDER_FILE, FORMAT, patterns_of, read_json, values_in
 from servotwin.parameters import Servo
 from servotwin.signals.time_base import warn_of_time_base
 

@@ -2,20 +2,259 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import MISSING, dataclass, field, fields
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from servotwin.errors import InputError, UnknownNameError
+from servotwin import units
+from servotwin.errors import InputError, LoadError, UnknownNameError
+from servotwin.loads import Flexible, Load, Pendulum, Recorded, Spring
+from servotwin.loads.parts import STANDARD_GRAVITY
 from servotwin.logs.columns import COMMANDS, NAMES, SWITCH, TIME, Column, check_unit, si_unit_of
-from servotwin.logs.json_file import read_json
-from servotwin.logs.load_words import load_from_words, words_of_load
-from servotwin.logs.name_values import filled_in, has_values, values_in
+from servotwin.parameters import write_file
+from servotwin.tables.text import read_bytes
 from servotwin.units import is_finite
+from servotwin.units.words import unit_word
 
 if TYPE_CHECKING:
     from servotwin.logs.log import Log
+
+# --- A load in words and numbers, as a sidecar holds it, under the names that a load's fields have everywhere ---------
+
+_PARTS: dict[str, tuple[str, Any]] = {"pendulum": ("pendulums", Pendulum), "spring": ("springs", Spring),
+                                      "recorded": ("recorded", Recorded), "flexible": ("flexibles", Flexible)}
+_NUMBERS = ("inertia", "viscous_friction", "torque", "coulomb_torque")
+
+
+@dataclass(frozen=True)
+class Drum:
+    """A weight that the shaft winds up.
+
+    Parameters
+    ----------
+    mass, radius : float
+        [kg], [m]
+    inertia : float
+        Of the drum [kg m²].
+    """
+
+    mass: float
+    radius: float
+    inertia: float = 0.0
+
+
+def load_from_words(content: object) -> Load:
+    """Return the load that a mapping describes, in SI.
+
+    Parameters
+    ----------
+    content : mapping
+        `inertia`, `viscous_friction`, `torque`, `coulomb_torque` and the parts `pendulum`, `spring`, `recorded`,
+        `flexible`; each part a mapping of its fields, or a list of such; and `drum`, a weight that the shaft winds up.
+
+    Raises
+    ------
+    LoadError, UnknownNameError
+        If it is none, has an unknown name, or a part lacks a number.
+
+    Examples
+    --------
+    >>> load_from_words({"inertia": 1e-3, "pendulum": {"mass": 0.5, "length": 0.1}}).pendulum.mass
+    0.5
+    """
+    if not isinstance(content, Mapping):
+        raise LoadError("load", got=content, allowed='a mapping, such as {"inertia": 0.001}')
+    given: dict[str, Any] = {}
+    drum = Load()
+    for name, value in content.items():
+        if name in _NUMBERS:
+            given[name] = value
+        elif name == "drum":
+            drum = _drum(value)
+        elif name in _PARTS:
+            key, kind = _PARTS[name]
+            given[key] = tuple(_part(f"load.{name}", kind, each) for each in
+                               (value if isinstance(value, list) else [value]))
+        else:
+            raise UnknownNameError("name in a load", name, (*_NUMBERS, *_PARTS, "drum"))
+    return Load(**given) + drum
+
+
+def _drum(content: object) -> Load:
+    """Return the load of a weight on a drum: its torque, and what turns with the shaft."""
+    drum = _part("load.drum", Drum, content)
+    for name, value in (("mass", drum.mass), ("radius", drum.radius), ("inertia", drum.inertia)):
+        if not is_finite(value) or value < 0.0:
+            raise LoadError(f"load.drum: {name}", got=value, allowed="a number, 0 or more")
+    return Load(torque=drum.mass * STANDARD_GRAVITY * drum.radius, inertia=drum.mass * drum.radius**2 + drum.inertia)
+
+
+def words_of_load(load: Load) -> dict[str, Any]:
+    """Return what `load_from_words` makes the same load of; what is 0 or absent is left out.
+
+    Examples
+    --------
+    >>> from servotwin.loads import Inertia, Spring
+    >>> words_of_load(Inertia(1e-3) + Spring(2.0))
+    {'inertia': 0.001, 'spring': {'stiffness': 2.0, 'rest_angle': 0.0}}
+    """
+    words: dict[str, Any] = {name: getattr(load, name) for name in _NUMBERS if getattr(load, name) != 0.0}
+    for name, (key, kind) in _PARTS.items():
+        parts = [{f.name: _plain(getattr(part, f.name)) for f in fields(kind) if getattr(part, f.name) is not None}
+                 for part in getattr(load, key)]
+        if parts:
+            words[name] = parts[0] if len(parts) == 1 else parts
+    return words
+
+
+def _part(what: str, kind: Any, content: object) -> Any:
+    if not isinstance(content, Mapping):
+        raise LoadError(what, got=content, allowed="a mapping of its fields")
+    names = [f.name for f in fields(kind)]
+    for name in content:
+        if name not in names:
+            raise UnknownNameError(f"name in {what}", name, names)
+    lacking = [f.name for f in fields(kind) if f.default is MISSING and f.name not in content]
+    if lacking:
+        raise LoadError(what, got=", ".join(content) or "nothing", allowed=f"also {', '.join(lacking)}")
+    return kind(**content)
+
+
+def _plain(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value
+
+# --- JSON files at the edge: read whole, refused in one line ----------------------------------------------------------
+
+def read_json(path: str | Path) -> Any:
+    """Return the content of a JSON file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, is not UTF-8 or no valid JSON (says the line), or has a key twice in one object.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> file = pathlib.Path(tempfile.mkdtemp()) / "run.json"
+    >>> _ = file.write_text('{"mass": 0.5}')
+    >>> read_json(file)
+    {'mass': 0.5}
+    """
+    try:
+        text = read_bytes(path).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not readable as text ({error})") from None
+    if not text.strip():
+        raise InputError(f"{path}", got="an empty file", allowed="JSON")
+    try:
+        return json.loads(text, object_pairs_hook=_once)
+    except json.JSONDecodeError as error:
+        raise InputError(f"{path}: line {error.lineno} is not valid JSON ({error.msg})") from None
+    except RecursionError:
+        raise InputError(f"{path}: is not valid JSON (nested too deeply)") from None
+    except InputError as error:
+        raise InputError(f"{path}: {error.what}", got=error.got, allowed=error.allowed) from None
+    except ValueError as error:  # an integer of thousands of digits
+        raise InputError(f"{path}: is not valid JSON ({error})") from None
+
+
+def write_json(path: str | Path, content: Mapping[str, Any], *, overwrite: bool = False) -> None:
+    """Write a JSON file; a failure leaves what was there untouched.
+
+    Raises
+    ------
+    OutputExistsError, OutputError
+        If the file exists and `overwrite` is false, or it cannot be written.
+    """
+    write_file(path, json_bytes(content), overwrite=overwrite)
+
+
+def json_bytes(content: Mapping[str, Any]) -> bytes:
+    """Return the contents of a JSON file."""
+    return (json.dumps(content, indent=1) + "\n").encode()
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    made = dict(pairs)
+    if len(made) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise InputError("key of an object", got=f"{twice} twice", allowed="once")
+    return made
+
+# --- Values in the names of files: what `lift{mass}.txt` says of `lift200.txt`, and sidecars that use it --------------
+
+_PLACE = re.compile(r"\{([a-z_]\w*)\}", re.IGNORECASE)
+_VALUE = r"(?P<{}>[+-]?\d+(?:[.,]\d+)?)"
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)?\s*")
+
+
+def has_values(pattern: str) -> bool:
+    """Tell whether a pattern of names takes values out of them."""
+    return _PLACE.search(pattern) is not None
+
+
+def values_in(pattern: str, name: str) -> dict[str, str] | None:
+    """Return the values in a name that fits a pattern, None where it does not fit.
+
+    Examples
+    --------
+    >>> values_in("lift{mass}g_{run}.*", "lift200g_3.csv"), values_in("lift{mass}.txt", "drop.txt")
+    ({'mass': '200', 'run': '3'}, None)
+    >>> values_in("*.csv", "run.csv")
+    {}
+    """
+    if not has_values(pattern):
+        return {} if fnmatchcase(name, pattern) else None
+    marks = _PLACE.findall(pattern)
+    if len(set(marks)) < len(marks):
+        raise InputError("values in a name", got=pattern, allowed="each of them once")
+    parts = _PLACE.split(pattern)  # text, name, text, ...
+    form = "".join(_VALUE.format(part) if k % 2 else re.escape(part).replace(r"\*", ".*").replace(r"\?", ".")
+                   for k, part in enumerate(parts))
+    match = re.fullmatch(form, name)
+    return None if match is None else {key: value.replace(",", ".") for key, value in match.groupdict().items()}
+
+
+def filled_in(what: str, content: Any, values: dict[str, str]) -> Any:
+    """Return an entry of a sidecar with values in the place of their names, in SI where a unit stands behind.
+
+    Raises
+    ------
+    InputError
+        If it names a value that the name does not hold, or the unit is none.
+
+    Examples
+    --------
+    >>> filled_in("load", {"drum": {"mass": "{mass}g", "radius": 0.1}, "note": "no {k}"}, {"mass": "200", "k": "3"})
+    {'drum': {'mass': 0.2, 'radius': 0.1}, 'note': 'no 3'}
+    """
+    if isinstance(content, dict):
+        return {key: filled_in(f"{what}, {key}", value, values) for key, value in content.items()}
+    if isinstance(content, list):
+        return [filled_in(what, value, values) for value in content]
+    if not isinstance(content, str) or not has_values(content):
+        return content
+    for name in _PLACE.findall(content):
+        if name not in values:
+            raise UnknownNameError(f"value of a name in {what}", name, values)
+    text = _PLACE.sub(lambda match: values[match[1]], content)
+    match = _QUANTITY.fullmatch(text)
+    if match is None or not _PLACE.match(content.strip()):
+        return text
+    if match[2] is None:
+        return float(match[1])
+    unit = unit_word(match[2])
+    if unit is None or unit[1] not in units.DIMENSIONS:
+        raise InputError(what, got=content, allowed="a value and its unit, such as {mass}g")
+    return float(units.to_si(float(match[1]), unit[0], unit[1]))
+
+# --- The JSON beside a CSV log: what the numbers alone do not say -----------------------------------------------------
 
 FORMAT = "servotwin-log-1"
 FOLDER_FILE = "logs.json"

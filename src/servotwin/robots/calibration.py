@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.logs.json_file import read_json
+from servotwin.logs.sidecar import read_json
 
 RANGE, OPENING, DEGREES = "-100 to 100", "0 to 100", "degrees"
 _COUNTS = 4096  # a turn, of Feetech STS and SMS and of Dynamixel X

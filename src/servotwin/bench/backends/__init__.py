@@ -1,8 +1,7 @@
 """What carries bytes to a bench and back: one small interface, and all that fits it."""
 
 from servotwin.bench.backends.backend import Backend
-from servotwin.bench.backends.emulated import EmulatedBackend
-from servotwin.bench.backends.mock import MockBackend
+from servotwin.bench.backends.emulated import EmulatedBackend, MockBackend
 from servotwin.bench.backends.serial_port import SerialBackend, serial_ports
 
 __all__ = ["Backend", "EmulatedBackend", "MockBackend", "SerialBackend", "serial_ports"]

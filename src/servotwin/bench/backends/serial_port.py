@@ -7,7 +7,7 @@ import errno
 import re
 from typing import TYPE_CHECKING, NamedTuple
 
-from servotwin.bench.wire.protocol import protocol
+from servotwin.bench.wire.frames import protocol
 from servotwin.errors import BenchError, MissingExtraError
 
 if TYPE_CHECKING:

@@ -10,12 +10,10 @@ from typing import Any, NamedTuple
 
 from servotwin.bench.backends.backend import Backend
 from servotwin.bench.bus.goals import Goals, goal_of
-from servotwin.bench.bus.port import BITS
 from servotwin.bench.bus.scan import wire_of
-from servotwin.bench.bus.sdk_wire import PATIENCE
+from servotwin.bench.bus.sdk_wire import BITS, PATIENCE, Answer, BusWire
 from servotwin.bench.bus.servo import BusServo, opened
 from servotwin.bench.bus.ticks import Ticks
-from servotwin.bench.bus.wire import Answer, BusWire
 from servotwin.bench.recording.experiment import Experiment
 from servotwin.errors import BenchError, InputError
 

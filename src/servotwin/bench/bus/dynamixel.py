@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from servotwin.bench.backends.backend import Backend
-from servotwin.bench.bus.port import BusPort
-from servotwin.bench.bus.sdk_wire import PATIENCE, Dialect, SdkWire
+from servotwin.bench.bus.sdk_wire import PATIENCE, BusPort, Dialect, SdkWire
 from servotwin.errors import MissingExtraError
 
 

@@ -1,4 +1,8 @@
-"""Families of bus servos: by which registers they are told where to go and tell where they are."""
+"""Families of bus servos: by which registers they are told where to go and tell where they are.
+
+Names, addresses, bytes and signs are those of `servotwin.parameters.registers`; those of protocol 1 have their bytes
+and signs here (Robotis' e-manual of MX and AX).
+"""
 
 from __future__ import annotations
 
@@ -7,14 +11,75 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from servotwin.bench.bus import registers as tables
-from servotwin.bench.bus.registers import Table
 from servotwin.errors import BenchError
+from servotwin.parameters.registers.dynamixel_one import AX_REGISTERS, MX_REGISTERS
 from servotwin.parameters.registers.dynamixel_one_models import AX_MODELS, MX_MODELS, OneModel
 from servotwin.parameters.registers.dynamixel_x import FULL, SPEED
+from servotwin.parameters.registers.dynamixel_x import REGISTERS as X_REGISTERS
 from servotwin.parameters.registers.dynamixel_x_models import X_MODELS, XModel
+from servotwin.parameters.registers.feetech import REGISTERS as STS_REGISTERS
 from servotwin.parameters.registers.feetech_models import STS_MODELS
 from servotwin.parameters.registers.model import RegisterModel
+from servotwin.parameters.registers.register import Register, laid
+
+# --- How the registers of bus servos lie in their memory: address, bytes, sign ----------------------------------------
+
+_CHUNK = 32  # bytes of one read of many registers
+Table = Mapping[str, Register]
+
+
+def chunks(table: Table) -> list[tuple[int, int]]:
+    """Return (address, bytes) of the reads that get all of a table; no register is cut.
+
+    Examples
+    --------
+    >>> chunks({"a": Register(0, 0, 9, 0, size=2), "b": Register(30, 0, 9, 0, size=4), "c": Register(40, 0, 9, 0)})
+    [(0, 2), (30, 11)]
+    """
+    made: list[tuple[int, int]] = []
+    for one in sorted(table.values(), key=lambda one: (one.address, one.size)):
+        end = one.address + one.size
+        if made and end - made[-1][0] <= _CHUNK:
+            made[-1] = (made[-1][0], max(end - made[-1][0], made[-1][1]))
+        else:
+            made.append((one.address, one.size))
+    return made
+
+
+def decoded(table: Table, memory: Mapping[int, int]) -> dict[str, int]:
+    """Return the raw values by name that bytes by address say; registers with bytes missing are left out."""
+    found = {}
+    for name, one in table.items():
+        places = range(one.address, one.address + one.size)
+        if all(place in memory for place in places):
+            found[name] = one.decode([memory[place] for place in places])
+    return found
+
+
+def _without(known: Mapping[str, Register], *leave: str) -> dict[str, Register]:
+    return {name: one for name, one in known.items() if name not in leave}
+
+
+_OF_CURRENT = ("Current_Limit", "Goal_Current", "Present_Current")
+STS = STS_REGISTERS
+"""Feetech STS and SMS."""
+X330 = _without(X_REGISTERS, "Present_Load")
+"""Dynamixel XL330 and XC330."""
+X = _without(X_REGISTERS, "Present_Load", "PWM_Slope")
+"""Dynamixel X with a current sensor, and MX-64 and MX-106 with protocol 2."""
+X_WITHOUT_CURRENT = _without(X_REGISTERS, *_OF_CURRENT, "PWM_Slope")
+"""Dynamixel XL430 and XC430, and MX-28 with protocol 2."""
+_ONE_SIZES = {2: (
+    "CW_Angle_Limit CCW_Angle_Limit Max_Torque Torque_Limit Moving_Speed Model_Number Goal_Position Present_Position "
+    "Present_Speed Present_Load Punch Multi_Turn_Offset Realtime_Tick Current Goal_Torque")}
+_ONE_SIGNS: dict[str, int | None] = {"Present_Speed": 10, "Present_Load": 10}
+MX = laid(MX_REGISTERS, sizes=_ONE_SIZES, signs={
+    **_ONE_SIGNS, "Goal_Position": None, "Present_Position": None, "Multi_Turn_Offset": None})
+"""Dynamixel MX with protocol 1."""
+AX = laid(AX_REGISTERS, sizes=_ONE_SIZES, signs=_ONE_SIGNS)
+"""Dynamixel AX."""
+
+# --- Families of bus servos: by which registers they are told where to go and tell where they are ---------------------
 
 _ZERO_CELSIUS = 273.15
 _RPM = 6.0  # deg/s
@@ -111,7 +176,7 @@ def _heat(register: str) -> Channel:
 
 _TURN = 360.0 / 4096.0  # deg
 _STS = BusFamily(
-    name="feetech-sts", protocol="feetech", registers=tables.STS, block=(56, 15), count=_TURN, middle=2048,
+    name="feetech-sts", protocol="feetech", registers=STS, block=(56, 15), count=_TURN, middle=2048,
     speed=Channel("output_speed_deg_per_s", "Present_Velocity", _TURN),
     channels=(
         Channel("duty", "Present_Load", 1e-3),
@@ -147,18 +212,18 @@ def _one(name: str, registers: Table, count: float, middle: int, rpm: float) -> 
 def _of_x(model: XModel) -> BusFamily:
     """Return the registers of a model of the X series, or of an MX with protocol 2."""
     if model.current_unit is None:
-        return _x(tables.X_WITHOUT_CURRENT, Channel("present_load", "Present_Load", 1e-3))
+        return _x(X_WITHOUT_CURRENT, Channel("present_load", "Present_Load", 1e-3))
     if model.current_sense == "bus":
-        return _x(tables.X330, Channel("supply_current_A", "Present_Current", model.current_unit))
-    return _x(tables.X, Channel("armature_current_A", "Present_Current", model.current_unit))
+        return _x(X330, Channel("supply_current_A", "Present_Current", model.current_unit))
+    return _x(X, Channel("armature_current_A", "Present_Current", model.current_unit))
 
 
 def _of_mx(model: OneModel) -> BusFamily:
-    return _one("dynamixel-mx", tables.MX, _TURN, 2048, model.speed_unit)
+    return _one("dynamixel-mx", MX, _TURN, 2048, model.speed_unit)
 
 
 def _of_ax(model: OneModel) -> BusFamily:
-    return _one("dynamixel-ax", tables.AX, 300.0 / 1023.0, 512, model.speed_unit)
+    return _one("dynamixel-ax", AX, 300.0 / 1023.0, 512, model.speed_unit)
 
 
 class BusModel(NamedTuple):
@@ -194,7 +259,6 @@ def _models() -> dict[tuple[str, int], BusModel]:
 
 MODELS = _models()
 """By protocol and model number; numbers as LeRobot and Robotis list them."""
-
 MODEL_NUMBER_AT = {"feetech": 3, "dynamixel-2": 0, "dynamixel-1": 0}
 """Address of the model number, of two bytes, by protocol."""
 

@@ -10,8 +10,7 @@ from servotwin.bench.backends.serial_port import SerialBackend
 from servotwin.bench.bus.dynamixel import dynamixel_wire
 from servotwin.bench.bus.families import MODEL_NUMBER_AT, MODELS, BusModel
 from servotwin.bench.bus.feetech import feetech_wire
-from servotwin.bench.bus.sdk_wire import PATIENCE, SdkWire
-from servotwin.bench.bus.wire import BusWire
+from servotwin.bench.bus.sdk_wire import PATIENCE, BusWire, SdkWire
 from servotwin.errors import BenchError, InputError, UnknownNameError
 
 BAUDS = (1_000_000, 57_600, 115_200, 500_000, 2_000_000)

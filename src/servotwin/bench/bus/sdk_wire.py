@@ -5,12 +5,166 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple, Protocol
 
 from servotwin.bench.backends.backend import Backend
-from servotwin.bench.bus.port import BusPort
-from servotwin.bench.bus.wire import Answer
 from servotwin.errors import BenchError
+
+# --- What the makers' packages take for their port --------------------------------------------------------------------
+
+BITS = 10  # of a byte on the wire, with start and stop
+_SLICE = 0.01  # s of one read
+_BABBLE = 50  # reads until a line that never falls silent is taken as it is
+
+
+class BusPort:
+    """A backend as Feetech's and Robotis' packages see a port; both call these names.
+
+    Parameters
+    ----------
+    backend : Backend
+    baud : int
+        [bit/s]
+    patience : float
+        How long an answer may be late beyond its time on the wire [s].
+    """
+
+    is_using = False
+
+    def __init__(self, backend: Backend, baud: int, patience: float) -> None:
+        self.backend = backend
+        self.patience = patience
+        self.sent = 0.0
+        self._baud = baud
+        self._left = b""
+        self._deadline = 0.0
+
+    def getBaudRate(self) -> int:
+        """Return the speed of the wire [bit/s]."""
+        return self._baud
+
+    def clearPort(self) -> None:
+        """Forget what has come: an answer that was too late is not one to the next question."""
+        self._left = b""
+        for _ in range(_BABBLE):
+            if not self.backend.read(0.0):
+                break
+
+    def writePort(self, packet: list[int]) -> int:
+        """Send a packet, and note when it had gone out."""
+        self.backend.send(bytes(packet))
+        self.sent = time.perf_counter() + len(packet) * BITS / self._baud
+        return len(packet)
+
+    def readPort(self, length: int) -> bytes:
+        """Return at most so many bytes; waits for the first a little."""
+        if not self._left and length > 0:
+            self._left = self.backend.read(max(0.0, min(self._deadline - time.perf_counter(), _SLICE)))
+        found, self._left = self._left[:length], self._left[length:]
+        return found
+
+    def setPacketTimeout(self, packet_length: int) -> None:
+        """Expect an answer of so many bytes."""
+        self.setPacketTimeoutMillis(1e3 * (packet_length * BITS / self._baud + self.patience))
+
+    def setPacketTimeoutMillis(self, msec: float) -> None:
+        """Expect an answer within a time [ms]."""
+        self._deadline = time.perf_counter() + 1e-3 * msec
+
+    def isPacketTimeout(self) -> bool:
+        """Return whether the answer is too late."""
+        return time.perf_counter() > self._deadline
+
+# --- A wire with bus servos: ask one, ask several at once, tell one, tell several at once -----------------------------
+
+class Answer(NamedTuple):
+    """What a servo said.
+
+    Parameters
+    ----------
+    data : bytes
+    error : int
+        Its status byte; 0: all is well.
+    sent, received : float
+        When the question had gone out and the answer had come, `time.perf_counter` [s].
+    """
+
+    data: bytes
+    error: int
+    sent: float
+    received: float
+
+    @property
+    def middle(self) -> float:
+        """Between question and answer [s]; the servo looked at its registers at most half their distance from it."""
+        return 0.5 * (self.sent + self.received)
+
+
+class BusWire(Protocol):
+    """Five things to do with servos on a wire. A packet that is damaged counts as none."""
+
+    @property
+    def name(self) -> str:
+        """Of the wire, for messages."""
+
+    def open(self) -> None:
+        """Take the wire.
+
+        Raises
+        ------
+        BenchError
+            If it is not there, or somebody else has it.
+        """
+
+    def ping(self, ids: Sequence[int]) -> dict[int, int]:
+        """Return the model numbers of those servos that answer, by id.
+
+        Raises
+        ------
+        BenchError
+            If the wire is cut.
+        """
+
+    def read(self, servo: int, address: int, size: int) -> Answer:
+        """Ask a servo for a block of its registers, several times if need be.
+
+        Raises
+        ------
+        BenchError
+            If it does not answer, refuses, or the wire is cut.
+        """
+
+    def read_all(self, servos: Sequence[int], address: int, size: int) -> dict[int, Answer]:
+        """Ask several servos for the same block, once; those that did not answer are left out.
+
+        Raises
+        ------
+        BenchError
+            If the wire is cut.
+        """
+
+    def write(self, servo: int, address: int, data: bytes) -> None:
+        """Write into a servo's registers, and see that it arrived.
+
+        Raises
+        ------
+        BenchError
+            If it did not, or the wire is cut.
+        """
+
+    def write_all(self, address: int, data: Mapping[int, bytes]) -> None:
+        """Write into several servos' registers at the same instant; nobody answers.
+
+        Raises
+        ------
+        BenchError
+            If the wire is cut.
+        """
+
+    def close(self) -> None:
+        """Give the wire back."""
+
+# --- The wire through the makers' packages: they make and check the packets -------------------------------------------
 
 PATIENCE = 0.02  # s: a USB adapter may keep what has come for 16 ms
 _TRIES = 4  # of a question to one servo

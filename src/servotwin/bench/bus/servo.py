@@ -6,10 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from servotwin.bench.bus.families import BusFamily, BusModel
-from servotwin.bench.bus.registers import chunks, decoded
+from servotwin.bench.bus.families import BusFamily, BusModel, chunks, decoded
 from servotwin.bench.bus.scan import identified
-from servotwin.bench.bus.wire import Answer, BusWire
+from servotwin.bench.bus.sdk_wire import Answer, BusWire
 from servotwin.errors import BenchError
 
 _ALERT = 128  # of a status byte of protocol 2

@@ -9,10 +9,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from servotwin.bench.backends.emulated import EmulatedBackend
-from servotwin.bench.bench import bench_servo
-from servotwin.bench.converter import FEEDBACK_CONVERTER, INPUT_CONVERTER, Converter
+from servotwin.bench.bench import FEEDBACK_CONVERTER, INPUT_CONVERTER, Converter, Reading, bench_servo
 from servotwin.bench.emulator.plant import Front, ServoOnPins
-from servotwin.bench.reading import Reading
 from servotwin.errors import BenchError
 from servotwin.models import PulseServo
 from servotwin.parameters import load_servo

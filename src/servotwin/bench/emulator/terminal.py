@@ -39,7 +39,7 @@ class Terminal:
 
     Examples
     --------
-    >>> from servotwin.bench.backends.mock import MockBackend
+    >>> from servotwin.bench.backends.emulated import MockBackend
     >>> with Terminal(MockBackend()) as terminal:
     ...     terminal.serve(0.01)
     ...     terminal.port[:5]

@@ -4,9 +4,7 @@ from servotwin.bench.recording.analog_rig import AnalogRig
 from servotwin.bench.recording.calibrate import Calibration, calibrated
 from servotwin.bench.recording.experiment import Experiment, Hold
 from servotwin.bench.recording.experiments import EXPERIMENTS, experiments, of_log
-from servotwin.bench.recording.limits import Limits
-from servotwin.bench.recording.recorder import About, Recorded, record, record_bus, watched_current
-from servotwin.bench.recording.rig import Rig
+from servotwin.bench.recording.recorder import About, Limits, Recorded, Rig, record, record_bus, watched_current
 from servotwin.bench.recording.wiring import Wiring, load_wiring, nominal_wiring
 
 __all__ = ["EXPERIMENTS", "About", "AnalogRig", "Calibration", "Experiment", "Hold", "Limits", "Recorded", "Rig",

@@ -11,7 +11,7 @@ from servotwin.bench.backends.backend import Backend
 from servotwin.bench.recording.experiment import Experiment, Hold
 from servotwin.bench.recording.wiring import SIGNALS, Wiring
 from servotwin.bench.wire.board import Board, Identity, Message
-from servotwin.bench.wire.protocol import protocol
+from servotwin.bench.wire.frames import protocol
 from servotwin.errors import BenchError, InputError
 
 _BATCH = 10  # points of one message

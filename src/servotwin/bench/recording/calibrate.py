@@ -8,8 +8,8 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from servotwin.bench.fits import LineFit, fit_line
 from servotwin.bench.recording.wiring import FULL, Wiring
+from servotwin.bench.table_columns import LineFit, fit_line
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.parameters import Quantity
 

@@ -14,7 +14,7 @@ from servotwin.errors import InputError, UnknownNameError
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
-    from servotwin.bench.recording.limits import Limits
+    from servotwin.bench.recording.recorder import Limits
     from servotwin.logs import Log
 
 _PERIODS = (0.02, 0.014, 0.01, 0.007, 0.005, 1.0 / 333.0)  # s, 50 to 333 Hz
@@ -141,7 +141,7 @@ def experiments(names: str, limits: Limits, *, duration: float = 10.0, frame_per
 
     Examples
     --------
-    >>> from servotwin.bench.recording.limits import Limits
+    >>> from servotwin.bench.recording.recorder import Limits
     >>> limits = Limits(kind="pulse_width", low=1e-3, high=2e-3, voltage=6.0, current=1.0)
     >>> [one.motion for one in experiments("steps,hold", limits, duration=2.0)]
     ['step', 'hold']

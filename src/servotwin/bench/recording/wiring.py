@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from servotwin.bench.wire.protocol import protocol
+from servotwin.bench.wire.frames import protocol
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.parameters import Quantity, write_file
 from servotwin.text import load_toml

@@ -13,12 +13,10 @@ from numpy.typing import NDArray
 from servotwin.bench.video.filmed import Filmed
 from servotwin.bench.video.instant import JUMP, LED
 from servotwin.errors import InputError, OutputError, OutputExistsError
-from servotwin.logs.clock import timed
 from servotwin.logs.columns import COMMANDS, SWITCH, TIME, Column
 from servotwin.logs.csv_logs import read_log_table
-from servotwin.logs.json_file import read_json, write_json
-from servotwin.logs.mends import checked_mends
-from servotwin.logs.sidecar import FORMAT, sidecar_path
+from servotwin.logs.mends import checked_mends, timed
+from servotwin.logs.sidecar import FORMAT, read_json, sidecar_path, write_json
 from servotwin.parameters import write_file
 from servotwin.tables import TextTable, csv_text
 

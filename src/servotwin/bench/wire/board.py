@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from servotwin.bench.backends.backend import Backend
-from servotwin.bench.wire.frames import Clock, Frame, Splitter, to_wire
-from servotwin.bench.wire.protocol import Kind, protocol
+from servotwin.bench.wire.frames import Clock, Frame, Kind, Splitter, protocol, to_wire
 from servotwin.errors import BenchError, InputError
 
 NAME = "servotwn"  # of the firmware, as it says it
@@ -69,7 +68,7 @@ class Board:
 
     Examples
     --------
-    >>> from servotwin.bench.backends.mock import MockBackend
+    >>> from servotwin.bench.backends.emulated import MockBackend
     >>> board = Board(MockBackend())
     >>> board.open().mode
     'computer'

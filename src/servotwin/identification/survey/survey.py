@@ -15,8 +15,8 @@ from servotwin.errors import InputError
 from servotwin.identification.fitting.suspicions.look import beat_of, rough_noise
 from servotwin.loads import Load
 from servotwin.logs.columns import COMMANDS
-from servotwin.logs.defined import is_defined
 from servotwin.logs.log import Log
+from servotwin.logs.log_checks import is_defined
 from servotwin.units.words import unit_shown
 
 if TYPE_CHECKING:
