@@ -7,7 +7,8 @@ import pytest
 
 from bench_posts import post_of
 from servotwin.errors import ServotwinError
-from servotwin.models.engine.live import posts, screen
+from servotwin.models.engine.live import posts as making
+from servotwin.models.engine.live import screen
 from servotwin.models.engine.live.posts import Post
 from servotwin.models.state.records import put_fields, record_of
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
@@ -46,8 +47,8 @@ def test_a_servo_is_what_its_model_makes_of_it(kind):
         put_fields(posts[0], post_of(model, load_of(scene)))
         put_fields(programs[0], model.firmware() or NO_FIRMWARE)
         posts[1] = posts[0]
-        how = posts.make(posts[1], programs[1], posts.FAMILIES[kind], model.given, posts.Weights(*LOAD.values()))
-        assert how == posts.MADE
+        how = making.make(posts[1], programs[1], making.FAMILIES[kind], model.given, making.Weights(*LOAD.values()))
+        assert how == making.MADE
         for (ours, value), (_, theirs) in zip([*numbers_in(posts[1]), *numbers_in(programs[1])],
                                               [*numbers_in(posts[0]), *numbers_in(programs[0])], strict=True):
             assert value == pytest.approx(theirs, rel=1e-12, abs=1e-15, nan_ok=True), (name, ours)
@@ -59,8 +60,8 @@ def test_play_without_inertia_is_not_made():
     model, = models_of(Scene(servos=(SceneServo(id="hitec-hs-755hb", parameters={"gear.backlash": 0.01}),),
                              load={"inertia": 1e-4}))
     post, program = np.zeros(1, record_of(Post)), np.zeros(1, record_of(Firmware))
-    nothing = posts.Weights(*[0.0] * 7)
-    assert posts.make(post[0], program[0], posts.PULSED, model.given, nothing) == posts.NO_INERTIA
+    nothing = making.Weights(*[0.0] * 7)
+    assert making.make(post[0], program[0], making.PULSED, model.given, nothing) == making.NO_INERTIA
     assert not post[0].numbers.motor.K
 
 
