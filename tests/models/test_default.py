@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 
 import servotwin as st
+from servotwin.identification.fitting.fit import checked_servo
 from servotwin.models import default_class, default_model
 
 SERVO = "hitec-hs-755hb"
@@ -63,5 +64,5 @@ def test_every_digital_and_bus_servo_of_the_catalog_makes_a_small_step(name):
 def test_a_fit_follows_it_too(recwarn):
     servo = st.load_servo(SERVO).replace(dict.fromkeys(CHIP) | {"electronics.pulse_to_voltage_gain": 735.0})
     with pytest.warns(UserWarning, match="has no chip"):
-        advice = st.identification.fitting.checks.checked_servo(servo, None)
+        advice = checked_servo(servo, None)
     assert isinstance(advice, st.BoundedServo)

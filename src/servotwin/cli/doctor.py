@@ -12,7 +12,7 @@ import typer
 from servotwin.cli import log_reading
 from servotwin.cli import shared_options as shared
 from servotwin.cli.terminal import emit_json, patience, show
-from servotwin.logs.mends import MENDS
+from servotwin.logs.mend_names import MENDS
 
 if TYPE_CHECKING:
     from servotwin.cli.command_words import CommandWords

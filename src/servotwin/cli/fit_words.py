@@ -12,7 +12,7 @@ from servotwin.identification.fitting.fit import MENDED
 from servotwin.identification.fitting.free import Space, nominal
 from servotwin.identification.fitting.stopping import Within
 from servotwin.identification.report.pictures import dimension_of_free
-from servotwin.logs.mends import MENDS
+from servotwin.logs.mend_names import MENDS
 from servotwin.studies.kinds import Distribution, Normal, Offset, Relative, Uniform
 from servotwin.studies.words import distribution_of
 from servotwin.units.quantities import number_and_unit, quantity

@@ -12,7 +12,7 @@ import typer
 from servotwin.cli.terminal import patience, show, table
 from servotwin.errors import one_line
 from servotwin.logs.formats import FORMATS, LOG_FORMATS
-from servotwin.logs.mends import MENDS
+from servotwin.logs.mend_names import MENDS
 from servotwin.logs.reading import read_alike
 
 if TYPE_CHECKING:

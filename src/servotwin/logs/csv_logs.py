@@ -29,10 +29,8 @@ from servotwin.logs.columns import (
 )
 from servotwin.logs.log import ANGLES, Log
 from servotwin.logs.log_checks import check_said, checked_definition, defined_commands, is_defined
+from servotwin.logs.mend_names import DROP, SPREAD, TORN
 from servotwin.logs.mends import (
-    DROP,
-    SPREAD,
-    TORN,
     Timed,
     checked_mends,
     say,

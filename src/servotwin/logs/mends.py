@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
 from itertools import pairwise
@@ -16,26 +16,13 @@ from servotwin.errors import InputError, UnknownNameError
 from servotwin.logs.column_values import CLOCKS, clock_of, stamps_of
 from servotwin.logs.columns import COMMANDS, TIME, Column
 from servotwin.logs.log_checks import defined_times, impossible, is_defined, refuse
+from servotwin.logs.mend_names import CLOCK16, DROP, MENDS, RESET, SPREAD, THOUSANDS, TORN
 from servotwin.tables import TextTable, said_lines
 from servotwin.tables.dialect import MISSING
 from servotwin.tables.thousands import grouped_in, without_groups
 
 if TYPE_CHECKING:
     from servotwin.logs.csv_logs import Layout
-
-# --- What a reader mends in a file when it is asked to, by name -------------------------------------------------------
-
-TORN, RESET, DROP, SPREAD, CLOCK16, THOUSANDS = (
-    "torn", "reset", "drop-repeated", "spread-repeated", "clock16", "thousands")
-MENDS: Mapping[str, str] = {
-    TORN: "leaves out rows that are cut, joined or hold no number",
-    RESET: "makes a log of its own of what comes after the time began again",
-    DROP: "leaves out rows with the stamp of the row before",
-    SPREAD: "spreads rows with one stamp between their neighbours",
-    CLOCK16: "joins times of a counter of 16 bits",
-    THOUSANDS: "takes marks within whole numbers for thousands separators",
-}
-"""What a reader mends when it is asked to; the certain faults are mended unasked."""
 
 # --- What can be mended in a table before it is a log: the words of `--mend`, and rows that are no rows ---------------
 
