@@ -156,7 +156,7 @@ def _digest(path: Path) -> str:
     if path.suffix in (".png", ".pdf", ".npz", ".mp4", ".fmu", ".svg"):
         return path.suffix
     text = _plain(path.read_text(encoding="utf-8", errors="replace"), path.parent)
-    text = re.sub(r'data:image/[^"]*|<svg.*?</svg>', "", text, flags=re.DOTALL)
+    text = re.sub(r'data:image/[^"]*|<svg.*?</svg>|\d+(\.\d+)?\s*s\b', "", text, flags=re.DOTALL)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
@@ -165,6 +165,8 @@ def _plain(text: str, folder: Path) -> str:
     text = text.replace(str(folder), "HERE").replace(str(folder.parent), "HERE")
     text = re.sub(r"\d{4}-\d\d-\d\d([T ]\d\d:\d\d(:\d\d(\.\d+)?)?)?(\+\d\d:\d\d|Z)?", "DATE", text)
     text = re.sub(r'("(?:seconds|elapsed|wall|cpu|took)[^"]*": )[\d.e+-]+', r"\1TIME", text)
+    text = re.sub(r"(?m)^\w+: \d+ %.*$", "PROGRESS", text)
+    text = re.sub(r"held out, \d+(\.\d+)? s\b", "held out, TIME", text)
     return re.sub(r"\b\d+(\.\d+)? ?m?s of (CPU|processor)[^\n]*|in \d+(\.\d+)? ?m?s\b", "TIME", text)
 
 
