@@ -16,8 +16,7 @@ pytest.importorskip("mujoco", reason="the extra `robots` is not installed")
 import servotwin as st
 from robots.robots_cases import links
 from robots.test_replay import JOINTS, recorded
-from servotwin.identification.fitting import fit as checks
-from servotwin.identification.fitting import stopping
+from servotwin.identification.fitting import checks, stopping
 
 pytestmark = pytest.mark.long
 
@@ -68,7 +67,7 @@ def test_what_is_printed(cli, arm):
 
 STOPPED = """
 import contextlib, signal, sys
-from servotwin.identification.fitting import fit as checks
+from servotwin.identification.fitting import checks
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore them
 number, stage = int(sys.argv.pop(1)), sys.argv.pop(1)

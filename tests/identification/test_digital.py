@@ -12,7 +12,7 @@ from identification.fits import near
 from servotwin.errors import ServotwinError
 from servotwin.identification import Log, Structure, as_structure, compare_structures, identify, validate
 from servotwin.identification.fitting.case import GAIN, with_loop_gain
-from servotwin.identification.fitting.fit import usual_free
+from servotwin.identification.fitting.checks import usual_free
 from servotwin.identification.fitting.free import nominal
 from servotwin.identification.fitting.structures import as_arm
 

@@ -12,7 +12,7 @@ from reference.rig_draws import CONDITIONS, file_of, random_truth, runs
 from reference.rig_logs import log_of, servo_of
 from servotwin.errors import InputError
 from servotwin.identification import findings, identify, validate
-from servotwin.identification.fitting.fit import MENDED, mended
+from servotwin.identification.fitting.checks import MENDED, mended
 from servotwin.identification.fitting.suspicions.look import beat_of, look, rough_noise
 
 MODEL = st.PulseServo(TRUTH)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 import servotwin as st
-from servotwin.identification.fitting.fit import checked_servo
+from servotwin.identification.fitting.checks import checked_servo
 from servotwin.models import default_class, default_model
 
 SERVO = "hitec-hs-755hb"

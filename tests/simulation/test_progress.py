@@ -3,7 +3,7 @@
 import pytest
 
 import servotwin as st
-from servotwin.identification.fitting import fit as checks
+from servotwin.identification.fitting import checks
 from servotwin.simulation import progress
 
 

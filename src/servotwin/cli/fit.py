@@ -240,7 +240,7 @@ def _model(servo: str, model: str | None, change: list[str], register: list[str]
 
 def _search(nominal: Model, free: list[str] | None, bounds: list[str], prior: list[str], *, priors: bool) -> _Search:
     from servotwin.cli import fit_words
-    from servotwin.identification.fitting.fit import usual_free
+    from servotwin.identification.fitting.checks import usual_free
 
     names = fit_words.names(free) or usual_free(nominal)
     fit_words.check_free(names, nominal)

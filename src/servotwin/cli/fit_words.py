@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 from servotwin.errors import InputError, ServotwinError, UnknownNameError
-from servotwin.identification.fitting.fit import MENDED
+from servotwin.identification.fitting.checks import MENDED
 from servotwin.identification.fitting.free import Space, nominal
 from servotwin.identification.fitting.stopping import Within
 from servotwin.identification.report.pictures import dimension_of_free

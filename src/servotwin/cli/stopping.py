@@ -22,7 +22,7 @@ def best_kept(*, shown: bool = True) -> Iterator[Callable[[float, str], None]]:
 
     Before the first step there is no best, and an interrupt ends the process.
     """
-    from servotwin.identification.fitting import fit as checks
+    from servotwin.identification.fitting import checks
 
     with checks.shown(shown) as show, contextlib.ExitStack() as stack:
         ends: list[Callable[[], None]] = []

@@ -92,7 +92,7 @@ def _run(servo: Servo, model: str | None, nuisance: list[str] | None, sensors: l
          mend: list[str] | None, read: Callable[[Model], list[Log]]) -> Validation:
     from servotwin.cli import fit_words
     from servotwin.cli.model_words import class_of
-    from servotwin.identification.fitting.fit import checked_servo
+    from servotwin.identification.fitting.checks import checked_servo
     from servotwin.identification.fitting.validate import recorded_model
     from servotwin.identification.fitting.validate import validate as run
 

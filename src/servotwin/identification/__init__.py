@@ -8,13 +8,15 @@ if TYPE_CHECKING:
     from servotwin.identification.arms.identify_arm import identify_arm
     from servotwin.identification.fitting.advise import Advice, Experiment, advise
     from servotwin.identification.fitting.case import LogPart, Point
-    from servotwin.identification.fitting.fit import Finding, Fit, Interval, Start, Trace, findings
+    from servotwin.identification.fitting.checks import findings
+    from servotwin.identification.fitting.fit import Fit, Interval, Start, Trace
     from servotwin.identification.fitting.forecast import Forecast
     from servotwin.identification.fitting.free import LUMPED, FreeParameter, Space
     from servotwin.identification.fitting.holdout import ErrorTable, LogError
     from servotwin.identification.fitting.identify import identify
     from servotwin.identification.fitting.ladder import RUNGS, Ladder, Rung, friction_ladder
     from servotwin.identification.fitting.structures import Structure, as_structure, compare_structures
+    from servotwin.identification.fitting.suspicions.look import Finding
     from servotwin.identification.fitting.uncertainty import Uncertainty, Unidentifiable
     from servotwin.identification.fitting.validate import Validation, validate
     from servotwin.identification.fitting.verdict import Cause, Verdict
@@ -61,13 +63,15 @@ _HOMES = {
     "identification.arms.identify_arm": ("identify_arm",),
     "identification.fitting.advise": ("Advice", "Experiment", "advise"),
     "identification.fitting.case": ("LogPart", "Point"),
-    "identification.fitting.fit": ("Finding", "Fit", "Interval", "Start", "Trace", "findings"),
+    "identification.fitting.checks": ("findings",),
+    "identification.fitting.fit": ("Fit", "Interval", "Start", "Trace"),
     "identification.fitting.forecast": ("Forecast",),
     "identification.fitting.free": ("LUMPED", "FreeParameter", "Space"),
     "identification.fitting.holdout": ("ErrorTable", "LogError"),
     "identification.fitting.identify": ("identify",),
     "identification.fitting.ladder": ("RUNGS", "Ladder", "Rung", "friction_ladder"),
     "identification.fitting.structures": ("Structure", "as_structure", "compare_structures"),
+    "identification.fitting.suspicions.look": ("Finding",),
     "identification.fitting.uncertainty": ("Uncertainty", "Unidentifiable"),
     "identification.fitting.validate": ("Validation", "validate"),
     "identification.fitting.verdict": ("Cause", "Verdict"),

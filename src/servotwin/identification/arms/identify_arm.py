@@ -40,7 +40,7 @@ from servotwin.identification.arms.rows import (
     usual_steps,
     without,
 )
-from servotwin.identification.fitting import fit as checks
+from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.case import DELAY_SCALE
 from servotwin.identification.fitting.diagnosis.drifts import counts_turns
 from servotwin.identification.fitting.registers import (

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.identification.fitting.case import LogPart
-from servotwin.identification.fitting.fit import usual_free
+from servotwin.identification.fitting.checks import usual_free
 from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.registers import busiest
 from servotwin.logs.log import Log

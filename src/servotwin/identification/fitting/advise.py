@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting import fit as checks
+from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.case import DELAY_SCALE, Point
 from servotwin.identification.fitting.fit import Fit
 from servotwin.identification.fitting.forecast import Forecast

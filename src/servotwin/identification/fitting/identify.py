@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, PlausibilityWarning, ServotwinError
-from servotwin.identification.fitting import fit as checks
+from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.arrow import Begin, Loss, Outcome, Prior, Search
 from servotwin.identification.fitting.assumptions import (
     HINTED,
@@ -40,11 +40,12 @@ from servotwin.identification.fitting.case import (
     Point,
     has_pulses,
 )
+from servotwin.identification.fitting.checks import BY_ITSELF, explained, first_looks, mended
 from servotwin.identification.fitting.clocks import delay_range, phase_errors, ticking, unsure_commands
 from servotwin.identification.fitting.comparison import BESIDE, SLEW, ErrorTables, compare
 from servotwin.identification.fitting.diagnosis import diagnose
 from servotwin.identification.fitting.diagnosis.drifts import counted_stamps
-from servotwin.identification.fitting.fit import BY_ITSELF, Fit, Start, Trace, explained, first_looks, mended
+from servotwin.identification.fitting.fit import Fit, Start, Trace
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Bounds, Priors, Space
 from servotwin.identification.fitting.held_out import trace_of, with_pulses_of

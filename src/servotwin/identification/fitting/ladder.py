@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting import fit as checks
+from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.arrow import Begin, Loss
 from servotwin.identification.fitting.case import LogPart
 from servotwin.identification.fitting.fit import Fit, Trace

@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting import fit as checks
+from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.fit import Fit
 from servotwin.identification.fitting.free import LUMPED
 from servotwin.identification.fitting.ladder import RUNGS, Ladder, Rung, friction_ladder, ladder_of, rung_of

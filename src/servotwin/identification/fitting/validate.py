@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, ServoFileError
-from servotwin.identification.fitting import fit as checks
+from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.arrow import Begin, Loss, Prior
 from servotwin.identification.fitting.batches import Running
 from servotwin.identification.fitting.case import (
@@ -34,8 +34,9 @@ from servotwin.identification.fitting.case import (
     gaps,
     has_pulses,
 )
+from servotwin.identification.fitting.checks import explained, first_looks
 from servotwin.identification.fitting.clocks import first_offset
-from servotwin.identification.fitting.fit import Trace, explained, first_looks
+from servotwin.identification.fitting.fit import Trace
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.held_out import trace_of, with_pulses_of

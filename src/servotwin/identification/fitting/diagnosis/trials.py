@@ -20,6 +20,7 @@ from servotwin.errors import ServotwinError
 from servotwin.identification.fitting.arrow import Prior
 from servotwin.identification.fitting.assumptions import assumptions
 from servotwin.identification.fitting.case import Point, has_pulses, joined
+from servotwin.identification.fitting.checks import findings
 from servotwin.identification.fitting.diagnosis.bench import (
     DEAR,
     Purse,
@@ -37,7 +38,7 @@ from servotwin.identification.fitting.diagnosis.drifts import (
     lost_pulses,
     warming,
 )
-from servotwin.identification.fitting.fit import Trace, findings
+from servotwin.identification.fitting.fit import Trace
 from servotwin.identification.fitting.free import LUMPED, nominal
 from servotwin.identification.fitting.task import Task
 from servotwin.identification.fitting.uncertainty import rows_of

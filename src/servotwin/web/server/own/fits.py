@@ -158,7 +158,7 @@ class Fits:
 
 
 def _usual(kind: type[Model], servo: Servo) -> tuple[str, ...]:
-    from servotwin.identification.fitting.fit import usual_free
+    from servotwin.identification.fitting.checks import usual_free
 
     return usual_free(kind(servo))
 
