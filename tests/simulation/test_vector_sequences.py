@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import servotwin as st
-from servotwin.errors import ServotwinError
 from servotwin.simulation.lanes.lane_numbers import LaneNumbers
 from servotwin.simulation.lanes.store import Store
 from simulation.test_retuned import HEAT, SERVOS
@@ -29,7 +28,7 @@ def numbers_of(model):
 
 
 def drawn(seed):
-    """Return a model, what its lanes have at first, and what is done with them: each a word and arguments."""
+    """Return a model, what its lanes have at first, what is done with them, each a word and arguments, and options."""
     rng = np.random.default_rng((seed, 53))
     kind, name, changes = KINDS[list(KINDS)[seed % len(KINDS)]]
     model = kind(st.load_servo(name).replace(changes))
@@ -55,18 +54,20 @@ def drawn(seed):
         elif what == 3:
             done.append(("set", {"lanes": which, "output_speed": rng.uniform(-1.0, 1.0, some)}))
         elif what == 4:
+            done.append(("set", {"lanes": which, "bus_voltage": rng.uniform(4.5, 6.5, some)}))
+        elif what == 5:
             done.append(("reset", {"lanes": which, "command_angle": rng.uniform(0.0, 0.6, some)}))
         else:
             done.append(("advance", {"duration": rng.choice([1e-3, 4e-3, 0.02, 0.013, 0.0371]),
                                      "command_angle": rng.uniform(0.0, 0.7, LANES)}))
-    return model, first, done
+    return model, first, done, {"watch_supply": seed % 7 == 3, "dtype": "float32" if seed % 5 == 4 else "float64"}
 
 
-def ran(model, first, done, lanes=slice(None)):
+def ran(model, first, done, more, lanes=slice(None)):
     """Return all that shows of some lanes after each of these."""
     every = np.arange(LANES)[lanes]
     own = {name: value[every] for name, value in first.items()}
-    sims = st.VectorSimulator(model, len(every), parameters=own, threads=1, seed=int(every[0]))
+    sims = st.VectorSimulator(model, len(every), parameters=own, threads=1, seed=int(every[0]), **more)
     sims.reset(command_angle=0.1)
     place = np.full(LANES, -1)
     place[every] = np.arange(len(every))
@@ -89,22 +90,19 @@ def ran(model, first, done, lanes=slice(None)):
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_numbers_in_place_are_numbers_laid_out_anew(seed, monkeypatch):
-    model, first, done = drawn(seed)
-    try:
-        quick = ran(model, first, done)
-    except ServotwinError:
-        pytest.skip("a number that is drawn is not possible")
+    model, first, done, more = drawn(seed)
+    within = 1e-8 if more["dtype"] == "float64" else 1e-4  # what float32 rounds where lanes are laid out anew
+    quick = ran(model, first, done, more)
     monkeypatch.setattr(Store, "takes", lambda self, part, which, names: False)
     monkeypatch.setattr(LaneNumbers, "retuned", lambda self, which, parameters: False)
-    for step, (now, then) in enumerate(zip(quick, ran(model, first, done), strict=True)):
-        np.testing.assert_allclose(now, then, rtol=1e-8, atol=1e-8, err_msg=f"{step}: {done[step][0]}")
+    for step, (now, then) in enumerate(zip(quick, ran(model, first, done, more), strict=True)):
+        np.testing.assert_allclose(now, then, rtol=within, atol=within, err_msg=f"{step}: {done[step][0]}")
 
 
 @pytest.mark.parametrize("seed", SEEDS[:12])
 def test_a_lane_by_itself_is_the_lane_among_others(seed):
-    model, first, done = drawn(seed)
-    together = ran(model, first, done)
-    alone = ran(model, first, [(word, asked) for word, asked in done], slice(2, 3))
+    model, first, done, more = drawn(seed)
+    together, alone = ran(model, first, done, more), ran(model, first, done, more, slice(2, 3))
     those = [shown[:, 2:3] for shown, (word, asked) in zip(together, done, strict=True)
              if word == "advance" or 2 in asked["lanes"]]
     for step, (now, then) in enumerate(zip(alone, those, strict=True)):
