@@ -101,6 +101,28 @@ def test_lanes_beside_those_that_change_keep_their_bits():
     assert not np.any(seen[0][[0, 2]] == seen[1][[0, 2]])
 
 
+def test_play_comes_and_goes_in_place(monkeypatch):
+    """Of servos that run by the same kernels with it and without."""
+    def run():
+        sims = st.VectorSimulator(st.DigitalServo(st.load_servo("feetech-sts3215-12v")), 3, threads=1, parameters={
+            "gear.backlash": [0.0, 0.02, 0.02], "gear.output_inertia": 1e-4})
+        sims.reset(command_angle=0.0)
+        seen = []
+        for k in range(40):
+            sims.advance(3e-3, command_angle=0.4 if k % 20 < 10 else 0.1)
+            if k == 12:
+                sims.set(parameters={"gear.backlash": [0.02, 0.0]}, lanes=[0, 1])
+            seen.append([sims[name] for name in ("output_angle", "motor_angle", "output_speed")])
+        return np.array(seen)
+
+    quick = run()
+    monkeypatch.setattr(Store, "takes", lambda self, part, which, names: False)
+    np.testing.assert_allclose(quick, run(), rtol=1e-9, atol=1e-9)
+    reduction = st.load_servo("feetech-sts3215-12v").get("gear.gear_reduction")
+    apart = np.abs(quick[:, 1] / reduction - quick[:, 0])
+    assert apart[13:, 1].max() < 1e-12 < 1e-3 < apart[13:, 0].max()
+
+
 def test_lanes_keep_their_own_loads():
     """A number of a load that changes in one lane leaves those of the others."""
     loads = [st.loads.Inertia(1e-4), st.loads.Inertia(2e-4), st.loads.Inertia(3e-4)]
