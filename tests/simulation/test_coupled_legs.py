@@ -10,6 +10,7 @@ import servotwin as st
 from leg_draws import drawn, goals, spread
 from servotwin.models.engine.legs import coupled_legs, coupled_ticks, coupled_units
 from servotwin.models.engine.legs.coupled_units import Coupling, Unit, put_unit_numbers
+from servotwin.models.engine.memory import FRAMES
 from servotwin.models.state.modes import BACKWARD, FORWARD
 from servotwin.models.state.records import object_of
 from servotwin.models.terms.source import Source
@@ -132,6 +133,16 @@ def test_a_warm_lane_is_the_servo_alone(seed):
     lane = st.simulate_many(model, command, outputs=tuple(ACCURATE), **asked)
     for name, most in ACCURATE.items():
         np.testing.assert_allclose(lane[name][0], one[name], rtol=0.0, atol=most)
+
+
+def test_a_warm_lane_goes_on_where_its_times_count_anew():
+    """Twice in a call."""
+    model = st.DigitalServo(st.load_servo("feetech-sts3215-12v").replace(WARM))
+    duration = 2.5 * FRAMES * model.servo.get("firmware.control_period")
+    command = st.signals.samples([0.0, 0.2, 0.45], [0.1, 0.5, 0.2], unit="rad", hold="previous")
+    asked = {"duration": duration, "load": st.loads.Inertia(1e-3), "output_times": np.linspace(0.0, duration, 23)}
+    one, lane = st.simulate(model, command, **asked), st.simulate_many(model, command, **asked)
+    np.testing.assert_allclose(lane["output_angle"][0], one["output_angle"], rtol=0.0, atol=1e-10)
 
 
 @pytest.mark.long
