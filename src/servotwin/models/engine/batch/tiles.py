@@ -313,7 +313,7 @@ def start(lanes: Lanes, form: int, first: int, size: int, first_output: float, t
         put_servo(tile.servo, j, Servo(
             y[0, lane], y[1, lane], 0.0, 0.0, -math.inf, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0,
             y[0, lane], y[2, lane], y[3, lane], y[4, lane], y[5, lane], y[6, lane],
-            INSIDE if form == GAPS else RIGID, FIRST_STEP))
+            INSIDE if form == GAPS and numbers_of(lanes, lane).play.half > 0.0 else RIGID, FIRST_STEP))
     for j in range(size):
         own = lanes.edge_count[first + j]
         late = lanes.edges[lanes.edge_first[first + j]] if own > 0 else math.inf if own == 0 else 0.0
