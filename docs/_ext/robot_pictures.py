@@ -10,7 +10,7 @@ import numpy as np
 
 import servotwin as st
 from servotwin import plotting
-from servotwin.cli.robot_task_files import joint_uses
+from servotwin.cli.robot_task_report import joint_uses
 from servotwin.robots import AwayFromLimits, LeastMotion, LeastTorque, run_task, scara, task_path
 from servotwin.robots.comparison import NOMINAL, Case, Comparison
 

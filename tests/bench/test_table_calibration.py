@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 import servotwin as st
 from servotwin.bench import calibrate_table
 from servotwin.bench.table_words import plus_minus, residual_pattern
-from servotwin.cli.fit_table import calibrate_from
+from servotwin.cli.fit_report import calibrate_from
 from servotwin.errors import InputError, OutputExistsError
 
 SOURCE = "Table II"

@@ -9,15 +9,16 @@ import typer
 pytest.importorskip("cv2", reason="the extra `video` is not installed")
 
 from bench.clips import Scene, film
-from servotwin.cli import app, bench_video
+from servotwin.cli import app
+from servotwin.cli.bench import marker, video
 from servotwin.logs import read_logs
 
 
 @pytest.fixture
 def bench(cli, monkeypatch):
     whole, group = typer.Typer(), typer.Typer()
-    group.command("marker")(bench_video.marker)
-    group.command("video")(bench_video.video)
+    group.command("marker")(marker)
+    group.command("video")(video)
     whole.add_typer(group, name="bench")
     monkeypatch.setattr(app, "app", whole)
     return lambda *words: cli("bench", *words)

@@ -194,7 +194,7 @@ def test_an_arm_is_horizontal_in_the_middle_of_the_travel(simulate):
     ("coulomb=1 oz.in", st.loads.Coulomb(0.028349523125 * 9.80665 * 0.0254)),
 ])
 def test_loads_have_units(words, load):
-    from servotwin.cli.load_words import load_from
+    from servotwin.cli.option_values import load_from
 
     found = load_from([words])
     for name in ("torque", "inertia", "coulomb_torque"):

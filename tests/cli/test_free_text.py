@@ -93,17 +93,16 @@ ELSEWHERE = {
 }
 # Modules that write files or make their contents; a new one has to show here what names do in it
 WRITERS = {
-    "bench/recording/recorder.py", "bench/recording/wiring.py", "bench/video/film_log.py",
-    "bench/video/marker.py", "cli/bench_calibrate.py", "cli/bench_paper.py", "cli/bench_video.py", "cli/curves.py",
-    "cli/curves_page.py", "cli/linear.py", "cli/linear_page.py", "cli/log.py", "cli/robot_compare.py",
-    "cli/robot_files.py", "cli/robot_fit.py", "cli/robot_mobile_files.py", "cli/robot_task_files.py",
-    "cli/robot_validate.py", "cli/web.py", "export/c_text.py", "export/fmu.py", "export/fmu_binary.py",
-    "identification/report/page.py", "identification/report/parts.py",
-    "identification/report/validation.py", "identification/sheets/sheet.py", "logs/csv_logs.py",
-    "logs/sidecar.py", "look/files.py", "paper/report.py", "parameters/output_file.py", "parameters/servo_file.py",
-    "plotting/files.py", "plotting/formula.py", "simulation/compile/building.py", "simulation/compile/storage.py",
-    "simulation/result.py", "simulation/lanes/c_entry.py", "studies/folder.py", "tables/columns.py",
-    "web/alone/kernel.py", "web/server/own/reading.py", "web/server/own/work.py", "wire/keeping.py", "wire/traffic.py",
+    "bench/recording/recorder.py", "bench/recording/wiring.py", "bench/video/film_log.py", "bench/video/marker.py",
+    "cli/bench.py", "cli/curves.py", "cli/curves_report.py", "cli/linear.py", "cli/linear_report.py", "cli/log.py",
+    "cli/robot.py", "cli/robot_report.py", "cli/robot_task_report.py", "cli/robot_tasks.py", "cli/web.py",
+    "export/c_text.py", "export/fmu.py", "export/fmu_binary.py", "identification/report/page.py",
+    "identification/report/parts.py", "identification/report/validation.py", "identification/sheets/sheet.py",
+    "logs/csv_logs.py", "logs/sidecar.py", "look/files.py", "paper/report.py", "parameters/output_file.py",
+    "parameters/servo_file.py", "plotting/files.py", "plotting/formula.py", "simulation/compile/building.py",
+    "simulation/compile/storage.py", "simulation/lanes/c_entry.py", "simulation/result.py", "studies/folder.py",
+    "tables/columns.py", "web/alone/kernel.py", "web/server/own/reading.py", "web/server/own/work.py",
+    "wire/keeping.py", "wire/traffic.py",
 }
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as some
 from typer.main import get_command
 
 import servotwin as st
-from servotwin.cli import layout, main, terminal
+from servotwin.cli import main, terminal
 from servotwin.cli.app import app
 
 ROOT = Path(__file__).parents[2]
@@ -111,7 +111,7 @@ CELLS = some.lists(some.sampled_from([
     some.integers(1, 150))
 def test_a_table_of_any_width_has_all_words_whole(drawn, width):
     header, rows = drawn
-    lines = [line.text for line in layout.table_lines(header, rows, width)]
+    lines = [line.text for line in terminal.table_lines(header, rows, width)]
     shown = Counter(" ".join(lines).split())
     assert set(shown) - {"|"} <= {word for row in [header, *rows] for cell in row for word in cell.split()}
     for row in rows:  # a name may stand again behind each row, a value stands as often as it is there
@@ -122,13 +122,13 @@ def test_a_table_of_any_width_has_all_words_whole(drawn, width):
 
 @given(some.lists(some.tuples(CELLS, CELLS), max_size=5), some.integers(1, 150))
 def test_pairs_of_any_width_have_all_words_whole(rows, width):
-    lines = [line.text for line in layout.pair_lines(rows, width)]
+    lines = [line.text for line in terminal.pair_lines(rows, width)]
     assert Counter(" ".join(lines).split()) == Counter(" ".join(f"{a} {b}" for a, b in rows).split())
 
 
 def test_a_number_stays_with_its_unit():
     for width in range(20, 60):
-        text = "\n".join(layout.wrapped("holding 0.46 N m with 10.8 deg (6.2 to 21.3) and 1.02 A, 45 % of it", width))
+        text = "\n".join(terminal.wrapped("holding 0.46 N m with 10.8 deg (6.2 to 21.3) and 1.02 A, 45 % of it", width))
         for whole in ("0.46 N m", "10.8 deg", "(6.2 to 21.3)", "1.02 A", "45 %"):
             assert whole in text
 

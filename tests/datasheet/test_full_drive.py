@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import servotwin as st
-from servotwin.cli.servo_facts import twin_torque
+from servotwin.cli.summary import twin_torque
 from servotwin.datasheet import FullDrive
 from servotwin.errors import InputError
 from servotwin.models import default_model

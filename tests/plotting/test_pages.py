@@ -12,7 +12,7 @@ import pytest
 
 import servotwin as st
 from servotwin import plotting
-from servotwin.cli import linear_page
+from servotwin.cli import linear_report
 from servotwin.datasheet import Bandwidth, Loop
 from servotwin.errors import InputError
 from servotwin.identification.fitting.holdout import ErrorTable, LogError
@@ -57,7 +57,7 @@ def errors(count):
 
 def sines(count, page):
     one = np.ones(len(TIME), np.complex128)
-    return linear_page.by_amplitude(SimpleNamespace(
+    return linear_report.by_amplitude(SimpleNamespace(
         frequency=TIME + 1.0, mean=None, loops={}, simulated=SimpleNamespace(response=np.tile(one, (count, 1))),
         sines=[SimpleNamespace(amplitude=np.radians(k + 1.0), described=None) for k in range(count)]), page)
 
@@ -125,7 +125,7 @@ PICTURES = {
     "ranking": Case("plotting.ranking.CURVES_A_PAGE", lambda n, page: plotting.ranking(
         ["plain", "PID"], {name: [10.0**k, np.nan] for k, name in enumerate(names(n))}, x_label="error (mm)",
         page=page), lines()),
-    "sines": Case("cli.linear_page.CURVES_A_PAGE", sines, lambda figure: [
+    "sines": Case("cli.linear_report.CURVES_A_PAGE", sines, lambda figure: [
         f"item {int(label.split()[2][:-2]) - 1}" for label in lines()(figure) if label.startswith("sines")],
         scaled=False),
     "errors": Case("identification.report.pictures.VALUES_A_PAGE", lambda n, page: report_pictures.errors(

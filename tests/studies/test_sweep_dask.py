@@ -63,7 +63,7 @@ def test_the_command_finds_the_scheduler(cluster, tmp_path, monkeypatch, capsys)
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_a_scheduler_without_workers_is_waited_for_and_said():
-    from servotwin.cli.scheduler import executor_at
+    from servotwin.cli.sweep import executor_at
 
     with (distributed.LocalCluster(n_workers=0, dashboard_address=":0", silence_logs=60) as idle,
           pytest.warns(UserWarning, match="has no worker yet"), executor_at(idle.scheduler_address) as executor):

@@ -2,20 +2,671 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from servotwin.cli.catalog_registers import registers
-from servotwin.cli.catalog_which import which
-from servotwin.cli.from_sheet import from_sheet
-from servotwin.cli.terminal import emit_help, emit_json, pairs, patience, show, table
+from servotwin.cli import shared_options as shared
+from servotwin.cli.robot_options import ContactOption, PackageOption
+from servotwin.cli.terminal import emit_help, emit_json, pairs, patience, show, table, with_span
 
 if TYPE_CHECKING:
-    from servotwin.parameters import Servo
+    from collections.abc import Sequence
+
+    from rich.console import RenderableType
+
+    from servotwin.cli.which_words import Judged, Prices
+    from servotwin.datasheet.choice import Limits
+    from servotwin.identification import Sheet
+    from servotwin.parameters import Servo, Supply
+    from servotwin.robots import Motion
+    from servotwin.robots.model_file import Plant
+
+
+
+# --- `servotwin catalog registers` ------------------------------------------------------------------------------------
+
+def registers(
+    model: Annotated[str | None, typer.Argument(
+        metavar="MODEL", help="A model such as XL330-M288; none: all models, and how many values are assumed.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Show the registers of bus servos."""
+    if model is None:
+        _all(as_json=as_json)
+    else:
+        _one(model, as_json=as_json)
+
+
+def _all(*, as_json: bool) -> None:
+    from servotwin.parameters.registers.listing import listed_models
+
+    found = [{"family": each.family, "model": each.name, "number": each.number, "registers": each.rows,
+              "assumed": each.assumed, "page": each.page} for each in listed_models()]
+    if as_json:
+        emit_json(found)
+        return
+    rows = [(str(each["family"]), str(each["model"]), str(each["number"]), str(each["registers"]),
+             str(each["assumed"]), str(each["page"]) or "none was seen") for each in found]
+    show(table(("family", "model", "number", "registers", "assumed", "page"), rows))
+
+
+def _one(name: str, *, as_json: bool) -> None:
+    from servotwin.parameters.registers.listing import listed_model, rows_of
+
+    model = listed_model(name)
+    rows: list[dict[str, Any]] = [row._asdict() for row in rows_of(model)]
+    facts = {"family": model.family, "model": model.name, "number": model.number, "registers": model.rows,
+             "assumed": model.assumed, "page": model.page}
+    if as_json:
+        emit_json({**facts, "rows": rows})
+        return
+    show(pairs([("family", model.family), ("model number", str(model.number)), ("page", model.page or "none was seen"),
+                ("registers", f"{model.rows}, {model.assumed} of them assumed")]), "",
+         table(("address", "register", "new", "range", "printed in"),
+               [(str(row["address"]), row["name"], str(row["value"]), f"{row['lower']} to {row['upper']}",
+                 row["document"] or "assumed") for row in rows]))
+
+
+# --- `servotwin catalog which` ----------------------------------------------------------------------------------------
+
+_WHY = {"torque": "lack the torque", "time": "are too slow", "voltage": "are not for this voltage",
+        "current": "draw too much", "mass": "are too heavy", "travel": "do not travel so far",
+        "kind": "are of another kind", "price": "cost too much", "motion": "do not follow the motion"}
+_MOST = 8  # candidates of which what takes seconds is simulated, unless they are named
+_USUAL = "6"  # V
+_TASK, _LIMITS = "Task", "Candidates and limits"
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Asked:
+    """What is to be done, on which supply, within which limits."""
+
+    lift: tuple[float, float] | None
+    motion: Motion | None
+    plant: Plant | None
+    robot: str | None
+    joints: tuple[str, ...]
+    at: Supply | float
+    bus: Supply | None
+    limits: Limits
+    named: bool
+    overlap: str
+
+    @property
+    def words(self) -> str:
+        """The task in words."""
+        parts = []
+        if self.lift is not None:
+            mass, arm = self.lift
+            parts.append(f"{1e3 * mass:.4g} g on {1e2 * arm:.4g} cm ({mass * 9.80665 * arm:.3g} N m)")
+        if self.robot is not None:
+            parts.append(self.robot)
+        if self.motion is not None:
+            parts.append(f"{self.motion.source}, {self.motion.duration:.4g} s")
+        parts = [" along ".join(parts) or "any task"]
+        volts = self.at if isinstance(self.at, float) else self.at.open_circuit_voltage
+        parts.append(f" at {volts:g} V")
+        if self.bus is not None and self.bus.current_limit is not None:
+            parts.append(f", {self.bus.current_limit:g} A")
+        if self.limits.time is not None:
+            parts.append(f", 60 deg within {self.limits.time:g} s")
+        return "".join(parts)
+
+
+def which(
+    lift: Annotated[str | None, typer.Option(
+        metavar="MASS", help="Mass to lift, such as 0.5kg, 120g, 4oz or 1lb; with --arm.",
+        rich_help_panel=_TASK)] = None,
+    arm: Annotated[str | None, typer.Option(
+        metavar="LENGTH", help="Length of the arm, such as 10cm, 80mm or 4in.", rich_help_panel=_TASK)] = None,
+    motion: Annotated[Path | None, typer.Option(
+        metavar="FILE", help="Motion to follow, a table with time_s and a column such as arm_deg: of the arm of "
+        "--lift, horizontal at 0, or of the joints of --robot.", rich_help_panel=_TASK)] = None,
+    robot: Annotated[str | None, typer.Option(
+        metavar="MODEL.xml", help="Robot whose joints follow --motion: MJCF or URDF file, or so101. Each candidate is "
+        "put at all of its hinges.", rich_help_panel=_TASK)] = None,
+    contact: ContactOption = None, package: PackageOption = None,
+    joint: Annotated[list[str] | None, typer.Option(
+        metavar="NAME", help="Joint of the motion that counts, repeatable (default: all).", rich_help_panel=_TASK)]
+    = None,
+    voltage: Annotated[str | None, typer.Option(
+        metavar="VOLTS", help=f"Supply voltage (default: {_USUAL}).", rich_help_panel=_TASK)] = None,
+    supply: shared.SupplyOption = None,
+    among: Annotated[list[str] | None, typer.Option(
+        metavar="ID", help="Candidates, with commas or repeatable: catalog ids, or paths of servo files (default: the "
+        "catalog, or the servos of --prices).", rich_help_panel=_LIMITS)] = None,
+    limit: Annotated[list[str] | None, typer.Option(
+        metavar="NAME=VALUE", help="Limit, repeatable or with commas: current=1A, mass=60g, time=0.2s, price=20 at "
+        "most; travel=180deg at least; voltage=7.4V, which the sheet has to reach; kind=analog, digital or bus.",
+        rich_help_panel=_LIMITS)] = None,
+    prices: Annotated[Path | None, typer.Option(
+        metavar="FILE.csv", help="Prices: columns servo and price, or such as price_EUR.",
+        rich_help_panel=_LIMITS)] = None,
+    time: Annotated[str | None, typer.Option(
+        metavar="SECONDS", help="Longest time allowed for 60 degrees, as --limit time=: with --lift from 30 below the "
+        "horizontal to 30 above, else without load.", rich_help_panel=_LIMITS)] = None,
+    register: shared.RegisterOption = None,
+    why: Annotated[bool, typer.Option(
+        "--why", help="Also list the servos that cannot, and why.", rich_help_panel=shared.OUTPUT)] = False,
+    as_json: shared.JsonOption = False,
+) -> None:
+    """List the servos that do a task within limits, side by side, and say why the others do not."""
+    from servotwin.cli.option_values import asked_lift
+    from servotwin.cli.robot_options import overlap_of
+    from servotwin.cli.which_words import limits_of, prices_of
+
+    bounds, shop = limits_of(limit or [], time), None if prices is None else prices_of(prices)
+    named = [name.strip() for word in among or [] for name in word.split(",") if name.strip()]
+    at, bus = _supply(voltage, supply)
+    weight = asked_lift(lift, arm)
+    if not (weight or motion or robot or joint or limit or time or among or prices):
+        raise _nothing()
+    plant, followed = _motion(motion, robot, joint or [], weight, package or [])
+    asked = _Asked(lift=weight, motion=followed, plant=plant, robot=robot, joints=tuple(joint or ()), at=at, bus=bus,
+                   limits=bounds, named=bool(named), overlap=overlap_of(contact))
+    servos = _servos(named, shop, prices, bounds, register or [])
+    found = _judged(servos, asked, shop)
+    if as_json:
+        emit_json(_facts(asked, found))
+        return
+    show(asked.words, *_told(found, asked, shop, why=why))
+
+
+def _nothing() -> Exception:
+    from servotwin.errors import InputError
+
+    return InputError("nothing is asked", allowed="--lift MASS --arm LENGTH, --motion FILE, --limit NAME=VALUE or "
+                      "--among ID,ID")
+
+
+def _supply(voltage: str | None, supply: str | None) -> tuple[Supply | float, Supply | None]:
+    from servotwin.errors import InputError
+    from servotwin.parameters import Supply
+    from servotwin.units.quantities import quantity
+
+    if supply is None:
+        return quantity("--voltage", voltage or _USUAL, "voltage", bare=True, positive=True), None
+    if voltage is not None:
+        raise InputError("--supply", got=f"also --voltage {voltage}", allowed="one of them")
+    found = Supply.of(supply, what="--supply")
+    return found, found
+
+
+def _motion(path: Path | None, robot: str | None, joints: list[str], lift: tuple[float, float] | None,
+            packages: list[str]) -> tuple[Plant | None, Motion | None]:
+    """Return robot and motion; without a robot that of an arm, whose joint is the column of the table."""
+    from servotwin.errors import InputError
+
+    if path is None:
+        if robot is not None or joints:
+            raise InputError("--robot" if robot is not None else "--joint", allowed="--motion FILE beside it")
+        return None, None
+    from servotwin.cli.robot_options import as_options, packages_of
+    from servotwin.robots import joint_names, joint_ranges, read_motion
+    from servotwin.robots.choice import arm_of, moved_joints
+    from servotwin.robots.model_file import plant_of
+
+    if robot is not None and lift is not None:
+        raise InputError("--robot", got="also --lift", allowed="one of them: a robot has its own masses")
+    plant = plant_of(arm_of(_column(path, joints), lift) if robot is None else robot, packages_of(packages))
+    with as_options(), patience(f"reading {path}"):
+        found = read_motion(path, joint_names(plant.model), ranges=joint_ranges(plant.model))
+    moved_joints(plant, found, joints)
+    return plant, found
+
+
+def _column(path: Path, joints: list[str]) -> str:
+    """Return the joint of a table of one joint: its column without the unit."""
+    from servotwin.errors import InputError
+    from servotwin.tables import read_table
+    from servotwin.units.words import unit_word
+
+    header = [name for name in read_table(path, lambda name: name.startswith("time")).header
+              if name and not name.startswith("time")]
+    names = [name.rpartition("_")[0] if "_" in name and unit_word(name.rpartition("_")[2]) else name
+             for name in header]
+    if joints and joints[0] not in names:
+        raise InputError(f"--joint {joints[0]}", got=f"no column of it in {path}", allowed=", ".join(names) or "none")
+    if len(names) != 1:
+        raise InputError(f"{path}: columns", got=", ".join(header) or "none but time",
+                         allowed="time_s and one such as arm_deg; --robot MODEL.xml takes several joints")
+    return names[0]
+
+
+def _servos(named: list[str], shop: Prices | None, file: Path | None, limits: Limits, register: list[str]
+            ) -> list[tuple[Servo, float]]:
+    """Return the candidates with their prices."""
+    from servotwin.cli.shared_options import with_registers
+    from servotwin.errors import InputError, UnknownNameError
+    from servotwin.parameters import catalog_names, load_servo
+
+    if limits.price is not None and shop is None:
+        raise InputError("--limit price", allowed="--prices FILE.csv beside it")
+    repeated = next((name for name in named if named.count(name) > 1), None)
+    if repeated is not None:
+        raise InputError("--among", got=f"{repeated!r} twice", allowed="each once")
+    names = named or (list(catalog_names()) if shop is None else list(shop.of))
+    missing = None if shop is None else next((name for name in names if name not in shop.of), None)
+    if missing is not None:
+        load_servo(missing)  # an unknown one is said to be that
+        raise InputError(f"{file}: price of {missing}", got="none", allowed="a row of each servo of --among")
+    found = []
+    with patience("reading the catalog"):
+        for name in names:
+            try:
+                servo = load_servo(name)
+            except UnknownNameError as error:
+                if named:
+                    raise
+                raise InputError(f"{file}: {error}") from None
+            own = with_registers(servo, register) if servo.kind == "bus" else servo
+            found.append((own, math.nan if shop is None else shop.of[name]))
+    return found
+
+
+def _judged(servos: Sequence[tuple[Servo, float]], asked: _Asked, shop: Prices | None) -> list[Judged]:
+    """Return all candidates in the order in which one would take them: the lightest first, or the cheapest."""
+    from dataclasses import replace
+
+    from servotwin.cli.which_words import Judged
+    from servotwin.datasheet.choice import candidate, standing_of
+
+    limits = asked.limits if asked.motion is None else replace(asked.limits, current=None)  # that of the run counts
+    lift = asked.lift if asked.motion is None else None
+    with patience("asking the catalog"):
+        found = [Judged(candidate(servo, asked.at, lift=lift, limits=limits, price=price)) for servo, price in servos]
+    found.sort(key=lambda each: _order(each, shop))
+    if asked.motion is not None:
+        with patience("following the motion"):
+            found = [_tried(each, asked) for each in found]
+    shown = [each for each in found if each.candidate.suits][:None if asked.named else _MOST]
+    if asked.named:  # those that do not suit stand beside them too
+        shown = [each for each in found if each.candidate.model is not None and not each.candidate.model.endless]
+    with patience("simulating where they stand"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        rests = {id(each): standing_of(each.candidate.model, lift, ranges=asked.named) for each in shown
+                 if each.candidate.model is not None}
+    return [each._replace(rest=rests.get(id(each))) for each in found]
+
+
+def _tried(each: Judged, asked: _Asked) -> Judged:
+    from servotwin.robots.choice import try_motion
+
+    if asked.motion is None or asked.plant is None or each.candidate.model is None or (
+            each.candidate.reasons and not asked.named):
+        return each
+    tried = try_motion(each.candidate, asked.plant, asked.motion, joints=asked.joints, bus=asked.bus,
+                       limits=asked.limits, overlap=asked.overlap)
+    return each._replace(candidate=tried.candidate, tried=tried)
+
+
+def _order(each: Judged, shop: Prices | None) -> tuple[Any, ...]:
+    """Unknown masses come last."""
+    made = each.candidate
+    price = 0.0 if shop is None else made.price
+    return price, math.isnan(made.mass), made.mass, -made.margin, made.servo.name
+
+
+def _told(found: list[Judged], asked: _Asked, shop: Prices | None, *, why: bool) -> list[Any]:
+    from servotwin.cli import which_words as words
+
+    able = [each for each in found if each.candidate.suits]
+    unable = [each.candidate for each in found if not each.candidate.suits]
+    shown = found if asked.named else able
+    current = asked.limits.current is not None
+    parts: list[Any] = ["", table(*words.suiting_table(shown, shop, current=current))] if shown else []
+    if not able:
+        parts += [*([""] if shown else []), f"no servo of {'these' if asked.named else 'the catalog'} can"]
+    if unable and (why or asked.named):
+        parts += ["", table(("cannot", "why"), [(each.servo.name, words.why(each)) for each in unable])]
+    notes = words.note_pairs(shown)
+    parts += ["", pairs(notes)] if notes else []
+    count = Counter(each.reasons[0].kind for each in unable)
+    cannot = ", ".join(f"{count[kind]} {phrase}" for kind, phrase in _WHY.items() if count[kind])
+    if not asked.named:
+        parts += ["", f"{len(unable)} cannot: {cannot}" if cannot else "all that were asked can"]
+    return [*parts, *_footnotes(shown, asked)]
+
+
+def _footnotes(shown: list[Judged], asked: _Asked) -> list[str]:
+    """Return what one has to know to read the table."""
+    notes, looked = [], [each for each in shown if each.rest is not None]
+    if len(looked) < len(shown) and not asked.named:
+        notes.append(f"what takes long is simulated of the first {len(looked)}; --among ID,ID names others")
+    if asked.motion is not None and shown:
+        notes.append("margin, off by (rms) and draws: the worst joint; 10 min: winding, if the motion is "
+                     "repeated")
+    elif asked.lift is not None and shown:
+        notes.append("10 min: winding, after holding the arm horizontal; droop: below its command there")
+    task = asked.motion is not None or asked.lift is not None
+    if shown and task and any(each.candidate.servo.thermal.winding_capacity is None for each in shown):
+        notes[-1] += "; thermal numbers assumed by mass"
+    if any(each.rest is not None and each.rest.move_span is not None for each in looked):
+        notes.append("ranges in brackets: with what is assumed at the ends of its range")
+    return notes
+
+
+def _facts(asked: _Asked, found: list[Judged]) -> dict[str, Any]:
+    from servotwin.cli.which_words import candidate_facts
+
+    mass, arm = asked.lift or (math.nan, math.nan)
+    at = asked.at
+    able = [candidate_facts(each) for each in found if each.candidate.suits]
+    unable = [candidate_facts(each) for each in found if not each.candidate.suits]
+    return {
+        "torque": mass * 9.80665 * arm, "supply_voltage": at if isinstance(at, float) else at.open_circuit_voltage,
+        "current_limit": None if isinstance(at, float) else at.current_limit,
+        "motion": None if asked.motion is None else asked.motion.source, "found": able,
+        "refused": [{**each, "kind": each["reasons"][0]["kind"], "reason": each["reasons"][0]["text"],
+                     "servo_kind": each["kind"]} for each in unable]}
+
+
+# --- `servotwin catalog from-sheet`: what a maker prints becomes a servo file -----------------------------------------
+
+_POINT, _WHOLE, _MANY, _OUTPUT = ("At a supply voltage (repeatable)", "Whole servo", "Other ways to give a sheet",
+                                  "Result")
+_Figures = list[str] | None
+
+
+def _at(metavar: str, text: str) -> Any:
+    return typer.Option(metavar=metavar, help=text, rich_help_panel=_POINT)
+
+
+def _of(metavar: str, text: str) -> Any:
+    return typer.Option(metavar=metavar, help=text, rich_help_panel=_WHOLE)
+
+
+def from_sheet(
+    again: Annotated[str | None, typer.Argument(
+        metavar="SERVO", help="A servo whose own \\[sheet] to use: catalog id, or path.")] = None,
+    torque: Annotated[_Figures, _at('"1.29 N m @6.0"', "Stall torque: N m, N cm, kgf.cm, oz.in.")] = None,
+    speed: Annotated[_Figures, _at('"0.23 s/60deg @6.0"', "No-load speed: s/60deg, deg/s, rad/s, rpm.")] = None,
+    running_current: Annotated[_Figures, _at('"285 mA @6.0"', "Current when running without load: A, mA.")] = None,
+    stall_current: Annotated[_Figures, _at('"1.8 A @6.0"', "Current with the shaft held still: A, mA.")] = None,
+    idle_current: Annotated[_Figures, _at('"9 mA @6.0"', "Current at rest: A, mA.")] = None,
+    at: Annotated[str | None, typer.Option(
+        metavar="VOLTAGE", help="Supply voltage for figures that do not name one.", rich_help_panel=_POINT)] = None,
+    name: Annotated[str | None, _of("ID", "Short id, such as my-servo.")] = None,
+    title: Annotated[str | None, _of("TEXT", "Name for human readers.")] = None,
+    voltage_range: Annotated[str | None, _of('"4.8-7.2 V"', "Supply voltages that the maker states.")] = None,
+    deadband: Annotated[str | None, _of('"8 us"', "Deadband, taken as its full width.")] = None,
+    pulse_range: Annotated[str | None, _of('"500-2500 us"', "Pulse widths between which the servo turns.")] = None,
+    travel: Annotated[str | None, _of('"180 deg"', "Angle between these pulses; endless: as --continuous.")] = None,
+    continuous: Annotated[bool, typer.Option(
+        "--continuous", help="Turns without end: a pulse is a speed, the deadband the pulses at which it stands.",
+        rich_help_panel=_WHOLE)] = False,
+    rate: Annotated[str | None, _of('"45 deg/400us"', "Angle per pulse width.")] = None,
+    neutral: Annotated[str | None, _of('"1500 us"', "Pulse width at the middle position.")] = None,
+    stops: Annotated[str | None, _of('"200 deg"', "Angle from stop to stop.")] = None,
+    mass: Annotated[str | None, _of('"40 g"', "Mass: g, kg, oz.")] = None,
+    gear_ratio: Annotated[str | None, _of("280:1", "Motor turns per output turn.")] = None,
+    backlash: Annotated[str | None, _of('"0.5 deg"', "Play of the gear.")] = None,
+    motor_type: Annotated[str, _of("TEXT", "Such as 3-pole or coreless.")] = "",
+    modulation: Annotated[str, _of("WORD", "analog, digital or bus.")] = "",
+    registers: Annotated[str, _of("WORD", "Of a bus servo: feetech-sts, dynamixel-x, -mx or -ax.")] = "",
+    source: Annotated[str, _of("TEXT", "Where the figures come from.")] = "",
+    note: Annotated[str, _of("TEXT", "Remark for human readers.")] = "",
+    list_file: Annotated[Path | None, typer.Option(
+        "--csv", metavar="FILE", help="A list of servos, one row for each servo and voltage: maker, model, V, "
+        "stall_torque_Nm, speed_s_per_60deg, ... (see the guide).", rich_help_panel=_MANY)] = None,
+    plain: Annotated[bool, typer.Option(
+        "--plain", help="Leave out play and the gear losses that grow with the load: faster, but too strong.",
+        rich_help_panel=_OUTPUT)] = False,
+    allow_impossible: Annotated[bool, typer.Option(
+        "--allow-impossible", help="Make a servo even from a sheet that contradicts itself, and flag it.",
+        rich_help_panel=_OUTPUT)] = False,
+    out: Annotated[Path | None, typer.Option(
+        metavar="FILE.toml", help="Write the servo file; with --csv, a folder.", rich_help_panel=_OUTPUT)] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace existing files.", rich_help_panel=_OUTPUT)] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.", rich_help_panel=_OUTPUT)] = False,
+) -> None:
+    """Make a servo file from a data sheet."""
+    points = {"stall_torque": torque, "no_load_speed": speed, "no_load_current": running_current,
+              "stall_current": stall_current, "idle_current": idle_current}
+    whole = {"name": name, "title": title, "voltage_range": voltage_range, "deadband": deadband,
+             "pulse_range": pulse_range, "travel": travel, "rate": rate, "neutral": neutral, "stops": stops,
+             "mass": mass, "gear_ratio": gear_ratio, "backlash": backlash, "continuous": continuous,
+             "motor_type": motor_type, "modulation": modulation, "registers": registers, "source": source,
+             "note": note}
+    typed = [f"--{option.replace('_', '-')}" for option, given in (
+        *whole.items(), ("torque", torque), ("speed", speed), ("running-current", running_current),
+        ("stall-current", stall_current), ("idle-current", idle_current), ("at", at)) if given]
+    how = {"load_friction": not plain, "backlash": not plain, "allow_impossible": allow_impossible}
+    if list_file is not None:
+        _one_way("--csv", typed, again)
+        _many(list_file, how, out, force=force, as_json=as_json)
+        return
+    if again is not None:
+        _one_way("SERVO", [word for word in typed if word not in ("--name", "--title")], None)
+    sheet = _again(again, name, title) if again is not None else _sheet(points, whole, at)
+    weighed = any(unit in text for text in torque or () for unit in ("kg", "oz"))
+    _one_sheet(sheet, how, out, weighed=weighed, force=force, as_json=as_json)
+
+
+def _one_way(way: str, typed: list[str], again: str | None) -> None:
+    from servotwin.errors import InputError
+
+    beside = [*typed, *([again] if again is not None else [])]
+    if beside:
+        raise InputError(f"{way} holds the sheet already", got=", ".join(beside), allowed="one way to give a sheet")
+
+
+def _again(servo: str, name: str | None, title: str | None) -> Sheet:
+    from dataclasses import replace
+
+    from servotwin.identification import sheet_of
+    from servotwin.parameters import load_servo
+
+    sheet = sheet_of(load_servo(servo))
+    return replace(sheet, name=name or sheet.name, title=title or (name or sheet.title))
+
+
+def _sheet(points: dict[str, _Figures], whole: dict[str, Any], at: str | None) -> Sheet:
+    from servotwin.cli import option_values as fig
+    from servotwin.errors import InputError
+    from servotwin.identification import Sheet
+    from servotwin.identification.sheets.sheet import ENDLESS
+    from servotwin.units.quantities import quantity
+
+    if not whole["name"]:
+        raise InputError("--name is missing", allowed="a short id, such as --name my-servo")
+    usual = None if at is None else quantity("--at", at, "voltage", bare=True, positive=True)
+    endless = (whole["travel"] or "").strip().lower() in ENDLESS
+    (lowest, highest), (low, high) = (
+        fig.two_ends(f"--{name.replace('_', '-')}", whole[name], dimension) if whole[name] else (None, None)
+        for name, dimension in (("voltage_range", "voltage"), ("pulse_range", "time")))
+
+    def one(option: str, dimension: str) -> float | None:
+        text = whole[option]
+        return None if text is None or (option == "travel" and endless) else quantity(
+            f"--{option}", text, dimension, positive=True)
+
+    return Sheet(
+        name=whole["name"], title=whole["title"] or "", points=_points(points, usual), pulse_min=low, pulse_max=high,
+        voltage_min=lowest, voltage_max=highest, deadband=one("deadband", "time"),
+        neutral_pulse=one("neutral", "time"), travel=one("travel", "angle"),
+        stop_travel=one("stops", "angle"), mass=one("mass", "mass"), backlash=one("backlash", "angle"),
+        angle_per_pulse=fig.rate("--rate", whole["rate"]) if whole["rate"] else None,
+        gear_reduction=fig.ratio("--gear-ratio", whole["gear_ratio"]) if whole["gear_ratio"] else None,
+        motor_type=whole["motor_type"], modulation=whole["modulation"], registers=whole["registers"],
+        continuous=whole["continuous"] or endless,
+        source=whole["source"], note=whole["note"])
+
+
+def _points(given: dict[str, _Figures], usual: float | None) -> tuple[Any, ...]:
+    from servotwin.cli import option_values as fig
+    from servotwin.errors import InputError
+    from servotwin.identification import SheetPoint
+    from servotwin.units.quantities import quantity
+
+    options = {"stall_torque": "--torque", "no_load_speed": "--speed", "no_load_current": "--running-current",
+               "stall_current": "--stall-current", "idle_current": "--idle-current"}
+    found: dict[float, dict[str, Any]] = {}
+    for field, texts in given.items():
+        option = options[field]
+        for text in texts or ():
+            words, volts = fig.without_voltage(option, text, usual)
+            value = fig.speed(option, words) if field == "no_load_speed" else quantity(
+                option, words, "torque" if field == "stall_torque" else "current", positive=True)
+            if field in found.setdefault(volts, {}):
+                raise InputError(f"{option} at {volts:g} V",
+                                 got=f"two, {found[volts][field]:.4g} and {value:.4g} in SI",
+                                 allowed="one figure")
+            found[volts][field] = value
+    if not found:
+        raise InputError("no figures of a sheet are given", allowed="at least --torque and --speed; or --csv, or the "
+                         "servo whose [sheet] is taken")
+    return tuple(SheetPoint(supply_voltage=volts, **values) for volts, values in sorted(found.items()))
+
+
+def _one_sheet(sheet: Sheet, how: dict[str, bool], out: Path | None, *, weighed: bool, force: bool,
+               as_json: bool) -> None:
+    from servotwin.cli.summary import parameter_table
+    from servotwin.identification import servo_from_sheet, write_servo_text
+
+    with warnings.catch_warnings():
+        if weighed:
+            warnings.filterwarnings("ignore", message=".*kgf cm")  # who typed these meant them
+        servo = servo_from_sheet(sheet, **how)
+    if out is not None:
+        write_servo_text(servo, out, overwrite=force)
+    with patience("simulating"):
+        found = sheet_facts(sheet, servo)
+    if as_json:
+        emit_json({**found, "files": [] if out is None else [str(out)]})
+        return
+    parts: list[RenderableType] = [f"{sheet.title} ({sheet.name}), from its sheet", *lines(found)]
+    if out is None:
+        parts += ["", *parameter_table(found["parameters"])]
+    else:
+        parts += ["", f"written: {out}"]
+    show(*parts)
+
+
+def _many(path: Path, how: dict[str, bool], out: Path | None, *, force: bool, as_json: bool) -> None:
+    from servotwin.cli.interrupts import held
+    from servotwin.errors import OutputExistsError
+    from servotwin.identification import read_sheets, servo_from_sheet, sheet_contradictions, write_servo_text
+
+    found = read_sheets(path)
+    kept = [sheet for sheet in found.sheets if how["allow_impossible"] or not sheet_contradictions(sheet)]
+    refused = [sheet for sheet in found.sheets if sheet not in kept]
+    servos = [servo_from_sheet(sheet, **how) for sheet in kept]
+    files = [] if out is None else [out / f"{servo.name}.toml" for servo in servos]
+    for file in files:
+        if file.exists() and not force:  # before the first is written
+            raise OutputExistsError(file)
+    if out is not None:
+        _folder(out)
+        with held():
+            for servo, file in zip(servos, files, strict=True):
+                write_servo_text(servo, file, overwrite=force)
+    rows = [sheet_facts(sheet, servo, steady=True) for sheet, servo in zip(kept, servos, strict=True)]
+    left = [*found.left_out, *(f"{sheet.title}: {sheet_contradictions(sheet)[0].text}" for sheet in refused)]
+    if as_json:
+        emit_json({"servos": rows, "left_out": left, "files": [str(file) for file in files]})
+        return
+    show(table(("id", "resistance", "torque per current", "efficiency", "flags"), [
+        (row["id"], *(ranged(row["motor"][name]) for name in (
+            "resistance", "output_torque_constant", "gear_efficiency")), "; ".join(row["flags"])) for row in rows]),
+         "", *[f"left out: {text}" for text in left],
+         *([f"written: {len(files)} servo files to {out}"] if out is not None else []))
+
+
+def _folder(out: Path) -> None:
+    from servotwin.errors import OutputError
+
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{out} cannot be written ({error.strerror})") from None
+
+
+# --- What `servotwin catalog from-sheet` tells of a sheet and of the servo made of it, as facts and as lines ----------
+
+_UNCHECKED = "not checked, needs a current"
+
+
+def sheet_facts(sheet: Sheet, servo: Servo, *, steady: bool = False) -> dict[str, Any]:
+    """Return what follows from a sheet, and the servo made of it beside each printed figure, in SI, ready for JSON.
+
+    Parameters
+    ----------
+    sheet : Sheet
+    servo : Servo
+        Made of it.
+    steady : bool
+        Whether to leave out what has to be simulated pulse by pulse.
+    """
+    from dataclasses import asdict
+
+    from servotwin.cli.summary import headline, parameters
+    from servotwin.datasheet.beside import beside_flags, motion_of, printed_beside
+    from servotwin.identification import motor_range, sheet_contradictions
+    from servotwin.identification.sheets.motor_range import no_load_current_is_known, stall_current_is_known
+
+    motor, contradictions = motor_range(sheet), sheet_contradictions(sheet)
+    ranges = {name: asdict(getattr(motor, name)) for name in (
+        "resistance", "output_torque_constant", "gear_efficiency", "no_load_current", "coulomb_torque")}
+    possible = motor.possible and not contradictions
+    checked = stall_current_is_known(sheet) or no_load_current_is_known(sheet)
+    beside, motion = printed_beside(servo, steady=steady), None if steady else motion_of(servo)
+    head = headline(servo)
+    return {**head, "flags": [*head["flags"], *beside_flags(servo, beside, motion)],
+            "possible": possible if checked or not possible else None,
+            "contradictions": [asdict(one) for one in contradictions],
+            "voltages": [point.supply_voltage for point in sheet.main],
+            "motor": {**ranges, "drop_voltage": motor.drop_voltage},
+            "figures": [{**figure._asdict(), "off": figure.off} for figure in beside],
+            "motion": None if motion is None else motion._asdict(), "notes": servo.notes.strip(),
+            "parameters": parameters(servo)}
+
+
+def lines(found: dict[str, Any]) -> list[RenderableType]:
+    """Return what the sheet says of the motor, whether it can be true, and what the servo does beside it."""
+    names = {"resistance": ("resistance of the motor's circuit", "ohm"),
+             "output_torque_constant": ("torque per current, at the output", "N m/A"),
+             "gear_efficiency": ("efficiency of the gear", "1"), "no_load_current": ("running current", "A"),
+             "coulomb_torque": ("Coulomb friction, at the output", "N m")}
+    rows = [(words, f"{found['motor'][name]['value']:z.4g}", unit,
+             f"{found['motor'][name]['lower']:z.4g} to {found['motor'][name]['upper']:z.4g}")
+            for name, (words, unit) in names.items()]
+    volts = ", ".join(f"{v:g} V" for v in found["voltages"])
+    possible = {True: "yes", False: "NO", None: _UNCHECKED}[found["possible"]]
+    parts: list[RenderableType] = [
+        pairs([("voltages", volts), ("possible", possible), ("flags", "; ".join(found["flags"]) or "none")]),
+        *[one["text"] for one in found["contradictions"]], "",
+        table(("what follows", "value", "unit", "range"), rows)]
+    beside = [(figure["name"], f"{figure['voltage']:g} V", f"{figure['printed']:.4g}", f"{figure['simulated']:.4g}",
+               figure["unit"], f"{100.0 * figure['off']:+z.0f} %") for figure in found["figures"]]
+    if beside:
+        parts += ["", table(("printed figure", "at", "printed", "simulated", "unit", "off"), beside)]
+    return parts if found["motion"] is None else [*parts, "", pairs(_motion_words(found["motion"]))]
+
+
+def ranged(found: dict[str, float]) -> str:
+    """Return a value with its range."""
+    return f"{found['value']:z.3g} ({found['lower']:z.3g} to {found['upper']:z.3g})"
+
+
+def _motion_words(found: dict[str, Any]) -> list[tuple[str, str]]:
+    spans = found["spans"]
+    passes = ("does not pass 54 deg" if math.isnan(found["passes"]) else
+              f"passes 54 deg after {with_span(found['passes'], spans.get('passes'), '.3f', 's')}")
+    over = with_span(100.0 * found["overshoot"], spans.get("overshoot"), ".1f", "%", scale=100.0)
+    held = ("does not hold it" if math.isnan(found["error"]) else
+            f"{with_span(math.degrees(found['error']), spans.get('error'), '.1f', 'deg', scale=math.degrees(1.0))} off")
+    said = [("60 deg from rest", f"{passes}, overshoot {over}"), (f"holding {found['torque']:.2g} N m", held)]
+    return [*said, ("ranges", "with what is guessed at the ends of its own")] if spans else said
+
+
+# --- `servotwin catalog`: which servos there are, what is known of one, and what a servo file gives -------------------
 
 _TELLING = ("impossible", "sources disagree", "digital", "bus", "currents unknown", "stall current unknown",
             "running current unknown")  # what a list has room for
@@ -36,7 +687,7 @@ def _catalog(context: typer.Context) -> None:
 @catalog.command("list", help="List the servos in the catalog.", epilog="Example: servotwin catalog list --json")
 def list_servos(as_json: _Json = False) -> None:
     """List the servos of the catalog."""
-    from servotwin.cli.servo_facts import headline
+    from servotwin.cli.summary import headline
     from servotwin.parameters import catalog_names, load_servo
 
     with patience("reading the catalog"):
@@ -58,8 +709,8 @@ def show_servo(
     as_json: _Json = False,
 ) -> None:
     """Show every parameter of a servo."""
-    from servotwin.cli.servo_facts import headline, parameters
-    from servotwin.cli.servo_page import figures, heading, parameter_table
+    from servotwin.cli.summary import heading, headline, parameter_table, parameters
+    from servotwin.cli.summary import servo_rows as figures
     from servotwin.parameters import load_servo
 
     loaded = load_servo(servo)
@@ -77,7 +728,7 @@ def check(
     as_json: _Json = False,
 ) -> None:
     """Check a servo file."""
-    from servotwin.cli.servo_facts import readiness
+    from servotwin.cli.summary import readiness
     from servotwin.datasheet.rotor import slow_rotor
     from servotwin.parameters import load_servo
 

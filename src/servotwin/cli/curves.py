@@ -65,8 +65,8 @@ def curves(
     as_json: shared.JsonOption = False,
 ) -> None:
     """Compute the sheets of servos from their parameters, beside what their makers print."""
-    from servotwin.cli.curves_words import facts
-    from servotwin.cli.lift_words import loads_of
+    from servotwin.cli.curves_report import facts
+    from servotwin.cli.option_values import loads_of
     from servotwin.errors import InputError
 
     asked, volts = loads_of(lift, arm, load or []), _voltages(voltage)
@@ -120,7 +120,7 @@ def _voltages(words: list[str] | None) -> list[float] | None:
 
 def _models(servos: list[str], model: str | None, change: list[str], register: list[str],
             supply: str | None) -> list[Model]:
-    from servotwin.cli.model_words import model_of
+    from servotwin.cli.shared_options import model_of
 
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=".*: computed as a")  # the notes say which model stands for it
@@ -153,7 +153,7 @@ def _write(sheets: list[DataSheet], targets: list[Target], torque: float | None,
     with patience("drawing"), staged(targets, force=force) as drafts:
         for target, draft in zip(targets, drafts, strict=True):
             if target.option == "--out":
-                from servotwin.cli.curves_page import page
+                from servotwin.cli.curves_report import page
 
                 draft.write_text(page(sheets, torque), encoding="utf-8", newline="\n")
             elif target.option == "--loop":
@@ -185,7 +185,7 @@ def _write_points(sheets: list[DataSheet], path: Path) -> None:
 
 def _show_beside(sheets: list[DataSheet]) -> None:
     """Show all servos in one table."""
-    from servotwin.cli.curves_words import beside
+    from servotwin.cli.curves_report import beside
     from servotwin.cli.which_words import side_by_side
 
     lifts = sheets[0].voltages[0].lift is not None
@@ -197,8 +197,7 @@ def _show_beside(sheets: list[DataSheet]) -> None:
 
 
 def _show(sheet: DataSheet, torque: float | None) -> None:
-    from servotwin.cli.curves_words import hot_words, lift_pairs, notes, rest_pairs, rows
-    from servotwin.cli.loop_words import loop_pairs
+    from servotwin.cli.curves_report import hot_words, lift_pairs, loop_pairs, notes, rest_pairs, rows
     from servotwin.cli.summary import model_name
     from servotwin.parameters import printed_points
 

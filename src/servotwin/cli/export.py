@@ -59,8 +59,8 @@ def c(
     as_json: shared.JsonOption = False,
 ) -> None:
     """Write a servo as C99: a header and a source."""
-    from servotwin.cli.load_words import load_from
-    from servotwin.cli.model_words import model_of
+    from servotwin.cli.option_values import load_from
+    from servotwin.cli.shared_options import model_of
     from servotwin.export import c as exported
 
     chosen = model_of(servo, model, change or [], None, register or [], supply)
@@ -115,8 +115,8 @@ def fmu(
     as_json: shared.JsonOption = False,
 ) -> None:
     """Write a servo as an FMU for co-simulation."""
-    from servotwin.cli.load_words import load_from
-    from servotwin.cli.model_words import model_of
+    from servotwin.cli.option_values import load_from
+    from servotwin.cli.shared_options import model_of
     from servotwin.export import fmu as exported
 
     chosen = model_of(servo, model, change or [], None, register or [], supply)

@@ -3,42 +3,127 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from servotwin.cli import log_reading
+from servotwin.cli import log
 from servotwin.cli import shared_options as shared
-from servotwin.cli.stopping import best_kept, end_if_stopped
-from servotwin.cli.terminal import emit_json, patience, show
+from servotwin.cli.shared_options import best_kept, end_if_stopped
+from servotwin.cli.terminal import emit_json, pairs, patience, show, table
 from servotwin.logs.reading import reading_facts
 
 if TYPE_CHECKING:
+    from servotwin.bench import LoadCalibration
+    from servotwin.bench.lift_records import LiftRecord
     from servotwin.cli.outputs import Target
     from servotwin.identification import Advice, Fit, Ladder, Log
     from servotwin.identification.fitting.stopping import Within
     from servotwin.models import Model
+    from servotwin.parameters import Servo
+
+
+
+# --- What a table of weights with currents, speeds or sags says of a servo, in words and as JSON ----------------------
+
+def calibrate_of_loads(path: Path, servo: Servo | None, arm: str | None, columns: Sequence[str]
+                       ) -> tuple[LoadCalibration, tuple[LiftRecord, ...]]:
+    """Return what a table, or the records that a pattern names, say of a servo.
+
+    Raises
+    ------
+    InputError
+        If table, record or arm is not usable.
+    """
+    from servotwin.bench import calibrate_loads, is_pattern, lifts
+    from servotwin.bench.lift_records import length_of
+    from servotwin.errors import InputError
+
+    length = length_of(arm)
+    if not is_pattern(path):
+        if columns:
+            raise InputError("--columns", got="a table of loads", allowed="units in the names of its columns, such as "
+                             "mass_g")
+        return calibrate_loads(path, servo, arm=length), ()
+    found = lifts(path, columns=" ".join(columns) or None, arm=length)
+    return calibrate_loads(found.table, servo), found.records
+
+
+def show_loads(found: LoadCalibration, records: Sequence[LiftRecord], out: Path | None) -> None:
+    """Show figures with their intervals, what is set of the servo, and all that is worth a sentence."""
+    from servotwin.bench.load_calibration import figure_words, record_words
+    from servotwin.cli.fit_report import parameter_table
+
+    names = ", ".join(column.name for column in found.table.columns)
+    parts: list[Any] = [f"{found.source}: {found.table.rows} rows, {names}", ""]
+    if records:
+        parts += [table(("file", "load", "speed", "current", "dead time"), [record_words(one) for one in records]), ""]
+    parts += [table(("", "value", "95 %", "unit", "line"), [figure_words(one) for one in found.figures]), ""]
+    if found.parameters:
+        parts += [parameter_table(found.parameters), ""]
+    parts += [f"- {text}" for text in found.findings()]
+    if out is not None:
+        parts += ["", pairs([("written", str(out))])]
+    show(*parts)
+
+
+def load_facts(found: LoadCalibration, records: Sequence[LiftRecord] = (), out: Path | None = None) -> dict[str, Any]:
+    """Return the same as plain data for JSON, in SI.
+
+    Examples
+    --------
+    >>> from servotwin.bench import calibrate_loads
+    >>> facts = load_facts(calibrate_loads({"torque_Nm": [0.1, 0.2, 0.3], "current_mA": [300, 401, 499]}))
+    >>> list(facts["figures"])
+    ['no-load current', 'current per torque', 'torque per current', 'heaviest load']
+    """
+    lines = {name: (one, one.line) for name, one in found.lines.lines.items()}
+    flat = found.lines.flat
+    return {
+        "source": found.source, "servo": found.servo.name, "rows": found.table.rows,
+        "columns": [column.name for column in found.table.columns], "ignored_columns": list(found.table.ignored),
+        "arm": found.table.arm,
+        "figures": {one.name: {"value": one.value, "std": one.error, "lower": one.lower, "upper": one.upper,
+                               "unit": one.unit, "line": one.line} for one in found.figures},
+        "lines": {name: {
+            "abscissa": one.x.name, "ordinate": one.y.name, "slope": line.slope, "slope_error": line.slope_error,
+            "intercept": line.intercept, "intercept_error": line.intercept_error, "covariance": line.covariance,
+            "freedom": line.freedom, "rows": [int(row) + 1 for row in one.rows],
+            "residuals": list(line.residuals)} for name, (one, line) in lines.items()},
+        "sheet": [{"name": one.name, "voltage": one.voltage, "printed": one.printed, "measured": one.measured,
+                   "share": one.share, "lower": one.lower, "upper": one.upper} for one in found.shares],
+        "flat_top": None if flat is None else {"current": flat.current, "load": flat.load,
+                                               "rows": [row + 1 for row in flat.rows]},
+        "stands_from": found.lines.stalled,
+        "records": [one._asdict() for one in records],
+        "parameters": {name: {"value": one.value, "std": one.std, "unit": one.unit, "source": one.source}
+                       for name, one in found.parameters.items()},
+        "findings": list(found.findings()), "files": [] if out is None else [str(out)],
+    }
+
+
+# --- `servotwin fit`: the parameters of a servo, from its logs or from a bench table ----------------------------------
 
 _TABLES = (".csv", ".txt", ".tsv", ".dat")
 _MOST_BYTES = 65536  # of a table that was written by hand
-_LOGS, _SEARCH = log_reading.PANEL, "What to search for, and how"
+_LOGS, _SEARCH = log.PANEL, "What to search for, and how"
 
 
 def fit(
     logs: Annotated[list[Path] | None, typer.Argument(
-        metavar="LOGS", help=log_reading.HELP)] = None,
+        metavar="LOGS", help=log.LOGS_HELP)] = None,
     servo: Annotated[str | None, typer.Option(
         metavar="SERVO", help="Servo to start from, which also supplies the values that are not fitted: catalog id, or "
         "path of a servo file (.toml).", rich_help_panel=_LOGS)] = None,
-    file_format: log_reading.FormatOption = "auto",
-    columns: log_reading.ColumnsOption = None,
-    joint: log_reading.JointOption = None,
-    raw: log_reading.RegistersOption = None,
-    rate: log_reading.RateOption = None,
-    commanded: log_reading.CommandedOption = None,
+    file_format: log.FormatOption = "auto",
+    columns: log.ColumnsOption = None,
+    joint: log.JointOption = None,
+    raw: log.RegistersOption = None,
+    rate: log.RateOption = None,
+    commanded: log.CommandedOption = None,
     change: Annotated[list[str] | None, typer.Option(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable; with a unit, or "
         "in SI units.", rich_help_panel=_LOGS)] = None,
@@ -51,7 +136,7 @@ def fit(
     leave_out: Annotated[list[str] | None, typer.Option(
         "--leave-out", metavar="START..STOP", help="Time window that says nothing about the servo, in all logs or "
         "in one: LOG=START..STOP; repeatable.", rich_help_panel=_LOGS)] = None,
-    mend: log_reading.MendOption = None,
+    mend: log.MendOption = None,
     sensors: Annotated[list[str] | None, typer.Option(
         metavar="NAME", help="Measured signals to fit; repeatable or with commas (default: the angle and all "
         "currents).", rich_help_panel=_LOGS)] = None,
@@ -126,7 +211,7 @@ def fit(
     """Find the parameters of a servo, with intervals."""
     _check_words(logs, servo, table, report, scheduler, raw, advise=advise, registers=bool(register))
     if table is not None:
-        from servotwin.cli.fit_table import calibrate_from
+        from servotwin.cli.fit_report import calibrate_from
 
         calibrate_from(table, servo, out, change=change or (), supply=supply, arm=arm, columns=columns or (),
                        force=force, as_json=as_json)
@@ -143,7 +228,7 @@ def fit(
                "loss": loss, "level": level, "intervals": intervals, "seed": seed, "compare": compare,
                "diagnose": diagnose, "accuracy": accuracy, "within": within}
     chosen = _options(options)
-    given = log_reading.read(logs, file_format, columns, joint, leave_out or [], mend=mend, rate=rate,
+    given = log.read(logs, file_format, columns, joint, leave_out or [], mend=mend, rate=rate,
                              commanded=commanded, force=force, quiet=as_json, registers=bool(register), raw=raw,
                              model=search.model)
     climbs = _climber(search, asked=bool(free), ladder=ladder, structures=structures, springs=spring)
@@ -232,33 +317,33 @@ def _targets(out: Path | None, report: Path | None, inputs: list[Path], *, force
 
 
 def _model(servo: str, model: str | None, change: list[str], register: list[str], supply: str | None) -> Model:
-    from servotwin.cli import fit_words
-    from servotwin.cli.model_words import model_of
+    from servotwin.cli import fit_report
+    from servotwin.cli.shared_options import model_of
 
-    return model_of(servo, model, change, fit_words.MODEL_NAMES, register, supply)
+    return model_of(servo, model, change, fit_report.MODEL_NAMES, register, supply)
 
 
 def _search(nominal: Model, free: list[str] | None, bounds: list[str], prior: list[str], *, priors: bool) -> _Search:
-    from servotwin.cli import fit_words
+    from servotwin.cli import fit_report
     from servotwin.identification.fitting.checks import usual_free
 
-    names = fit_words.names(free) or usual_free(nominal)
-    fit_words.check_free(names, nominal)
-    return _Search(nominal, names, fit_words.bounds_of(bounds, names),
-                   fit_words.priors_of(prior, names, nominal, of_servo=priors))
+    names = fit_report.names(free) or usual_free(nominal)
+    fit_report.check_free(names, nominal)
+    return _Search(nominal, names, fit_report.bounds_of(bounds, names),
+                   fit_report.priors_of(prior, names, nominal, of_servo=priors))
 
 
 def _options(given: dict[str, Any]) -> dict[str, Any]:
     """Return the options of `identify` that words say."""
-    from servotwin.cli import fit_words
+    from servotwin.cli import fit_report
 
     return {
-        "holdout": fit_words.held_out(given["holdout"]), "mend": fit_words.kinds(given["mend"]),
-        "sensors": fit_words.names(given["sensors"]),
-        "nuisance": fit_words.some_or_none("--nuisance", given["nuisance"], None),
-        "level": fit_words.share("--level", given["level"]), "starts": given["starts"], "loss": given["loss"],
+        "holdout": fit_report.held_out(given["holdout"]), "mend": fit_report.kinds(given["mend"]),
+        "sensors": fit_report.names(given["sensors"]),
+        "nuisance": fit_report.some_or_none("--nuisance", given["nuisance"], None),
+        "level": fit_report.share("--level", given["level"]), "starts": given["starts"], "loss": given["loss"],
         "intervals": given["intervals"], "seed": given["seed"], "accuracy": given["accuracy"],
-        "diagnose": given["diagnose"], "within": fit_words.duration("--within", given["within"]),
+        "diagnose": given["diagnose"], "within": fit_report.duration("--within", given["within"]),
         "compare_with": ("slew", "M1") if given["compare"] else ()}
 
 
@@ -267,19 +352,19 @@ def _climber(search: _Search, *, asked: bool, ladder: bool, structures: bool,
     """Return what fits several laws or structures; None where one fit is asked for."""
     from functools import partial
 
-    from servotwin.cli import fit_words
+    from servotwin.cli import fit_report
     from servotwin.identification import compare_structures, friction_ladder
 
     servo, kind = search.model.servo, type(search.model)
     if structures:
         return partial(compare_structures, servo=servo, model=kind, free=search.free if asked else None,
-                       springs=fit_words.names(springs) or ())
+                       springs=fit_report.names(springs) or ())
     return partial(friction_ladder, servo=servo, model=kind, free=search.free) if ladder else None
 
 
 def _run(search: _Search, logs: list[Log], options: dict[str, Any], scheduler: str | None,
          climbs: Callable[..., Ladder] | None) -> _Found:
-    from servotwin.cli.scheduler import executor_at
+    from servotwin.cli.sweep import executor_at
     from servotwin.identification import identify
 
     servo, kind = search.model.servo, type(search.model)
@@ -345,7 +430,7 @@ def _write(found: _Found, targets: list[Target], *, force: bool) -> list[str]:
 
 
 def _show_advice(advice: Advice, *, as_json: bool) -> None:
-    from servotwin.cli.fit_show import advice_facts, advice_table
+    from servotwin.cli.fit_report import advice_facts, advice_table
 
     if as_json:
         emit_json({"advice": advice_facts(advice)})
@@ -354,18 +439,18 @@ def _show_advice(advice: Advice, *, as_json: bool) -> None:
 
 
 def _report(found: _Found, files: list[str], *, as_json: bool) -> None:
-    from servotwin.cli import fit_show
+    from servotwin.cli import fit_report
 
     if as_json:
         more: dict[str, Any] = {"reading": reading_facts([trace.log for trace in found.fit.traces])}
         if found.ladder is not None:
-            more["ladder"] = fit_show.ladder_facts(found.ladder)
+            more["ladder"] = fit_report.ladder_facts(found.ladder)
         if found.advice is not None:
-            more["advice"] = fit_show.advice_facts(found.advice)
-        emit_json({**fit_show.facts(found.fit, files), **more})
+            more["advice"] = fit_report.advice_facts(found.advice)
+        emit_json({**fit_report.facts(found.fit, files), **more})
         return
-    parts = [] if found.ladder is None else fit_show.ladder_table(found.ladder)
-    parts += fit_show.sections(found.fit, files)
+    parts = [] if found.ladder is None else fit_report.ladder_table(found.ladder)
+    parts += fit_report.sections(found.fit, files)
     if found.advice is not None:
-        parts += ["", *fit_show.advice_table(found.advice)]
+        parts += ["", *fit_report.advice_table(found.advice)]
     show(*parts)

@@ -68,9 +68,9 @@ def linear(
     as_json: shared.JsonOption = False,
 ) -> None:
     """Show the linear views of a servo, or find its gain."""
-    from servotwin.cli import linear_words as words
-    from servotwin.cli.load_words import load_from
-    from servotwin.cli.model_words import model_of
+    from servotwin.cli import linear_report as words
+    from servotwin.cli.option_values import load_from
+    from servotwin.cli.shared_options import model_of
 
     chosen = model_of(servo, model, change or [], _MODELS, register or [], supply)
     hangs = load_from(load or [], chosen)
@@ -115,7 +115,7 @@ def _computed(model: Model, load: Load, asked: dict[str, Any]) -> Overview:
 
 
 def _tune(model: Model, load: Load, wanted: dict[str, Any], *, as_json: bool) -> None:
-    from servotwin.cli.linear_words import tuning_facts, tuning_pairs
+    from servotwin.cli.linear_report import tuning_facts, tuning_pairs
     from servotwin.linear import tune
 
     with patience(f"simulating steps of {model.servo.name}"):
@@ -133,23 +133,23 @@ def _write(found: Overview, targets: list[Target], *, force: bool) -> None:
     with patience("drawing"), staged(targets, force=force) as drafts:
         for target, draft in zip(targets, drafts, strict=True):
             if target.option == "--out":
-                from servotwin.cli.linear_page import page
+                from servotwin.cli.linear_report import page
 
                 draft.write_text(page(found), encoding="utf-8", newline="\n")
             elif target.option == "--plot":
                 from servotwin import plotting
-                from servotwin.cli.linear_page import by_amplitude
+                from servotwin.cli.linear_report import by_amplitude
 
                 plotting.save(by_amplitude(found, target.page), draft)
             else:
-                from servotwin.cli.linear_words import columns
+                from servotwin.cli.linear_report import columns
                 from servotwin.tables import csv_text
 
                 draft.write_bytes(csv_text(columns(found), digits=12).encode())
 
 
 def _show(found: Overview, targets: list[Target]) -> None:
-    from servotwin.cli import linear_words as words
+    from servotwin.cli import linear_report as words
 
     servo = found.model.servo
     parts: list[Any] = [f"{servo.title or servo.name} ({servo.name}), model {type(found.model).__name__}", ""]

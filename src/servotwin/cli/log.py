@@ -4,20 +4,173 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from servotwin.cli import log_reading
 from servotwin.cli import shared_options as shared
-from servotwin.cli.terminal import emit_json, patience, show
+from servotwin.cli.terminal import emit_json, patience, show, table
+from servotwin.errors import one_line
+from servotwin.logs.formats import FORMATS, LOG_FORMATS
 from servotwin.logs.mend_names import MENDS
+from servotwin.logs.reading import read_alike
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
+
     from servotwin.cli.outputs import Target
     from servotwin.identification import Log
     from servotwin.identification.survey.survey import Survey
+    from servotwin.models import Model
+
+
+
+# --- Logs read for a command ------------------------------------------------------------------------------------------
+
+_MOST_REMARKS = 5
+_QUIET = ("named", "sidecar")  # someone said so before
+
+PANEL = "Logs and servo"
+LOGS_HELP = f"Log files or folders: {', '.join(each.what for each in LOG_FORMATS.values())}."
+FormatOption = Annotated[str, typer.Option(
+    "--format", metavar="FORMAT", help=f"Format of the logs: {', '.join(FORMATS)}.", rich_help_panel=PANEL)]
+ColumnsOption = Annotated[list[str] | None, typer.Option(
+    metavar="SIGNAL=COLUMN:UNIT", help='What the columns of a table mean: "time=t:ms angle=pos:deg-90"; kept in the '
+    "sidecar. Other columns are recognised by name or guessed, and shown.", rich_help_panel=PANEL)]
+JointOption = Annotated[list[str] | None, typer.Option(
+    metavar="NAME[:UNIT]", help="Joints of a LeRobot dataset to read, and their unit; repeatable or with commas, *:deg "
+    "for all.", rich_help_panel=PANEL)]
+
+MendOption = Annotated[list[str] | None, typer.Option(
+    metavar="KIND", help="What to put right in the logs first, of what is said to be wrong with them: wrap, stamps, "
+    f"sign, span, rows, not-followed; and in their files {', '.join(MENDS)}; repeatable or with commas.",
+    rich_help_panel=PANEL)]
+RegistersOption = Annotated[str | None, typer.Option(
+    "--registers", metavar="FAMILY|MODEL", help="Whose registers the columns of a table are named after and hold raw: "
+    "feetech-sts, dynamixel-x, -mx, -ax, -xl320, or a model such as XM430-W350 (default: those of the servo, where the "
+    "numbers cannot be degrees).", rich_help_panel=PANEL)]
+RateOption = Annotated[str | None, typer.Option(
+    metavar="RATE", help="Rows per second of tables without times, such as 50Hz.", rich_help_panel=PANEL)]
+CommandedOption = Annotated[str | None, typer.Option(
+    metavar="VALUE[@TIME]", help="What was commanded in tables without a command: 153deg@0s, or jumps such as "
+    "1500us@0s,1700us@0.5s.", rich_help_panel=PANEL)]
+
+
+def read(paths: Sequence[Path], file_format: str, columns: Sequence[str] | None, joints: Sequence[str] | None,
+         leave_out: Sequence[str], *, mend: Sequence[str] | None = None, rate: str | None = None,
+         commanded: str | None = None, force: bool = False, quiet: bool = False, registers: bool = False,
+         raw: str | None = None, model: Model) -> list[Log]:
+    """Return the logs of files and folders, with commands that count from the middle of the servo's travel.
+
+    What was guessed, said or found of columns is shown, unless `quiet`, and what was said or found is written into
+    sidecars. Where the user says the registers of the servo (`registers`), those that a dataset's robot has are not
+    assumed. Columns that are named after registers hold those of the family or model `raw`, else of the servo.
+
+    Raises
+    ------
+    InputError
+        If one cannot be read, a window is none, the servo cannot follow a command, or a sidecar says otherwise and
+        `force` is false.
+    """
+    from servotwin.cli import fit_report
+    from servotwin.identification import read_logs
+    from servotwin.identification.fitting.registers import of_no_robot
+    from servotwin.identification.fitting.suspicions.followed import centred
+
+    windows = fit_report.left_out(leave_out)
+    said = columns_said(columns, rate, commanded)
+    mends = fit_report.reading_mends(mend)
+    chosen = None if not joints else ",".join(joints)
+    with patience("reading"):
+        given = [(path, read_logs(path, file_format, columns=said, joints=chosen, mend=mends,
+                                  registers=raw or model.servo)) for path in paths]
+        logs = fit_report.without([log for _, some in given for log in some], windows)
+    found = centred(logs, model)
+    parts = _parts(logs)
+    lines = list(found.sentences)
+    rest = iter(found.logs)
+    for path, some in given:
+        lines += _kept(some, list(islice(rest, len(some))), path, said=_option(said, raw), force=force)
+    if (parts or lines) and not quiet:
+        show(*parts, *lines, "")
+    for line in lines if quiet else ():
+        typer.echo(one_line(line), err=True)
+    return of_no_robot(found.logs) if registers else list(found.logs)
+
+
+def _option(said: str | None, raw: str | None) -> str:
+    """Return the option that said something of columns; empty where none did."""
+    return "--columns" if said is not None else "--registers" if raw is not None else ""
+
+
+def _kept(read: Sequence[Log], found: Sequence[Log], path: Path, *, said: str, force: bool) -> list[str]:
+    """Write what was said or found of columns into sidecars, and return what to say of it."""
+    from servotwin.errors import InputError, OutputError
+    from servotwin.identification import keep_columns
+
+    what = said or "this"
+    try:
+        return [f"written  {file}, which keeps {what}" for file in keep_columns(
+            found, path if path.is_dir() else None, overwrite=force, instead_of=read)]
+    except InputError as error:
+        if said and not isinstance(error, OutputError):  # one that cannot be written is no contradiction
+            raise
+        return [f"{what} is not kept: {error}"]
+
+
+def columns_said(columns: Sequence[str] | None, rate: str | None, commanded: str | None) -> str | None:
+    """Return the words of `--columns`, with those of `--rate` and `--commanded` among them.
+
+    Raises
+    ------
+    InputError
+        If a rate or a command is none.
+
+    Examples
+    --------
+    >>> columns_said(["angle=1:deg"], "50Hz", "153deg@0s")
+    'angle=1:deg time=50Hz command=153deg@0s'
+    """
+    from servotwin.logs.column_words import with_signals
+    from servotwin.logs.log_checks import checked_definition
+
+    words = [] if not columns else [with_signals("--columns", " ".join(columns))]
+    for option, signal, text in (("--rate", "time", rate), ("--commanded", "command", commanded)):
+        if text is not None:
+            checked_definition(option, signal, text)
+            words.append(f"{signal}={text}")
+    return " ".join(words) or None
+
+
+def _parts(logs: Sequence[Log]) -> list[RenderableType]:
+    """Return a table of the columns that were guessed or said just now, and what was passed over."""
+    groups = read_alike(logs)
+    shown = [some for some in groups if some[0].reading is not None
+             and any(one.known not in _QUIET for one in some[0].reading.columns)]
+    rows = [(_file(some), one.column, one.signal, one.unit, one.known) for some in shown if some[0].reading is not None
+            for one in some[0].reading.columns]
+    parts: list[RenderableType] = []
+    if rows:
+        many = len(groups) > 1
+        names = ("file", "column", "signal", "unit", "known")
+        parts.append(table(names if many else names[1:], [row if many else row[1:] for row in rows]))
+    unread = dict.fromkeys(name for some in shown if some[0].reading is not None for name in some[0].reading.unread)
+    if unread:
+        parts.append(f"not read: {', '.join(unread)}")
+    remarks = list(dict.fromkeys(f"{log.reading.file}: {remark}" for log in logs if log.reading is not None
+                                 for remark in log.reading.remarks))
+    more = [f"... and {len(remarks) - _MOST_REMARKS} more"] if len(remarks) > _MOST_REMARKS else []
+    return [*parts, *remarks[:_MOST_REMARKS], *more]
+
+
+def _file(some: Sequence[Log]) -> str:
+    name = some[0].name
+    return name if len(some) == 1 else f"{name} and {len(some) - 1} more"
+
+
+# --- `servotwin log`: reads a log, mends it, and says what it holds, without a servo and without a fit ----------------
 
 HELP = "Read a log, mend it, and say what it holds and lacks: clock, gaps, noise, counts, lag; no servo, no fit."
 EPILOG = ("Example: servotwin log run.csv --mend torn,reset --out mended.csv --plot run.png\n\n"
@@ -25,17 +178,17 @@ EPILOG = ("Example: servotwin log run.csv --mend torn,reset --out mended.csv --p
 
 
 def log(
-    files: Annotated[list[Path], typer.Argument(metavar="FILES", help=log_reading.HELP)],
-    file_format: log_reading.FormatOption = "auto",
-    columns: log_reading.ColumnsOption = None,
-    joint: log_reading.JointOption = None,
-    registers: log_reading.RegistersOption = None,
-    rate: log_reading.RateOption = None,
-    commanded: log_reading.CommandedOption = None,
+    files: Annotated[list[Path], typer.Argument(metavar="FILES", help=LOGS_HELP)],
+    file_format: FormatOption = "auto",
+    columns: ColumnsOption = None,
+    joint: JointOption = None,
+    registers: RegistersOption = None,
+    rate: RateOption = None,
+    commanded: CommandedOption = None,
     mend: Annotated[list[str] | None, typer.Option(
         metavar="KIND", help="What to mend of what is not certain: " + "; ".join(
             f"{name} {what}" for name, what in MENDS.items()) + "; repeatable or with commas.",
-        rich_help_panel=log_reading.PANEL)] = None,
+        rich_help_panel=PANEL)] = None,
     out: Annotated[Path | None, typer.Option(
         metavar="FILE.csv", help="Write the mended log, in SI, and its sidecar.",
         rich_help_panel=shared.OUTPUT)] = None,
@@ -50,7 +203,7 @@ def log(
     from servotwin.identification import read_logs
     from servotwin.identification.survey.survey import survey_of
 
-    said, mends = log_reading.columns_said(columns, rate, commanded), _mends(mend)
+    said, mends = columns_said(columns, rate, commanded), _mends(mend)
     if out is not None or plot is not None:
         _check(files, out, plot, 1, force=force)
     with patience("reading"):
@@ -76,7 +229,7 @@ def _mends(words: list[str] | None) -> tuple[str, ...]:
     InputError
         If something is to be mended that only shows beside a servo.
     """
-    from servotwin.cli.fit_words import kinds, reading_mends
+    from servotwin.cli.fit_report import kinds, reading_mends
     from servotwin.errors import InputError
 
     mends = reading_mends(words)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import warnings
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,15 +13,253 @@ import typer
 
 from servotwin.cli import robot_options as options
 from servotwin.cli import shared_options as shared
-from servotwin.cli.robot_arm import add_to
-from servotwin.cli.robot_compare import compare
-from servotwin.cli.robot_fit import fit
-from servotwin.cli.robot_mobile import mobile
-from servotwin.cli.robot_validate import validate
-from servotwin.cli.terminal import emit_help, emit_json, pairs, patience, show, table
+from servotwin.cli.robot_tasks import add_to, compare, mobile
+from servotwin.cli.terminal import emit_help, emit_json, json_text, pairs, patience, show, table
+from servotwin.text import file_stems
 
 if TYPE_CHECKING:
-    from servotwin.robots import Motion, RobotRun, Sizing
+    from servotwin.cli.outputs import Target
+    from servotwin.identification.arms import ArmFit
+    from servotwin.robots import Motion, RobotRun, RobotValidation, Sizing
+
+
+
+# --- `servotwin robot validate`: how far a simulated robot is from the real one ---------------------------------------
+
+SUMMARY, WINDOWS, ERRORS, PAGE = "summary.json", "windows.png", "errors.png", "index.html"
+
+DatasetArgument = Annotated[Path, typer.Argument(
+    metavar="DATASET", help="Folder of a LeRobot dataset, or CSV file with a time and an action and a state of each "
+    "joint (action.elbow_deg, state.elbow_deg).")]
+OutOption = Annotated[Path | None, typer.Option(
+    metavar="FOLDER", help="Folder for page, pictures and numbers (default: none).", rich_help_panel=shared.OUTPUT)]
+ForceOption = Annotated[bool, typer.Option("--force", help="Replace existing files.", rich_help_panel=shared.OUTPUT)]
+
+
+def validate(
+    model_file: options.ModelArgument, dataset: DatasetArgument, servo: options.ServoOption = None,
+    mount: options.MountOption = None, model: options.ModelOption = None, change: options.SetOption = None,
+    register: options.RegisterOption = None, supply: options.SupplyOption = None,
+    package: options.PackageOption = None,
+    friction: options.FrictionOption = "refuse", calibration: options.CalibrationOption = None,
+    episode: options.EpisodesOption = None, unit: options.UnitOption = None,
+    latency: Annotated[float | None, typer.Option(
+        metavar="SECONDS", help="Between the reading of positions and when the goal of the same row acts (default: "
+        "the one that fits best).", rich_help_panel=options.MOTION)] = None,
+    timestep: Annotated[float | None, typer.Option(
+        metavar="SECONDS", help="Of MuJoCo (default: that of the model).", rich_help_panel=shared.OUTPUT)] = None,
+    out: OutOption = None, force: ForceOption = False, as_json: shared.JsonOption = False,
+) -> None:
+    """Replay recorded goals, and compare with the measured joints."""
+    from servotwin.cli import robot_report as files
+    from servotwin.cli.robot_options import as_options
+    from servotwin.robots import validate_robot
+    from servotwin.robots.replay import measured_joints
+
+    asked = options.asked_robot(model_file, dataset, servo=servo or [], mount=mount or [], model=model,
+                                change=change or [], register=register or [], supply=supply, calibration=calibration,
+                                episodes=episode or [], unit=unit or [], package=package or [])
+
+    def done(targets: Sequence[Target]) -> dict[str, Any]:
+        with as_options():
+            found = validate_robot(asked.plant, asked.mounts, asked.motions, bus=asked.bus, joint_friction=friction,
+                                   timestep=timestep, latency=latency, progress=True)
+        told = facts(found, model_file, asked.said)
+        _write(found, told, targets, force=force)
+        told["files"] = [str(target.path) for target in targets]
+        if not as_json:
+            _show(found, told)
+        return told
+
+    if out is None:
+        told = done([])
+    else:
+        with files.folder(out):
+            windows = files.joint_pages(WINDOWS, len(measured_joints(asked.mounts, asked.motions)))
+            told = done(files.targets_of(out, [SUMMARY, ERRORS, *windows, PAGE], force=force, inputs=[dataset]))
+    if as_json:
+        emit_json(told)
+
+
+def facts(found: RobotValidation, robot: str, said: Sequence[str]) -> dict[str, Any]:
+    """Return all of it as plain numbers in SI units."""
+    return {
+        "robot": robot, "episodes": [one.run.motion.source for one in found.replays],
+        "servos": {joint: mount.model.servo.name for joint, mount in found.replays[0].run.mounts.items()},
+        "latency": dict(found.latency), "rms": {name: found.rms(name) for name in found.errors},
+        "errors": {name: {joint: {kind: error._asdict() for kind, error in kinds.items()}
+                          for joint, kinds in joints.items()} for name, joints in found.errors.items()},
+        "worst": [{**window._asdict(), "episode": found.replays[window.replay].run.motion.source}
+                  for window in found.windows],
+        "notes": list(dict.fromkeys((*said, *found.said)))}
+
+
+def degrees(value: float) -> str:
+    """Return an angle [rad] in degrees, a dash where there is none."""
+    return "-" if math.isnan(value) else f"{math.degrees(value):z.2f}"
+
+
+def rows(found: RobotValidation) -> list[list[str]]:
+    """Return a row for each joint: errors by kind of motion, and those of rivals [deg]."""
+    from servotwin.robots.replay import ALL, KINDS, SERVOS
+
+    made = []
+    for joint in found.joints:
+        own = found.errors[SERVOS][joint]
+        made.append([joint, *(degrees(own[kind].rms) for kind in KINDS), degrees(own[ALL].largest),
+                     *(degrees(kinds[joint][ALL].rms) for name, kinds in found.errors.items() if name != SERVOS)])
+    return made
+
+
+def head(found: RobotValidation) -> list[str]:
+    """Return what stands above the rows."""
+    from servotwin.robots.replay import KINDS, SERVOS
+
+    return ["joint", *KINDS, "at most", *(name for name in found.errors if name != SERVOS)]
+
+
+def _show(found: RobotValidation, told: dict[str, Any]) -> None:
+    from servotwin.robots.replay import SERVOS
+
+    worst = found.windows[0]
+    late = ", ".join(f"{name} {1e3 * value:.0f} ms" for name, value in found.latency.items())
+    servos, rivals = [row[:6] for row in rows(found)], [[row[0], *row[6:]] for row in rows(found)]
+    titles = head(found)
+    show(f"{told['robot']} beside {', '.join(told['episodes'][:3])}{' ...' if len(told['episodes']) > 3 else ''}: "
+         f"simulated less measured joints, rms {degrees(found.rms(SERVOS))} deg", "",
+         table(titles[:6], servos), "", "the same with other actuators, rms (deg)",
+         table([titles[0], *titles[6:]], rivals), "",
+         pairs([("goals act later by", late),
+                ("worst second", f"{worst.joint}, {worst.start:.2f} s of {told['worst'][0]['episode']}, {worst.kind}: "
+                 f"{degrees(worst.rms)} deg rms"),
+                *(("note", text) for text in told["notes"]),
+                *((("written", told["files"][-1]),) if told["files"] else ())]))
+
+
+def _write(found: RobotValidation, told: dict[str, Any], targets: Sequence[Target], *, force: bool) -> None:
+    if not targets:
+        return
+    from servotwin import plotting
+    from servotwin.cli.outputs import staged
+    from servotwin.cli.robot_task_report import errors_picture, write_windows
+    from servotwin.cli.robot_task_report import validation_page as page
+
+    with staged(targets, force=force) as drafts:
+        places: dict[str, Path] = {target.path.name: draft for target, draft in zip(targets, drafts, strict=True)}
+        places[SUMMARY].write_bytes((json_text(told) + "\n").encode())
+        plotting.save(errors_picture(found), places[ERRORS])
+        write_windows(found, places)
+        places[PAGE].write_bytes(page(found, told).encode())
+
+
+# --- `servotwin robot fit`: servos, supply, links, zeros and latency of a robot from its episodes ---------------------
+
+_FIT = "Fit"
+
+
+def fit(
+    model_file: options.ModelArgument, logs: DatasetArgument, servo: options.ServoOption = None,
+    mount: options.MountOption = None, model: options.ModelOption = None, change: options.SetOption = None,
+    register: options.RegisterOption = None, supply: options.SupplyOption = None,
+    package: options.PackageOption = None,
+    calibration: options.CalibrationOption = None, episode: options.EpisodesOption = None,
+    unit: options.UnitOption = None,
+    each: Annotated[bool, typer.Option("--each", help="Fit every servo by itself (default: one for all that are "
+                                       "equal).", rich_help_panel=_FIT)] = False,
+    masses: Annotated[float, typer.Option(metavar="SHARE", help="How far the masses of the robot's file may be off, as "
+                                          "a standard deviation; 0: they are right.", rich_help_panel=_FIT)] = 0.1,
+    holdout: Annotated[int | None, typer.Option(metavar="COUNT", help="Episodes, the last ones, that are not fitted "
+                                                "but predicted (default: a fourth, at least one of two).",
+                                                rich_help_panel=_FIT)] = None,
+    intervals: Annotated[bool, typer.Option("--intervals/--no-intervals", help="Without them it is a first result in a "
+                                            "third of the time.", rich_help_panel=_FIT)] = True,
+    diagnose: Annotated[bool, typer.Option("--trials/--no-trials", help="Whether causes are sought where a belief "
+                                           "is pushed far.", rich_help_panel=_FIT)] = True,
+    within: Annotated[str | None, typer.Option(metavar="DURATION", help="Stop after this time, such as 90s or 5min, "
+                                               "and keep the best so far, as Ctrl-C does.",
+                                               rich_help_panel=_FIT)] = None,
+    out: OutOption = None, force: ForceOption = False, as_json: shared.JsonOption = False,
+) -> None:
+    """Fit the servos of a robot."""
+    from servotwin.cli import robot_report as files
+    from servotwin.cli.fit_report import duration
+    from servotwin.cli.robot_options import as_options
+    from servotwin.cli.shared_options import best_kept, end_if_stopped
+    from servotwin.identification.arms import identify_arm
+    from servotwin.identification.arms.identify_arm import UNKNOWN, mounts_of, plant_of
+    from servotwin.robots.episode import joints_of_dataset
+
+    limit = duration("--within", within)
+    plant, unknown = plant_of(UNKNOWN, joints_of_dataset(logs)) if model_file == UNKNOWN else (None, ())
+    asked = options.asked_robot(model_file, logs, servo=servo or [], mount=mount or [], model=model,
+                                change=change or [], register=register or [], supply=supply, calibration=calibration,
+                                episodes=episode or [], unit=unit or [], package=package or [], plant=plant)
+
+    def done(names: Sequence[str]) -> tuple[ArmFit, dict[str, Any]]:
+        targets = files.targets_of(out, names, force=force, inputs=[logs]) if out is not None else []
+        with as_options(), best_kept(shown=not as_json) as progress:
+            found = identify_arm(asked.motions, UNKNOWN if unknown else asked.plant, asked.mounts, bus=asked.bus,
+                                 each=each, masses=masses, holdout=holdout, intervals=intervals, diagnose=diagnose,
+                                 within=limit, progress=progress)
+        told = {"robot": model_file, "episodes": [one.source for one in asked.motions], **found.facts()}
+        told["warnings"] = [*asked.said, *told["warnings"]]
+        _write_fit(found, told, targets, stems, force=force)
+        told["files"] = [str(target.path) for target in targets]
+        if not as_json:
+            _show_fit(found, told)
+        return found, told
+
+    with as_options():  # of the servos at recorded joints, the only ones that are fitted
+        stems = file_stems(mounts_of(asked.mounts, model_file, asked.plant, asked.motions)[0])
+    servos = [f"{stem}.toml" for stem in stems.values()]
+    windows = files.joint_pages(WINDOWS, len(stems))
+    if out is None:
+        found, told = done([])
+    else:
+        with files.folder(out):
+            found, told = done([*servos, SUMMARY, ERRORS, *windows, PAGE])
+    if as_json:
+        emit_json(told)
+    end_if_stopped(found, timed=within is not None)
+
+
+def _show_fit(found: ArmFit, told: dict[str, Any]) -> None:
+    from servotwin.identification.report.page import error_rows, estimate_rows
+
+    head, rows = error_rows(found)
+    said = [*map(str, found.unidentifiable), *map(str, found.left_out), *told["warnings"]]
+    show(f"{told['robot']}: {told['sentence']}", *(f"! {cause.sentence}" for cause in found.causes), "",
+         "simulated less measured, rms (deg)", table(head, rows), "",
+         table(("number", "value", f"{100 * found.level:g} % interval", "known"), estimate_rows(found)), "",
+         pairs([*(("note", text) for text in said),
+                *((("written", told["files"][-1]),) if told["files"] else ())]))
+
+
+def _write_fit(found: ArmFit, told: dict[str, Any], targets: Sequence[Target], stems: dict[str, str], *,
+           force: bool) -> None:
+    if not targets:
+        return
+    from servotwin import plotting
+    from servotwin.cli.outputs import staged
+    from servotwin.cli.robot_report import figure, figures, joint_pages
+    from servotwin.cli.robot_task_report import errors_picture, write_windows
+    from servotwin.identification.report.page import arm_page
+
+    judged = found.holdout or found.training
+    with staged(targets, force=force) as drafts:
+        places: dict[str, Path] = {target.path.name: draft for target, draft in zip(targets, drafts, strict=True)}
+        for joint, servo in found.servos.items():
+            servo.save(places[f"{stems[joint]}.toml"], overwrite=True)
+        places[SUMMARY].write_bytes((json_text(told) + "\n").encode())
+        plotting.save(errors_picture(judged), places[ERRORS])
+        write_windows(judged, places)
+        pictures = figure(ERRORS, "The same beside ideal actuators.") + figures(
+            joint_pages(WINDOWS, len(judged.windows)), "The second of each joint in which the fitted servos are "
+            "furthest off, the worst joint first.")
+        places[PAGE].write_bytes(arm_page(found, pictures).encode())
+
+
+# --- `servotwin robot`: robots whose joints are servos ----------------------------------------------------------------
 
 _MOST_NOTES = 6  # that are told
 _RATES = (1.0, 120.0)  # pictures a second
@@ -81,9 +321,8 @@ def run(
     as_json: shared.JsonOption = False,
 ) -> None:
     """Let a robot follow a motion, and say whether its servos are big enough."""
-    from servotwin.cli import robot_files as files
-    from servotwin.cli.robot_facts import facts
-    from servotwin.cli.robot_words import (
+    from servotwin.cli import robot_report as files
+    from servotwin.cli.robot_options import (
         as_options,
         models_of,
         mounts_of,
@@ -93,6 +332,7 @@ def run(
         supply_of,
         units_of,
     )
+    from servotwin.cli.robot_report import run_facts as facts
     from servotwin.robots import joint_names, joint_ranges, run_motion, sizing_of
     from servotwin.robots.model_file import plant_of
     from servotwin.robots.motion import is_dataset
@@ -124,7 +364,7 @@ def run(
     if as_json:
         emit_json(found)
     else:
-        _show(done, sized, found)
+        _show_run(done, sized, found)
 
 
 def check_numbers(*, output_step: float, rate: float, blend: float | None) -> None:
@@ -163,8 +403,8 @@ def check_drawing(plant: Any, camera: str | None, *, video: bool) -> bool:
         return False
 
 
-def _show(done: RobotRun, sized: dict[str, Sizing], found: dict[str, Any]) -> None:
-    from servotwin.cli.robot_facts import HEAD, heat_is_assumed, place, row
+def _show_run(done: RobotRun, sized: dict[str, Sizing], found: dict[str, Any]) -> None:
+    from servotwin.cli.robot_report import HEAD, heat_is_assumed, place, row
 
     servos: dict[str, list[str]] = {}
     for joint, mount in done.mounts.items():

@@ -3,10 +3,332 @@
 An option whose help differs from command to command (unit, model, load, seed ...) is declared by the command itself.
 """
 
+from __future__ import annotations
+
+import contextlib
+import re
+import warnings
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple, Protocol
 
 import typer
+
+from servotwin.cli import interrupts
+from servotwin.errors import ParameterError
+
+if TYPE_CHECKING:
+    from servotwin.models import Model
+    from servotwin.parameters import Servo
+    from servotwin.parameters.servo import Value
+
+
+
+# --- How a command that fits goes on after a signal, or the time that it was given: with the best so far --------------
+
+class _Fit(Protocol):
+    @property
+    def interrupted(self) -> bool: ...
+
+
+@contextlib.contextmanager
+def best_kept(*, shown: bool = True) -> Iterator[Callable[[float, str], None]]:
+    """Give what shows the progress, and ends the search after an interrupt, with the best so far.
+
+    Before the first step there is no best, and an interrupt ends the process.
+    """
+    from servotwin.identification.fitting import checks
+
+    with checks.shown(shown) as show, contextlib.ExitStack() as stack:
+        ends: list[Callable[[], None]] = []
+
+        def tell(share: float, text: str) -> None:
+            show(share, text)
+            if share > 0.0 and not ends:
+                ends.append(stack.enter_context(interrupts.finishing()))
+            for check in ends:
+                check()
+
+        yield tell
+
+
+def end_if_stopped(fit: _Fit, *, timed: bool) -> None:
+    """End the command as an interrupt does, where one has stopped the fit; `timed` is whether its time was limited.
+
+    Raises
+    ------
+    typer.Exit
+    """
+    if fit.interrupted and (not timed or interrupts.noted()):
+        raise typer.Exit(interrupts.code())
+
+
+# --- Servo and model out of the words of an argument SERVO and the options `--model` and `--set` ----------------------
+
+def class_of(name: str, among: Sequence[str] | None = None) -> type[Model]:
+    """Return the class of a model by the name that `--model` has for it.
+
+    Parameters
+    ----------
+    name : str
+    among : sequence of str, optional
+        Names that are allowed; all unless given.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is none of this name.
+
+    Examples
+    --------
+    >>> class_of("pulse").__name__
+    'PulseServo'
+    """
+    from servotwin.errors import UnknownNameError
+    from servotwin.models import MODELS
+
+    if name not in (among or MODELS):
+        raise UnknownNameError("model", name, among or MODELS)
+    return MODELS[name]
+
+
+def model_of(servo: str, name: str | None, change: Sequence[str], among: Sequence[str] | None = None,
+             register: Sequence[str] = (), supply: str | None = None, assumed: Sequence[str] = ()) -> Model:
+    """Return the model of a servo.
+
+    Parameters
+    ----------
+    servo : str
+        Id in the catalog, or path of a servo file.
+    name : str or None
+        Of the model; None: the one that stands for this servo.
+    change : sequence of str
+        Words of `--set`.
+    among : sequence of str, optional
+        Names that are allowed; all unless given.
+    register : sequence of str
+        Words of `--register`; they come first.
+    supply : str, optional
+        Words of `--supply`; what `--set` says comes after it.
+    assumed : sequence of str
+        Sets of registers that nobody said; those of `--register` go before them.
+
+    Raises
+    ------
+    ServotwinError
+        If servo, model, a register or a changed parameter is not known or not possible.
+
+    Examples
+    --------
+    >>> model_of("hitec-hs-755hb", "bounded", ["motor.armature_resistance=3.1"])
+    BoundedServo('hitec-hs-755hb')
+    """
+    from servotwin.models import default_model
+
+    kind = None if name is None else class_of(name, among)
+    changed = servo_of(servo, change, register, supply, assumed)
+    return default_model(changed) if kind is None else kind(changed)
+
+
+def servo_of(servo: str, change: Sequence[str], register: Sequence[str] = (), supply: str | None = None,
+             assumed: Sequence[str] = ()) -> Servo:
+    """Return a servo with the registers of `--register`, on the supply of `--supply`, as `--set` changes it.
+
+    Examples
+    --------
+    >>> servo_of("hitec-hs-755hb", ["motor.armature_resistance=3.1"]).motor.armature_resistance
+    3.1
+    """
+    from servotwin.parameters import load_servo
+    from servotwin.parameters.registers.held import register_family_of
+    from servotwin.parameters.registers.table import set_registers
+
+    plain = load_servo(servo)
+    for name in assumed:
+        plain = set_registers(register_family_of(plain), name, plain, assumed=True)
+    known = found = with_registers(plain, register)
+    if supply is not None:
+        from servotwin.datasheet.conditions import on_supply
+        from servotwin.parameters import Supply
+
+        found = on_supply(found, Supply.of(supply, what="--supply"), source="set by --supply")
+    made = found.replace(settings(change), source="set by --set") if change else found
+    volts = made.supply.open_circuit_voltage
+    if volts is not None and volts != known.supply.open_circuit_voltage:
+        _check_sheet(known, volts)
+    return made
+
+
+def _check_sheet(servo: Servo, volts: float) -> None:
+    """Warn of a supply far from the maker's sheet; of twice as much simulations themselves do."""
+    from servotwin.datasheet.conditions import highest_voltage, is_above_sheet, is_below_sheet, lowest_voltage
+
+    most = highest_voltage(servo)
+    if is_below_sheet(servo, volts):
+        warnings.warn(f"{servo.name}: its sheet begins at {lowest_voltage(servo):g} V, and the supply has {volts:g} V",
+                      UserWarning, stacklevel=3)
+    if is_above_sheet(servo, volts) and volts <= 2.0 * most:
+        warnings.warn(f"{servo.name}: its sheet ends at {most:g} V, and the supply has {volts:g} V", UserWarning,
+                      stacklevel=3)
+
+
+# --- Changed parameters out of the words of `--set` -------------------------------------------------------------------
+
+_AWAY = "none"  # takes a value, or all of a group, away
+
+
+def settings(words: Sequence[str]) -> dict[str, Value | None]:
+    """Return values (SI) by dotted name, None for what is taken away; `Servo.replace` checks whether they are physical.
+
+    Parameters
+    ----------
+    words : sequence of str
+        Such as ``"motor.armature_resistance=3.1ohm"``; a number without unit is in SI. ``"stops.upper_angle=none"``
+        takes a value away, ``"stops=none"`` all of its group.
+
+    Raises
+    ------
+    ParameterError
+        If one has no name or no value, or a name comes twice.
+    UnknownNameError
+        If no parameter has this name.
+    InputError
+        If a number is none, or its unit measures something else.
+
+    Examples
+    --------
+    >>> settings(["motor.armature_resistance=3.1", "electronics.deadband=8us", "electronics.off_state=coast"])
+    {'motor.armature_resistance': 3.1, 'electronics.deadband': 8e-06, 'electronics.off_state': 'coast'}
+    >>> settings(["stops=none"])
+    {'stops.lower_angle': None, 'stops.upper_angle': None, 'stops.restitution': None}
+    """
+    values: dict[str, Value | None] = {}
+    for word in words:
+        name, equals, text = (word.partition("=")[k].strip() for k in range(3))
+        if not (name and equals and text):
+            raise ParameterError("--set", got=word, allowed="GROUP.NAME=VALUE, such as supply.open_circuit_voltage=5V, "
+                                 "or GROUP=none")
+        for each in _names(name, text):
+            if each in values:
+                got = _AWAY if values[each] is None else values[each]
+                raise ParameterError(f"--set {each}", got=f"{got} and {text}", allowed="one value")
+            values[each] = _value(each, text)
+    return values
+
+
+def _names(name: str, text: str) -> tuple[str, ...]:
+    """Return the parameters that a name means: itself, or where a group is taken away all of it."""
+    from dataclasses import fields
+
+    from servotwin.parameters import GROUPS
+
+    if text.lower() != _AWAY or name not in GROUPS:
+        return (name,)
+    return tuple(f"{name}.{f.name}" for f in fields(GROUPS[name]))
+
+
+def _value(name: str, text: str) -> Value | None:
+    from servotwin.parameters import dimension_of
+    from servotwin.units.quantities import quantity
+
+    dimension = dimension_of(name)
+    if text.lower() == _AWAY:
+        return None
+    if dimension == "word":
+        return text
+    found = tuple(quantity(f"--set {name}", part, dimension, bare=True) for part in text.split(","))
+    return found if len(found) > 1 else found[0]
+
+
+# --- Registers out of the words of `--register` -----------------------------------------------------------------------
+
+_WHOLE = re.compile(r"[+-]?\d+|0[xX][0-9a-fA-F]+")
+_FORM = "NAME=VALUE, such as P_Coefficient=16, or the name of a set, such as lerobot"
+
+
+class Registers(NamedTuple):
+    """What words say: names of sets, and single values, which go before them.
+
+    Parameters
+    ----------
+    sets : tuple of str
+    values : dict of str to int
+    """
+
+    sets: tuple[str, ...]
+    values: dict[str, int]
+
+
+def registers(words: Sequence[str]) -> Registers:
+    """Return sets and raw values by name; whether there are such registers is checked when they are set.
+
+    Parameters
+    ----------
+    words : sequence of str
+        Such as ``"P_Coefficient=16"`` or ``"lerobot"``; several in one word are divided by commas.
+
+    Raises
+    ------
+    ParameterError
+        If one has no name or no whole number, or a name comes twice.
+
+    Examples
+    --------
+    >>> registers(["lerobot,P_Coefficient=32", "ID=0x03"])
+    Registers(sets=('lerobot',), values={'P_Coefficient': 32, 'ID': 3})
+    """
+    sets: dict[str, None] = {}
+    found: dict[str, int] = {}
+    for word in (part for each in words for part in each.split(",")):
+        name, equals, text = (word.partition("=")[k].strip() for k in range(3))
+        if not name or bool(equals) is not bool(text):
+            raise ParameterError("--register", got=word, allowed=_FORM)
+        if not equals:
+            sets[name] = None
+            continue
+        if _WHOLE.fullmatch(text) is None:
+            raise ParameterError(f"--register {name}", got=text, allowed="a whole number, as it is written into it")
+        if name in found:
+            raise ParameterError(f"--register {name}", got=f"{found[name]} and {text}", allowed="one value")
+        found[name] = int(text, 0) if "x" in text.lower() else int(text)
+    return Registers(tuple(sets), found)
+
+
+def with_registers(servo: Servo, words: Sequence[str]) -> Servo:
+    """Return a servo with the registers of its own family that `--register` sets.
+
+    Raises
+    ------
+    ParameterError
+        If the servo has no registers, or a value is not one of theirs.
+    UnknownNameError
+        If there is no register, or no set, of a name.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> softer = with_registers(st.load_servo("feetech-sts3215-12v"), ["P_Coefficient=16"])
+    >>> round(softer.firmware.proportional_gain, 3)
+    2.608
+    """
+    from servotwin.parameters import REGISTER_FAMILIES
+
+    if not words:
+        return servo
+    given, family = registers(words), servo.sheet.get("registers")
+    if family not in REGISTER_FAMILIES:
+        raise ParameterError(f"--register for {servo.name}", got=", ".join((*given.sets, *given.values)),
+                             allowed="a servo with registers, whose file says registers = "
+                             + " or ".join(f'"{name}"' for name in REGISTER_FAMILIES)
+                             + " under [sheet]; --set firmware.NAME=VALUE changes any servo")
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        for name in given.sets:
+            servo = REGISTER_FAMILIES[family](name, servo=servo)
+        return REGISTER_FAMILIES[family](given.values, servo=servo) if given.values else servo
+
+
+# --- What the commands that run a servo ask for in the same words; the defaults stand in each command's ---------------
 
 COMMAND, PLANT, OUTPUT = "Command (one of)", "Servo and load", "Run and output"  # panels of the help
 

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.model_words import model_of
+from servotwin.cli.shared_options import model_of
 from servotwin.cli.terminal import emit_json, pairs, patience, show
 
 if TYPE_CHECKING:
-    from servotwin.cli.command_words import CommandWords
+    from servotwin.cli.option_values import CommandWords
     from servotwin.cli.outputs import Target
     from servotwin.models import Model
     from servotwin.signals import Signal
@@ -72,8 +72,8 @@ def simulate(
     as_json: shared.JsonOption = False,
 ) -> None:
     """Simulate one servo under one command and one load."""
-    from servotwin.cli import load_words
-    from servotwin.cli.command_words import CommandWords
+    from servotwin.cli import option_values
+    from servotwin.cli.option_values import CommandWords
 
     words = CommandWords(step=step, ramp=ramp, sine=sine, chirp=chirp, prbs=prbs, constant=constant, pulses=pulses,
                          command=command, unit=unit, at=at, over=over, hold=hold, column=column)
@@ -84,13 +84,13 @@ def simulate(
     if duration <= _LONGEST_RANGED:
         found |= _ranges(result, words.signal(duration), found, load or [], seed)
     found |= {"remedies": _remedies(result), "command": words.described(duration),
-              "load": load_words.described(load or []), "files": [str(target.path) for target in targets]}
+              "load": option_values.described(load or []), "files": [str(target.path) for target in targets]}
     _report(found, as_json=as_json)
 
 
 def _checked_targets(out: Path | None, plot: Path | None, servo: str, words: CommandWords, load: list[str], *,
                      force: bool) -> list[Target]:
-    from servotwin.cli.load_words import recorded_files
+    from servotwin.cli.option_values import recorded_files
     from servotwin.cli.outputs import Target, check_targets
 
     targets = []
@@ -105,7 +105,7 @@ def _checked_targets(out: Path | None, plot: Path | None, servo: str, words: Com
 
 def _run(model: Model, words: CommandWords, load: list[str], duration: float, output_step: float | None,
          seed: int) -> Result:
-    from servotwin.cli.load_words import load_from
+    from servotwin.cli.option_values import load_from
     from servotwin.errors import InputError
     from servotwin.simulation import simulate as run
 
@@ -162,7 +162,7 @@ def _remedies(result: Result) -> list[dict[str, Any]]:
 
 def _ranges(result: Result, signal: Signal, found: dict[str, Any], load: list[str], seed: int) -> dict[str, Any]:
     """Return the ranges of what rests on guesses, and these."""
-    from servotwin.cli.load_words import load_from
+    from servotwin.cli.option_values import load_from
     from servotwin.cli.summary import facts, figures
     from servotwin.datasheet.guesses import guesses, spans, variants
     from servotwin.simulation import simulate as run

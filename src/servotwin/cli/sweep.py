@@ -2,18 +2,75 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
+import logging
+import warnings
+from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.model_words import model_of
+from servotwin.cli.shared_options import model_of
 from servotwin.cli.terminal import emit_json, patience, show
+from servotwin.errors import InputError, MissingExtraError
 
 if TYPE_CHECKING:
     from servotwin.models import Model
     from servotwin.studies import Study
+
+
+
+# --- The workers of a dask scheduler, as an executor ------------------------------------------------------------------
+
+_PATIENCE = 5.0  # s until a scheduler has answered
+_RETRIES = 3  # of a chunk whose worker is lost
+
+
+@contextlib.contextmanager
+def executor_at(address: str | None) -> Iterator[Any]:
+    """Give an executor that hands work to a dask scheduler; None without an address.
+
+    Raises
+    ------
+    MissingExtraError
+        If dask is not installed.
+    InputError
+        If no scheduler answers at this address.
+    """
+    if address is None:
+        yield None
+        return
+    try:
+        distributed: Any = import_module("distributed")
+    except ImportError:
+        raise MissingExtraError("distributed", "sweep") from None
+    for name in ("distributed", "tornado"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what matters becomes an error of one line
+    try:  # first by hand: a client that found no scheduler complains again when it is collected
+        asyncio.run(_greeted(address))
+        client = distributed.Client(address, timeout=_PATIENCE, set_as_default=False)
+    except (Exception, asyncio.CancelledError) as error:  # whatever answers there may say anything
+        raise InputError("--scheduler", got=f"{address} ({type(error).__name__})",
+                         allowed="the address of a dask scheduler that answers, such as tcp://host:8786") from None
+    if not client.scheduler_info()["workers"]:
+        warnings.warn(f"the scheduler at {address} has no worker yet: this waits for one", stacklevel=2)
+    try:
+        yield client.get_executor(pure=False, retries=_RETRIES)
+    finally:
+        client.close(timeout=_PATIENCE)
+
+
+async def _greeted(address: str) -> None:
+    core: Any = import_module("distributed.comm.core")
+    comm = await asyncio.wait_for(core.connect(address, timeout=_PATIENCE), 1.2 * _PATIENCE)
+    comm.abort()
+
+
+# --- `servotwin sweep`: one servo whose parameters vary, one command, one load ----------------------------------------
 
 _VARIED = "What varies"
 
@@ -87,7 +144,7 @@ def sweep(
     as_json: shared.JsonOption = False,
 ) -> None:
     """Draw the parameters of a servo, simulate all, and say what that does to a few metrics."""
-    from servotwin.cli.command_words import CommandWords
+    from servotwin.cli.option_values import CommandWords
 
     words = CommandWords(step=step, ramp=ramp, sine=sine, chirp=chirp, prbs=prbs, constant=constant, pulses=pulses,
                          command=command, unit=unit, at=at, over=over, hold=hold, column=column)
@@ -138,8 +195,7 @@ def _draws(path: Path | None) -> dict[str, Any] | None:
 def _run(model: Model, words: Any, load: list[str], metric: list[str], options: dict[str, Any],
          scheduler: str | None) -> Study:
     from servotwin.cli.interrupts import last_words
-    from servotwin.cli.load_words import load_from
-    from servotwin.cli.scheduler import executor_at
+    from servotwin.cli.option_values import load_from
     from servotwin.errors import InputError
     from servotwin.studies import sweep as run
     from servotwin.studies.metrics import checked_metrics
@@ -164,8 +220,7 @@ def _how_to_go_on(folder: Path | None) -> str | None:
 
 
 def _report(study: Study, nominal: Model, metric: list[str], out: Path | None, *, plot: bool, as_json: bool) -> None:
-    from servotwin.cli.summary import was_set
-    from servotwin.cli.sweep_words import sections
+    from servotwin.cli.summary import sections, was_set
 
     chosen = metric[0] if metric else study.metrics[0]
     files = [] if out is None else [str(out)]

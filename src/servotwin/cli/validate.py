@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from servotwin.cli import log_reading
+from servotwin.cli import log
 from servotwin.cli import shared_options as shared
 from servotwin.cli.terminal import emit_json, patience, show, table
 from servotwin.logs.reading import reading_facts
@@ -30,17 +30,17 @@ _MOST_LOGS = 30
 def validate(
     servo: shared.ServoArgument,
     logs: Annotated[list[Path], typer.Argument(
-        metavar="LOGS", help=log_reading.HELP)],
+        metavar="LOGS", help=log.LOGS_HELP)],
     model: Annotated[str | None, typer.Option(
         metavar="MODEL", help="pulse, pulse-inductive, bounded or digital (default: the model of the file's fit, else "
         "that of the servo's kind).")]
     = None,
-    file_format: log_reading.FormatOption = "auto",
-    columns: log_reading.ColumnsOption = None,
-    joint: log_reading.JointOption = None,
-    raw: log_reading.RegistersOption = None,
-    rate: log_reading.RateOption = None,
-    commanded: log_reading.CommandedOption = None,
+    file_format: log.FormatOption = "auto",
+    columns: log.ColumnsOption = None,
+    joint: log.JointOption = None,
+    raw: log.RegistersOption = None,
+    rate: log.RateOption = None,
+    commanded: log.CommandedOption = None,
     change: Annotated[list[str] | None, typer.Option(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable; with a unit, or "
         "in SI units.")] = None,
@@ -55,7 +55,7 @@ def validate(
     leave_out: Annotated[list[str] | None, typer.Option(
         "--leave-out", metavar="START..STOP", help="Time window to ignore, in all logs, or in one: "
         "LOG=START..STOP; repeatable.")] = None,
-    mend: log_reading.MendOption = None,
+    mend: log.MendOption = None,
     max_error: Annotated[list[str] | None, typer.Option(
         "--max-error", metavar="ERROR", help="Exit with code 1 if the rms error of a kind of motion is larger, such as "
         "3deg, or prbs=8deg for one kind; repeatable.")] = None,
@@ -65,11 +65,11 @@ def validate(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.")] = False,
 ) -> None:
     """Compare a servo with logs, and say how far it is off."""
-    from servotwin.cli.model_words import servo_of
+    from servotwin.cli.shared_options import servo_of
 
     targets = _targets(report, [Path(servo), *logs], force=force)
     changed = servo_of(servo, change or [], register or [], supply)
-    found = _run(changed, model, nuisance, sensors, mend, lambda nominal: log_reading.read(
+    found = _run(changed, model, nuisance, sensors, mend, lambda nominal: log.read(
         logs, file_format, columns, joint, leave_out or [], mend=mend, rate=rate, commanded=commanded, force=force,
         quiet=as_json, registers=bool(register), raw=raw, model=nominal))
     limits = _limits(found, max_error or [])
@@ -90,27 +90,27 @@ def _targets(report: Path | None, inputs: list[Path], *, force: bool) -> list[Ta
 
 def _run(servo: Servo, model: str | None, nuisance: list[str] | None, sensors: list[str] | None,
          mend: list[str] | None, read: Callable[[Model], list[Log]]) -> Validation:
-    from servotwin.cli import fit_words
-    from servotwin.cli.model_words import class_of
+    from servotwin.cli import fit_report
+    from servotwin.cli.shared_options import class_of
     from servotwin.identification.fitting.checks import checked_servo
     from servotwin.identification.fitting.validate import recorded_model
     from servotwin.identification.fitting.validate import validate as run
 
-    kind = None if model is None else class_of(model, fit_words.MODEL_NAMES)
-    fitted = fit_words.some_or_none("--nuisance", nuisance, ())
+    kind = None if model is None else class_of(model, fit_report.MODEL_NAMES)
+    fitted = fit_report.some_or_none("--nuisance", nuisance, ())
     nominal = checked_servo(servo, recorded_model(servo) if kind is None else kind)
-    return run(read(nominal), servo, kind, mend=fit_words.kinds(mend), nuisance=fitted,
-               sensors=fit_words.names(sensors), progress=True)
+    return run(read(nominal), servo, kind, mend=fit_report.kinds(mend), nuisance=fitted,
+               sensors=fit_report.names(sensors), progress=True)
 
 
 def _limits(found: Validation, words: list[str]) -> Mapping[str | None, float]:
-    from servotwin.cli import fit_words
+    from servotwin.cli import fit_report
     from servotwin.errors import InputError, UnknownNameError
 
     signals = {trace.signal for trace in found.traces}
     if words and len(signals) > 1:
         raise InputError("--max-error", got="logs with angles and logs with feedback voltages", allowed="one kind")
-    limits = fit_words.limits_of(words, angle="output_angle" in signals)
+    limits = fit_report.limits_of(words, angle="output_angle" in signals)
     motions = list(found.errors.by("motion"))
     for motion in limits:
         if motion is not None and motion not in motions:
@@ -140,14 +140,15 @@ def _write(found: Validation, targets: list[Target], *, force: bool) -> list[str
 
 def _report(found: Validation, above: Mapping[str, float], limits: Mapping[str | None, float], files: list[str], *,
             as_json: bool) -> None:
-    from servotwin.cli import fit_show
+    from servotwin.cli import fit_report
 
     if as_json:
         emit_json({
             "servo": found.servo.name, "model": type(found.model).__name__, "logs": len(found.traces),
             "reading": reading_facts([trace.log for trace in found.traces]),
             "nuisance": dict(found.nuisance), "fitted": list(found.fitted),
-            "errors": fit_show.error_facts(found.errors), "noise": dict(found.noise), "warnings": list(found.warnings),
+            "errors": fit_report.error_facts(found.errors), "noise": dict(found.noise),
+            "warnings": list(found.warnings),
             "registers": None if found.registers is None else found.registers.facts,
             "max_error": {motion or "all": limit for motion, limit in limits.items()}, "above": dict(above),
             "files": files})
@@ -157,7 +158,7 @@ def _report(found: Validation, above: Mapping[str, float], limits: Mapping[str |
 
 def _sections(found: Validation, above: Mapping[str, float], limits: Mapping[str | None, float],
               files: list[str]) -> list[RenderableType]:
-    from servotwin.cli import fit_show
+    from servotwin.cli import fit_report
     from servotwin.identification.report.pictures import error_shown, rig_text
 
     tables = {"": found.errors}
@@ -167,7 +168,7 @@ def _sections(found: Validation, above: Mapping[str, float], limits: Mapping[str
         f"{found.servo.title or found.servo.name} ({found.servo.name}), {type(found.model).__name__}, "
         f"{len(found.traces)} logs" + (f"; {', '.join(rig)}" if rig else "")]
     for label in found.errors.labels():
-        parts += ["", fit_show.errors(tables, found.traces, label)]
+        parts += ["", fit_report.errors(tables, found.traces, label)]
     parts += ["", _log_table(found)]
     parts += ["", *[f"! {text}" for text in found.warnings]] if found.warnings else []
     factor, unit = error_shown(found.traces)
@@ -175,7 +176,7 @@ def _sections(found: Validation, above: Mapping[str, float], limits: Mapping[str
     for motion, error in above.items():
         limit = limits.get(motion, limits.get(None, math.inf))
         parts += [f"! {motion}: {error * factor:.3g} {unit} is above {limit * factor:.3g} {unit}"]
-    return [*parts, "", fit_show.written(files)] if files else parts
+    return [*parts, "", fit_report.written(files)] if files else parts
 
 
 def _log_table(found: Validation) -> Any:

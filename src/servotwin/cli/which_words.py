@@ -6,9 +6,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.cli.numbers import numbers
-from servotwin.cli.rest_words import rest_words
-from servotwin.cli.span_words import with_span
+from servotwin.cli.option_values import numbers
+from servotwin.cli.summary import rest_words
+from servotwin.cli.terminal import with_span
 from servotwin.datasheet.choice import Limits
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.tables import read_table
@@ -256,7 +256,7 @@ def candidate_facts(each: Judged) -> dict[str, Any]:
                     "stated": operating_voltages(made.servo) is not None},
         "notes": [*made.notes, *remarks(each)], "reasons": [reason._asdict() for reason in made.reasons]}
     if rest is not None:
-        from servotwin.cli.curves_words import lift_facts
+        from servotwin.cli.curves_report import lift_facts
 
         found |= {"smallest_move": rest.smallest_move, "smallest_move_span": rest.move_span,
                   "at_rest": None if rest.rest is None else rest.rest._asdict(),

@@ -70,7 +70,7 @@ def wire(
 
 
 def _written(servo: Any, words: tuple[str, ...]) -> Any:
-    from servotwin.cli.register_words import with_registers
+    from servotwin.cli.shared_options import with_registers
 
     return with_registers(servo, words)
 

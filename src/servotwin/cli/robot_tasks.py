@@ -10,17 +10,116 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.robot_words import ALL, Chosen, as_options, models_of, named_words, supply_of
-from servotwin.cli.terminal import emit_json, pairs, patience, show, table
+from servotwin.cli.robot_options import ALL, Chosen, as_options, models_of, named_words, supply_of
+from servotwin.cli.terminal import emit_json, json_text, pairs, patience, show, table
+from servotwin.cli.terminal import table as shown_table
 
 if TYPE_CHECKING:
     from servotwin.cli.outputs import Target
     from servotwin.models import Model
+    from servotwin.robots import WaypointRun
     from servotwin.robots.arm import Arm
+    from servotwin.robots.comparison import Comparison, Outcome
     from servotwin.robots.kinematics import JointPath
     from servotwin.robots.redundancy import Criterion
     from servotwin.robots.steering import Steering
     from servotwin.robots.tasks import ToolPath
+
+
+
+# --- `servotwin robot mobile`: the robot on wheels drives along waypoints, by odometry --------------------------------
+
+_DRIVE, _WHEELS = "Waypoints", "Robot and servos"
+
+
+def mobile(
+    out: Annotated[Path, typer.Option(
+        metavar="FOLDER", help="Folder for tables, pictures, video and page.", rich_help_panel=shared.OUTPUT)],
+    task: Annotated[str, typer.Option(
+        metavar="ROUND", help="square or circle.", rich_help_panel=_DRIVE)] = "square",
+    size: Annotated[str | None, typer.Option(
+        metavar="LENGTH", help="Side or diameter of the round, such as 60cm (the default).",
+        rich_help_panel=_DRIVE)] = None,
+    waypoints: Annotated[str | None, typer.Option(
+        metavar="X,Y;X,Y;...", help="Instead of a round, in metres, such as '0,0; 0.6,0; 0.6,0.6'; or a CSV file with "
+        "columns x_m and y_m.", rich_help_panel=_DRIVE)] = None,
+    speed: Annotated[float, typer.Option(
+        metavar="M/S", help="Of the robot.", rich_help_panel=_DRIVE)] = 0.08,
+    lookahead: Annotated[float, typer.Option(
+        metavar="METRES", help="How far ahead on its path it steers to.", rich_help_panel=_DRIVE)] = 0.1,
+    servo: Annotated[str, typer.Option(
+        metavar="ID", help="Servo of both wheels, rebuilt to turn endlessly: catalog id, or path of a servo file.",
+        rich_help_panel=_WHEELS)] = "hitec-hs-755hb",
+    unequal: Annotated[bool, typer.Option(
+        "--unequal", help="With servos as one buys them: one neutral 8 us off, one motor with 0.9 of its torque.",
+        rich_help_panel=_WHEELS)] = False,
+    encoders: Annotated[int | None, typer.Option(
+        metavar="COUNTS", help="Encoders on the wheels, counts of a turn (default: none; it believes in its pulses).",
+        rich_help_panel=_WHEELS)] = None,
+    ideal: Annotated[bool, typer.Option(
+        "--ideal", help="On ideal wheels.", rich_help_panel=_WHEELS)] = False,
+    supply: Annotated[str | None, typer.Option(
+        metavar="VOLTS[:OHMS]", help="Supply that both servos share, such as 6V:0.1ohm.",
+        rich_help_panel=_WHEELS)] = None,
+    output_step: Annotated[float, typer.Option(
+        metavar="SECONDS", help="Time between rows of the tables.", rich_help_panel=shared.OUTPUT)] = 0.02,
+    video: Annotated[bool, typer.Option(
+        "--video/--no-video", help="Draw a video.", rich_help_panel=shared.OUTPUT)] = True,
+    force: Annotated[bool, typer.Option(
+        "--force", help="Replace existing files.", rich_help_panel=shared.OUTPUT)] = False,
+    as_json: shared.JsonOption = False,
+) -> None:
+    """Let the mobile robot drive along waypoints."""
+    from servotwin.cli import robot_report as files
+    from servotwin.cli import robot_task_report as written
+    from servotwin.cli.robot import check_drawing, check_numbers
+    from servotwin.cli.robot_options import as_options
+    from servotwin.robots import robot_model
+
+    check_numbers(output_step=output_step, rate=written.MOBILE_RATE, blend=None)
+    corners = written.points_of(waypoints, task, size)
+    servos = _servos(servo, unequal=unequal)
+    picture = not ideal and check_drawing(robot_model("mobile"), None, video=video)
+    names = [*([] if ideal else [files.SERVOS]), written.PATH_TABLE, files.SUMMARY, written.PATHS,
+             *files.drawn_names(picture=picture, video=video and picture), files.PAGE]
+    with files.folder(out):
+        targets = files.targets_of(out, names, force=force)
+        with as_options():
+            run = _run(corners, servos, _wheel(servo), speed, lookahead, encoders, supply, ideal=ideal)
+        found = written.mobile_facts(run, servo, encoders, unequal=unequal, ideal=ideal)
+        written.write(run, found, targets, output_step, force=force)
+    found["files"] = [str(target.path) for target in targets]
+    if as_json:
+        emit_json(found)
+    else:
+        show(f"mobile: {len(run.waypoints)} waypoints",
+             pairs([*written.mobile_pairs(found), ("written", found["files"][-1])]))
+
+
+def _servos(servo: str, *, unequal: bool) -> tuple[Model, Model]:
+    from servotwin.robots import unequal_servos
+
+    return unequal_servos(servo) if unequal else (_wheel(servo),) * 2
+
+
+def _wheel(servo: str) -> Model:
+    from servotwin.robots import wheel_servo
+
+    return wheel_servo(servo)
+
+
+def _run(corners: Any, servos: Sequence[Model], nominal: Model, speed: float, lookahead: float, encoders: int | None,
+         supply: str | None, *, ideal: bool) -> WaypointRun:
+    from servotwin.cli.robot_options import supply_of
+    from servotwin.robots import ideal_waypoints, run_waypoints
+
+    if ideal:
+        return ideal_waypoints(corners, speed=speed, lookahead=lookahead)
+    return run_waypoints(servos, corners, encoders=encoders, nominal=nominal, speed=speed, lookahead=lookahead,
+                         bus=supply_of(supply), progress=True)
+
+
+# --- `servotwin robot scara` and `two-link`: arms whose tool follows a path -------------------------------------------
 
 _TASK, _ARM = "Task", "Arm and servos"
 _SERVO = "hitec-hs-755hb"
@@ -142,11 +241,11 @@ def add_to(robot: typer.Typer) -> None:
 
 def _do(arm: Arm, asked: Asked) -> None:
     """Do a task, write its files and tell of it."""
-    from servotwin.cli import robot_files as files
-    from servotwin.cli import robot_task_files as written
+    from servotwin.cli import robot_report as files
+    from servotwin.cli import robot_task_report as written
     from servotwin.cli.robot import check_drawing, check_numbers
 
-    check_numbers(output_step=asked.output_step, rate=written.RATE, blend=None)
+    check_numbers(output_step=asked.output_step, rate=written.MOBILE_RATE, blend=None)
     criterion, steering = _criterion(arm, asked.redundancy), _steering(asked.controller)
     path = path_of(arm, asked.task, asked.size, asked.speed)
     models = _models(arm, asked)
@@ -167,7 +266,7 @@ def _do(arm: Arm, asked: Asked) -> None:
         emit_json(found)
         return
     show(f"{found['robot']}: {path.name}, {path.duration:.4g} s",
-         pairs([*written.told(found), ("written", found["files"][-1])]),
+         pairs([*written.mobile_pairs(found), ("written", found["files"][-1])]),
          *(["", table(written.WAYS, written.way_rows(found))] if arm.redundant else []))
 
 
@@ -210,7 +309,7 @@ def _models(arm: Arm, asked: Asked) -> dict[str, Model]:
 
 
 def _ideal(ways: Ways, targets: Sequence[Target], asked: Asked) -> dict[str, Any]:
-    from servotwin.cli import robot_task_files as written
+    from servotwin.cli import robot_task_report as written
     from servotwin.robots.task_run import ideal_task
 
     done = ideal_task(ways.joints)
@@ -221,7 +320,7 @@ def _ideal(ways: Ways, targets: Sequence[Target], asked: Asked) -> dict[str, Any
 
 def _driven(ways: Ways, targets: Sequence[Target], asked: Asked, models: Mapping[str, Model],
             steering: Steering) -> dict[str, Any]:
-    from servotwin.cli import robot_task_files as written
+    from servotwin.cli import robot_task_report as written
     from servotwin.robots import sizing_of
     from servotwin.robots.task_run import run_task
 
@@ -239,3 +338,98 @@ def mass(text: str | None) -> float:
     from servotwin.units.quantities import quantity
 
     return 0.0 if text is None else quantity("--payload", text, "mass", bare=True)
+
+
+# --- `servotwin robot compare` ----------------------------------------------------------------------------------------
+
+_TABLE, _SUMMARY, _PICTURE, _PAGE = "compare.csv", "summary.json", "conditions.png", "index.html"
+_WHAT = "What to compare"
+
+
+def compare(
+    out: OutOption,
+    robot: Annotated[list[str] | None, typer.Option(
+        metavar="ROBOT", help="scara or two-link; repeatable (default: both).", rich_help_panel=_WHAT)] = None,
+    task: Annotated[list[str] | None, typer.Option(
+        metavar="TASK", help="circle, square or pick-and-place; repeatable (default: all that a robot has).",
+        rich_help_panel=_WHAT)] = None,
+    speed: SpeedOption = 0.08,
+    servo: Annotated[str, typer.Option(
+        metavar="ID", help="Analog servo of all joints: catalog id, or path of a servo file.",
+        rich_help_panel=_WHAT)] = "hitec-hs-755hb",
+    bus_servo: Annotated[str, typer.Option(
+        metavar="ID", help="Digital servo that it is compared with.", rich_help_panel=_WHAT)] = "feetech-sts3215-12v",
+    force: ForceOption = False, as_json: shared.JsonOption = False,
+) -> None:
+    """Compare controllers on all tasks by all fidelities, and when it gets hard."""
+    from servotwin.cli import robot_report as files
+    from servotwin.cli import robot_task_report as words
+    from servotwin.cli.shared_options import servo_of
+    from servotwin.robots.comparison import Comparison
+
+    chosen = _cases(robot, task)
+    comparison = Comparison(servo=servo_of(servo, []), bus_servo=servo_of(bus_servo, []), speed=speed)
+    with files.folder(out):
+        targets = files.targets_of(out, [_TABLE, _SUMMARY, _PICTURE, _PAGE], force=force)
+        done = _outcomes(comparison, chosen, quiet=as_json)
+        found = words.comparison_facts(comparison, done)
+        _write(done, found, targets, force=force)
+    found["files"] = [str(target.path) for target in targets]
+    if as_json:
+        emit_json(found)
+        return
+    show("distance of the tool from where it should be, rms, by pulse servos, mean of all tasks",
+         shown_table(words.CONDITION_HEAD, words.condition_rows(done)), "",
+         *words.losses(done), "", pairs([("written", found["files"][-1])]))
+
+
+def _cases(robots: list[str] | None, tasks: list[str] | None) -> list[Any]:
+    from servotwin.errors import UnknownNameError
+    from servotwin.robots import comparison
+
+    for name in robots or []:
+        if name not in comparison.ROBOTS:
+            raise UnknownNameError("robot to compare on", name, comparison.ROBOTS)
+    known = {task for each in comparison.TASKS.values() for task in each}
+    for name in tasks or []:
+        if name not in known:
+            raise UnknownNameError("task to compare", name, sorted(known))
+    chosen = list(comparison.cases(robots or tuple(comparison.ROBOTS), tasks))
+    if not chosen:
+        raise UnknownNameError("task of these robots", ", ".join(tasks or []),
+                               [task for name in robots or comparison.ROBOTS for task in comparison.TASKS[name]])
+    return chosen
+
+
+def _outcomes(comparison: Comparison, chosen: Sequence[Any], *, quiet: bool) -> list[Outcome]:
+    """Do all cases; the path of the joints is found once a task."""
+    from servotwin.cli.robot_options import as_options
+    from servotwin.simulation.progress import shown
+
+    paths: dict[tuple[str, str], Any] = {}
+    done = []
+    with shown(not quiet, len(chosen), "doing tasks") as tell:
+        for case in chosen:
+            key = (case.robot, case.task)
+            if key not in paths:
+                with as_options():
+                    paths[key] = comparison.joints(case)
+            done.append(comparison.outcome(case, paths[key]))
+            tell(len(done))
+    return done
+
+
+def _write(done: Sequence[Outcome], found: dict[str, Any], targets: Sequence[Target], *, force: bool) -> None:
+    from servotwin import plotting
+    from servotwin.cli.outputs import staged
+    from servotwin.cli.robot_task_report import comparison_page as page
+    from servotwin.cli.robot_task_report import conditions_picture
+    from servotwin.tables import csv_text
+
+    with staged(targets, force=force) as drafts:
+        places: dict[str, Path] = {target.path.name: draft for target, draft in zip(targets, drafts, strict=True)}
+        columns = {name: [case[name] for case in found["cases"]] for name in found["cases"][0]}
+        places[_TABLE].write_bytes(csv_text(columns, digits=9).encode())
+        places[_SUMMARY].write_bytes((json_text(found) + "\n").encode())
+        plotting.save(conditions_picture(done), places[_PICTURE])
+        places[_PAGE].write_bytes(page(found, done).encode())

@@ -1,0 +1,677 @@
+"""The words of `servotwin fit` and `servotwin validate`: names, bounds, priors, what is held out and left out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from servotwin.cli.summary import names as dotted
+from servotwin.cli.summary import was_set
+from servotwin.cli.terminal import emit_json, pairs, show, table
+from servotwin.errors import InputError, ServotwinError, UnknownNameError
+from servotwin.identification.fitting.checks import MENDED
+from servotwin.identification.fitting.free import Space, nominal
+from servotwin.identification.fitting.holdout import fit_percent
+from servotwin.identification.fitting.stopping import Within
+from servotwin.identification.report.pictures import (
+    MODELS,
+    dimension_of_free,
+    error_rows,
+    error_shown,
+    estimate_lines,
+    nominal_of,
+    percent,
+    tables_of,
+)
+from servotwin.logs.mend_names import MENDS
+from servotwin.studies.kinds import Distribution, Normal, Offset, Relative, Uniform
+from servotwin.studies.words import distribution_of
+from servotwin.units.quantities import number_and_unit, quantity
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from servotwin.bench import TableCalibration
+    from servotwin.identification import Advice, Fit, Ladder, Log
+    from servotwin.identification.fitting.fit import Trace
+    from servotwin.identification.fitting.holdout import ErrorTable
+    from servotwin.identification.fitting.yielding import Yielded
+    from servotwin.models import Model
+    from servotwin.parameters import Quantity, Servo
+
+
+
+# --- A fit in tables, and as facts for JSON ---------------------------------------------------------------------------
+
+_MOST_EXPERIMENTS = 8
+
+
+def sections(fit: Fit, files: Sequence[str]) -> list[RenderableType]:
+    """Return what is printed of a fit."""
+    held = sum(trace.held_out for trace in fit.traces)
+    head = f"{fit.servo.title or fit.servo.name} ({fit.servo.name}), {type(fit.model).__name__}, " \
+           f"{len(fit.traces)} logs, {held} of them held out, {fit.seconds:.1f} s"
+    parts: list[RenderableType] = [head, *_verdict(fit)]
+    if fit.interrupted:
+        parts.append(f"INTERRUPTED: the best so far; not known are {', '.join(fit.unknown)}")
+    parts += ["", _estimates(fit), ""]
+    if fit.register_values:
+        rows = [(one.name, f"{one.value:.3g}", one.interval) for one in fit.register_values]
+        parts += [table(("register", "raw value", f"{100.0 * fit.level:g} % interval"), rows), ""]
+    parts += [f"- {item}" for item in fit.unidentifiable]
+    parts += ["- no delay is seen: it ended at 0" if name == "delay" and fit.estimates[name] == 0.0
+              else f"- {name} ended at a bound of the search" for name in fit.at_bound]
+    parts += [f"- {line}" for line in fit.allowing]
+    parts += [""] if fit.unidentifiable or fit.at_bound or fit.allowing else []
+    parts.append(errors(tables_of(fit), fit.traces, "motion"))
+    said = [text for text in fit.warnings if (fit.verdict is None or text != fit.verdict.sentence)
+            and not (fit.interrupted and text.startswith("stopped: the best"))]
+    if said:
+        parts += ["", *[f"! {text}" for text in said]]
+    given = was_set(fit.model)
+    if given or files:
+        parts += ["", pairs([*([("set", dotted(given))] if given else []), *_written(files)])]
+    return parts
+
+
+def _verdict(fit: Fit) -> list[RenderableType]:
+    """Return the verdict, and the causes that explain it, in two lines or a table."""
+    if fit.verdict is None:
+        return []
+    mark = "" if fit.verdict.holds else "! "
+    lines: list[RenderableType] = [f"{mark}{fit.verdict.sentence}"]
+    if fit.verdict.causes:
+        factor, unit = error_shown(fit.traces)
+        rows = [(cause.name, f"{cause.before * factor:.3g}", f"{cause.after * factor:.3g}", cause.remedy)
+                for cause in fit.verdict.causes]
+        lines += ["", table(("what may be the matter", f"error ({unit})", f"with it ({unit})", "what to do"), rows)]
+    return lines
+
+
+def written(files: Sequence[str]) -> RenderableType:
+    """Return the names of files that were written."""
+    return pairs(_written(files))
+
+
+def _written(files: Sequence[str]) -> list[tuple[str, str]]:
+    return [("written", name) for name in files]
+
+
+def _estimates(fit: Fit) -> RenderableType:
+    rows = []
+    for line in estimate_lines(fit):
+        found_by = line.method if line.interval != line.method else ""
+        rows.append((line.name, line.value, line.interval, line.unit, found_by, line.prior,
+                     "rig" if line.nuisance else line.sheet))
+    level = f"{100.0 * fit.level:g} % interval"
+    return table(("parameter", "value", level, "unit", "found by", "prior", "before"), rows)
+
+
+def errors(tables: Mapping[str, ErrorTable], traces: Sequence[Trace], label: str) -> RenderableType:
+    """Return a table of rms errors by the values of a label, all models beside each other."""
+    models = next(iter(tables.values())).models
+    factor, unit = error_shown(traces)
+    rows = [(row.value, row.which, *(_error(row.errors, model, factor) for model in models),
+             percent(row.fits.get(models[0], math.nan))) for row in error_rows(tables, label)]
+    rows += [("all", which, *(_error(held.total(), model, factor) for model in models),
+              percent(held.total(fit_percent)[models[0]])) for which, held in tables.items()]
+    named = any(tables)
+    header = (label.replace("_", " "), "logs", *(f"{MODELS.get(name, name)} ({unit})" for name in models), "fit (%)")
+    if not named:
+        header, rows = (header[0], *header[2:]), [(row[0], *row[2:]) for row in rows]
+    return table(header, rows)
+
+
+def _error(errors_of: Mapping[str, float], model: str, factor: float) -> str:
+    value = errors_of.get(model, math.nan) * factor
+    return f"{value:.3g}" if math.isfinite(value) else "–"
+
+
+def facts(fit: Fit, files: Sequence[str]) -> dict[str, Any]:
+    """Return a fit as plain data for JSON, in SI."""
+    found = fit.intervals()
+    estimates = {name: {
+        "value": fit.estimates[name], "unit": fit.units[name], "lower": float(found[name].lower),
+        "upper": float(found[name].upper), "method": found[name].method, "prior_share": fit.prior_share.get(name),
+        "before": nominal_of(fit, name)}
+        for name in fit.names}
+    return {
+        "servo": fit.servo.name, "model": type(fit.model).__name__, "logs": len(fit.traces),
+        "held_out": [trace.log.name for trace in fit.traces if trace.held_out], "level": fit.level,
+        "estimates": estimates, "covariance": {"names": list(fit.names), "rows": fit.covariance.tolist()},
+        "undetermined": [{
+            "parameters": list(item.parameters), "direction": list(item.direction),
+            "combinations": list(item.combinations), "remedies": list(item.remedies), "words": str(item)}
+            for item in fit.unidentifiable],
+        "registers": None if fit.registers is None else {
+            **fit.registers.facts, "values": [one._asdict() for one in fit.register_values]},
+        "foreseen": [vars(one) | {"words": str(one)} for one in fit.foreseen],
+        "assumptions": [{**asdict(one), "moves": dict(one.moves), "beside": dict(one.beside)}
+                        for one in fit.assumptions],
+        "at_bound": list(fit.at_bound), "yielded": [_yielded(one) for one in fit.yielded],
+        "errors": {which.replace(" ", "_"): error_facts(held) for which, held in tables_of(fit).items()},
+        "noise": {name: float(value) for name, value in fit.noise.items()}, "warnings": list(fit.warnings),
+        "verdict": None if fit.verdict is None else {
+            "sentence": fit.verdict.sentence, "holds": fit.verdict.holds, "ratio": fit.verdict.ratio,
+            "noise": dict(fit.verdict.noise), "autocorrelation": fit.verdict.autocorrelation,
+            "odds": dict(fit.verdict.odds), "outliers": fit.verdict.outliers, "word": fit.verdict.word,
+            "rival": None if fit.verdict.rival is None else vars(fit.verdict.rival),
+            "command_lag": fit.verdict.command_lag,
+            "cross_correlation": None if fit.verdict.command is None else {
+                name: getattr(fit.verdict.command, name).tolist() for name in ("lag", "value", "band")},
+            "causes": [{"name": cause.name, "sentence": cause.sentence, "before": cause.before, "after": cause.after,
+                        "remedy": cause.remedy} for cause in fit.verdict.causes]},
+        "starts": [{"cost": float(start.cost), "converged": bool(start.converged)} for start in fit.starts],
+        "data": fit.servo.fit.get("data"), "seconds": fit.seconds, "interrupted": fit.interrupted,
+        "unknown": list(fit.unknown),
+        "set": was_set(fit.model), "files": list(files),
+    }
+
+
+def _yielded(one: Yielded) -> dict[str, Any]:
+    return {"parameter": one.name, "unit": one.unit, "file": one.file, "file_std": one.file_std, "logs": one.logs,
+            "logs_std": one.logs_std, "logs_lower": one.logs_lower, "logs_upper": one.logs_upper, "apart": one.apart,
+            "of_file": one.of_file, "others": list(one.others), "words": str(one)}
+
+
+def error_facts(held: ErrorTable) -> dict[str, Any]:
+    """Return errors as plain data (SI): in all, by every label, and of each log."""
+    return {
+        "all": held.total(), "by": {label: held.by(label) for label in held.labels()},
+        "fit_percent": held.total(fit_percent),
+        "logs": {model: [{"log": e.log, "motion": e.motion, "conditions": dict(e.conditions), "rms": e.rms,
+                          "largest": e.largest, "samples": e.samples, "fit_percent": e.fit_percent}
+                         for e in held.errors[model]]
+                 for model in held.models}}
+
+
+def ladder_table(ladder: Ladder) -> list[RenderableType]:
+    """Return the rungs of a friction ladder, and which one is chosen."""
+    factor, unit = error_shown(ladder.fit.traces)
+    rows = []
+    for rung in ladder.rungs:
+        said = ["chosen"] if rung.name == ladder.chosen else []
+        said += ["overfitted"] if rung.overfits else []
+        rows.append((rung.name, str(len(rung.fit.space)), f"{rung.training * factor:.3g}",
+                     f"{rung.holdout * factor:.3g}" if math.isfinite(rung.holdout) else "–", f"{rung.criterion:.1f}",
+                     ", ".join(said)))
+    what = "structure" if "," in ladder.chosen else "friction"
+    return [table((what, "parameters", f"fitted ({unit})", f"held out ({unit})", "information criterion", ""), rows),
+            f"{ladder.chosen}: {ladder.reason}", *_told(ladder, factor, unit), ""]
+
+
+def _told(ladder: Ladder, factor: float, unit: str) -> list[str]:
+    """Return the error that the choice did not see."""
+    if not math.isfinite(ladder.error):
+        return []
+    said = f"error on logs that had no say in the choice: {ladder.error * factor:.3g} {unit}"
+    if ladder.choices:
+        said += f" (held-out logs in two halves, which choose {' and '.join(ladder.choices)})"
+    return [said]
+
+
+def ladder_facts(ladder: Ladder) -> dict[str, Any]:
+    """Return a friction ladder as plain data."""
+    return {"chosen": ladder.chosen, "reason": ladder.reason, "error": ladder.error,
+            "choices": list(ladder.choices), "rungs": [
+        {"name": rung.name, "training": rung.training, "holdout": rung.holdout, "criterion": rung.criterion,
+         "overfits": rung.overfits, "estimates": dict(rung.fit.estimates)} for rung in ladder.rungs]}
+
+
+def advice_table(advice: Advice) -> list[RenderableType]:
+    """Return the next experiments, the best first, with the predicted half width of the worst-known parameters."""
+    worst = sorted(advice.now, key=lambda name: -advice.now[name])[:3]
+    rows: list[tuple[str, ...]] = [("as it is now", *_widths(advice.now, worst))]
+    rows += [(str(experiment), *_widths(experiment.widths, worst))
+             for experiment in advice.experiments[:_MOST_EXPERIMENTS]]
+    if any(_width(advice.alone[name]) != _width(advice.now[name]) for name in advice.now):
+        rows.insert(1, ("as it is now, by logs alone, without priors", *_widths(advice.alone, worst)))
+        best = advice.experiments[0]
+        rows.insert(3, ("the same, by logs alone, without priors", *_widths(best.alone, worst)))
+    return ["next experiments, and how surely what is known worst would be known with them (half a 95 % interval)",
+            table(("experiment", *worst, "widest"), rows), str(advice)]
+
+
+def _widths(widths: Mapping[str, float], names: Sequence[str]) -> tuple[str, ...]:
+    return (*(_width(widths[name]) for name in names), _width(max(widths.values())))
+
+
+def advice_facts(advice: Advice) -> dict[str, Any]:
+    """Return advice as plain data; widths are relative."""
+    return {"now": dict(advice.now), "alone": dict(advice.alone), "widest": advice.widest, "experiments": [
+        {"motion": one.motion, "load": one.load, "voltage": one.voltage, "sensors": list(one.sensors),
+         "widths": dict(one.widths), "alone": dict(one.alone), "widest": one.widest} for one in advice.experiments]}
+
+
+def _width(share: float) -> str:
+    if share > 10.0:
+        return "unknown"
+    return f"±{100.0 * share:.2g} %" if share < 1.0 else f"±{100.0 * share:.0f} %"
+
+
+# --- `servotwin fit --table` ------------------------------------------------------------------------------------------
+
+def calibrate_from(path: Path, servo: str | None, out: Path | None, *, change: Sequence[str] = (),
+                   supply: str | None = None, arm: str | None = None, columns: Sequence[str] = (), force: bool = False,
+                   as_json: bool = False) -> None:
+    """Calibrate from a table, show what was found, and write the servo.
+
+    Parameters
+    ----------
+    path : Path
+        The table, a CSV file; or a pattern of the records of lifts, such as ``lift{mass:g}.txt``.
+    servo : str or None
+        Id in the catalog or path of a servo file, which takes the values.
+    out : Path or None
+        Where the servo is written, a .toml.
+    change : sequence of str
+        Words of `--set`.
+    supply : str or None
+        Words of `--supply`.
+    arm : str or None
+        On which weights hung, or the radius of the drum, such as "1cm".
+    columns : sequence of str
+        What the columns of records are.
+    force : bool
+        Replace it where it exists.
+    as_json : bool
+        Print JSON, values in SI.
+
+    Raises
+    ------
+    InputError
+        If table, servo or output is not usable.
+    """
+    from servotwin.bench import calibrate_table, is_load_table, is_pattern
+    from servotwin.cli.fit import calibrate_of_loads, load_facts, show_loads
+    from servotwin.cli.outputs import Target, check_targets
+    from servotwin.cli.shared_options import servo_of
+    from servotwin.errors import InputError
+
+    if out is not None:
+        check_targets([Target(option="--out", path=out, endings=(".toml",))], force=force,
+                      inputs=[path, *([] if servo is None else [Path(servo)])])
+    if (change or supply) and servo is None:
+        raise InputError("--set" if change else "--supply", got="no --servo", allowed="both")
+    loaded = None if servo is None else servo_of(servo, list(change), [], supply)
+    if is_pattern(path) or is_load_table(path):
+        loads, records = calibrate_of_loads(path, loaded, arm, columns)
+        if out is not None:
+            loads.servo.save(out, overwrite=force)
+        if as_json:
+            emit_json(load_facts(loads, records, out))
+        else:
+            show_loads(loads, records, out)
+        return
+    for option, given in (("--arm", arm), ("--columns", columns)):
+        if given:
+            raise InputError(option, got="a table without loads", allowed="a table of loads, or a pattern of records")
+    found = calibrate_table(path, loaded)
+    if out is not None:
+        found.servo.save(out, overwrite=force)
+    if as_json:
+        emit_json(calibration_facts(found, out))
+        return
+    show_table_calibration(found, out)
+
+
+def show_table_calibration(found: TableCalibration, out: Path | None) -> None:
+    """Show what a table says, and where the servo is, if it was written."""
+    written = [] if out is None else ["", pairs([("written", str(out))])]
+    show(f"{found.source}: {found.table.rows} rows, " + ", ".join(c.name for c in found.table.columns), "",
+         _lines(found), "", *_parameters(found), *[f"- {text}" for text in found.findings()], *written)
+
+
+def calibration_facts(found: TableCalibration, out: Path | None = None) -> dict[str, Any]:
+    """Return a calibration as plain data for JSON: lines in the table's units, parameters in SI.
+
+    Examples
+    --------
+    >>> from servotwin.bench import calibrate_table
+    >>> facts = calibration_facts(calibrate_table({"q_deg": [0, 45, 90, 135], "V_o_V": [0.590, 0.912, 1.253, 1.572]}))
+    >>> list(facts["parameters"])
+    ['potentiometer.feedback_gain', 'potentiometer.feedback_offset']
+    """
+    from servotwin.bench.table_rows import ways_facts
+
+    return {
+        "source": found.source, "servo": found.servo.name, "rows": found.table.rows,
+        "columns": [column.name for column in found.table.columns], "ignored_columns": list(found.table.ignored),
+        "lines": {name: {
+            "abscissa": fit.x_column.name, "ordinate": fit.y_column.name, "slope": fit.line.slope,
+            "slope_error": fit.line.slope_error, "slope_unit": fit.slope_unit, "intercept": fit.line.intercept,
+            "intercept_error": fit.line.intercept_error, "covariance": fit.line.covariance, "unit": fit.unit,
+            "residuals": list(fit.line.residuals), "largest_residual": fit.line.max_residual,
+            "curvature_F": fit.curvature.f_value, "curvature_p": fit.curvature.p_value,
+            "sagitta": fit.curvature.sagitta, "curved": name in found.curved,
+            "hysteresis": ways_facts(fit)} for name, fit in found.lines.items()},
+        "parameters": {name: {"value": one.value, "std": one.std, "unit": one.unit, "source": one.source}
+                       for name, one in found.parameters.items()},
+        "instruments": [{
+            "first": pair.first, "second": pair.second, "gain": pair.line.slope, "gain_error": pair.gain_error,
+            "zero": pair.line.intercept, "zero_error": pair.zero_error, "same": pair.same,
+            "expected_gain": pair.expected_gain, "expected_from": pair.expected_from, "gain_p": pair.gain_p,
+            "zero_p": pair.zero_p, "disagrees_in": list(pair.disagrees_in), "words": pair.words}
+            for pair in found.instruments],
+        "rows_off": [{"row": one.row + 1, "line": one.line, "residual": one.residual, "t": one.t_value,
+                      "p": one.p_value, "certain": one.certain, "column": one.column, "better": one.better,
+                      "words": one.words} for one in found.rows],
+        "findings": list(found.findings()), "files": [] if out is None else [str(out)],
+    }
+
+
+def _lines(found: TableCalibration) -> Any:
+    from servotwin.bench.table_words import plus_minus
+
+    rows = []
+    for name, fit in found.lines.items():
+        line = fit.line
+        rows.append((name, f"{plus_minus(line.slope, line.slope_error)} {fit.slope_unit}",
+                     f"{plus_minus(line.intercept, line.intercept_error)} {fit.unit}",
+                     f"{line.max_residual:.3g} {fit.unit}",
+                     f"p = {fit.curvature.p_value:.2g}" + (", curved" if name in found.curved else "")))
+    return table(("line", "slope", "at 0", "largest residual", "parabola"), rows)
+
+
+def _parameters(found: TableCalibration) -> list[Any]:
+    if not found.parameters:
+        return []
+    return [parameter_table(found.parameters), ""]
+
+
+def parameter_table(parameters: Mapping[str, Quantity]) -> RenderableType:
+    """Return what a table sets of a servo, with errors and where each comes from."""
+    rows = [(name, *_values(one), one.unit, (one.source or "").rpartition("least squares: ")[2])
+            for name, one in parameters.items()]
+    return table(("parameter", "value", "standard error", "unit", "from"), rows)
+
+
+def _values(one: Quantity) -> tuple[str, str]:
+    return f"{one.value:z.6g}", "" if one.std is None else f"{one.std:.2g}"
+
+
+# --- The words of `servotwin fit` and `servotwin validate` ------------------------------------------------------------
+
+Usual = TypeVar("Usual")
+
+MODEL_NAMES = ("pulse", "pulse-inductive", "bounded", "digital")
+
+
+def names(words: Sequence[str] | None) -> tuple[str, ...] | None:
+    """Return names of an option that is repeated or has commas; None where it was not given.
+
+    Examples
+    --------
+    >>> names(["a,b", "c"]), names([])
+    (('a', 'b', 'c'), None)
+    """
+    if not words:
+        return None
+    return tuple(part.strip() for word in words for part in word.split(",") if part.strip())
+
+
+def kinds(words: Sequence[str] | None) -> tuple[str, ...]:
+    """Return the kinds of findings among the words of --mend, which may be joined; those of a reader are others.
+
+    Examples
+    --------
+    >>> kinds(["wrap,not-followed", "torn"]), kinds(None)
+    (('wrap', 'not followed'), ())
+    """
+    return tuple(name.replace("-", " ") for name in names(words) or () if name not in MENDS)
+
+
+def reading_mends(words: Sequence[str] | None) -> tuple[str, ...]:
+    """Return what a reader mends, among the words of --mend.
+
+    Raises
+    ------
+    UnknownNameError
+        If a word is neither that nor a kind of finding.
+
+    Examples
+    --------
+    >>> reading_mends(["wrap,not-followed", "torn"])
+    ('torn',)
+    """
+    findings = [name.replace(" ", "-") for name in MENDED]
+    for name in names(words) or ():
+        if name not in MENDS and name.replace(" ", "-") not in findings:
+            raise UnknownNameError("kind of --mend", name, (*findings, *MENDS))
+    return tuple(name for name in names(words) or () if name in MENDS)
+
+
+def some_or_none(option: str, words: Sequence[str] | None, usual: Usual) -> tuple[str, ...] | Usual:
+    """Return names, no name at all for the word "none", and the usual ones where the option was not given.
+
+    Examples
+    --------
+    >>> some_or_none("--nuisance", ["none"], ("delay",)), some_or_none("--nuisance", None, ("delay",))
+    ((), ('delay',))
+    """
+    found = names(words)
+    if found is None:
+        return usual
+    if "none" in found and len(found) > 1:
+        raise InputError(option, got=", ".join(found), allowed="names, or none alone")
+    return () if "none" in found else found
+
+
+def share(option: str, text: str) -> float:
+    """Return a number between 0 and 1, or a percentage.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+
+    Examples
+    --------
+    >>> share("--level", "95%"), share("--level", "0.9")
+    (0.95, 0.9)
+    """
+    found = quantity(option, text, "number", bare=True) if _is_number(text) else math.nan
+    if not 0.0 <= found < 1.0:
+        raise InputError(option, got=text, allowed="a share from 0 to below 1, such as 0.25 or 25%")
+    return found
+
+
+def duration(option: str, text: str | None) -> Within:
+    """Return the time that a fit may take, which begins now.
+
+    Examples
+    --------
+    >>> duration("--within", "5 min").over, duration("--within", None).over
+    (False, False)
+    """
+    return Within(None if text is None else quantity(option, text, "time", bare=True, positive=True))
+
+
+def held_out(text: str | None) -> float | tuple[str, ...] | None:
+    """Return what is held out: a share, or names of logs.
+
+    Examples
+    --------
+    >>> held_out("25%"), held_out("step-1, step-2"), held_out(None)
+    (0.25, ('step-1', 'step-2'), None)
+    """
+    if text is None:
+        return None
+    return share("--holdout", text) if _is_number(text) else names([text]) or ()
+
+
+def _is_number(text: str) -> bool:
+    found = number_and_unit(text)
+    return found is not None and found[1] in ("", "%")
+
+
+def bounds_of(words: Sequence[str], free: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Return bounds (SI) by name, from words such as ``motor.armature_resistance=2ohm..5ohm``.
+
+    Raises
+    ------
+    InputError
+        If a word is none, a name is not searched, or the ends are not in order.
+
+    Examples
+    --------
+    >>> bounds_of(["electronics.deadband=2..8us"], ["electronics.deadband"])
+    {'electronics.deadband': (2e-06, 8e-06)}
+    """
+    found = {}
+    for name, text in _assigned("--bounds", words, free).items():
+        form = "LOWEST..HIGHEST, with units such as 2ohm..5ohm, or in SI"
+        if ".." not in text:
+            raise InputError(f"--bounds {name}", got=text, allowed=form)
+        try:
+            made = distribution_of(f"uniform:{text}", dimension_of_free(name))
+        except ServotwinError as error:
+            raise InputError(f"--bounds {name}", got=text, allowed=_allowed(error, form)) from None
+        if not isinstance(made, Uniform):
+            raise InputError(f"--bounds {name}", got=text, allowed=form)
+        found[name] = (made.lower, made.upper)
+    return found
+
+
+def priors_of(words: Sequence[str], free: Sequence[str], model: Model, *, of_servo: bool,
+              ) -> dict[str, tuple[float, float]] | None:
+    """Return means and standard deviations (SI) by name: what the servo's file states, then what the words say.
+
+    Parameters
+    ----------
+    words : sequence of str
+        Such as ``motor.armature_resistance=3ohm±0.3ohm``, or ``=10%`` about the servo's own value.
+    free : sequence of str
+    model : Model
+    of_servo : bool
+        Whether the spreads of the servo's file count.
+
+    Raises
+    ------
+    InputError
+        If a word is none, or a name is not searched.
+    """
+    stated = {p.name: p.prior for p in Space(model, free, priors="servo").parameters} if of_servo else {}
+    found = {name: prior for name, prior in stated.items() if prior is not None}
+    for name, text in _assigned("--prior", words, free).items():
+        found[name] = _prior(name, text, model.servo)
+    return found or None
+
+
+def _prior(name: str, text: str, servo: Servo) -> tuple[float, float]:
+    form = "VALUE±STANDARD_DEVIATION, with units such as 3ohm±0.3ohm or 3ohm±10%, or ±10% about the servo's value"
+    try:
+        made = distribution_of(f"normal:{text}", dimension_of_free(name))
+    except ServotwinError as error:
+        raise InputError(f"--prior {name}", got=text, allowed=_allowed(error, form)) from None
+    value = nominal(servo, name)
+    if isinstance(made, Relative | Offset) and value is None:
+        raise InputError(f"--prior {name}", got=text, allowed="a value too: the servo has none")
+    mean, std = _moments(made, value or 0.0)
+    if not std > 0.0:
+        raise InputError(f"--prior {name}", got=text, allowed=form)
+    return mean, std
+
+
+def _moments(law: Distribution, value: float) -> tuple[float, float]:
+    """Return mean and standard deviation of a normal law, which may be one about a value."""
+    if isinstance(law, Relative) and isinstance(law.factor, Normal):
+        return value * law.factor.mean, abs(value) * law.factor.std
+    if isinstance(law, Offset) and isinstance(law.added, Normal):
+        return value + law.added.mean, law.added.std
+    return (law.mean, law.std) if isinstance(law, Normal) else (math.nan, math.nan)
+
+
+def _assigned(option: str, words: Sequence[str], free: Sequence[str]) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for word in words:
+        name, equals, text = (word.partition("=")[k].strip() for k in range(3))
+        if not (name and equals and text):
+            raise InputError(option, got=word, allowed="NAME=..., such as motor.armature_resistance=2ohm..5ohm"
+                             if option == "--bounds" else "NAME=..., such as motor.armature_resistance=3ohm±10%")
+        if name in found:
+            raise InputError(f"{option} {name}", got=f"{found[name]} and {text}", allowed="one of both")
+        if name not in free:
+            raise InputError(f"{option} {name}", got="a name that is not searched", allowed=", ".join(free))
+        found[name] = text
+    return found
+
+
+def _allowed(error: ServotwinError, form: str) -> str:
+    """Return the units that are allowed where one was wrong, else the form."""
+    known = getattr(error, "allowed", None)
+    return f"one of the units {known}" if type(error).__name__ == "UnitError" and known else form
+
+
+def check_free(free: Sequence[str], model: Model) -> None:
+    """Raise if a searched name is unknown, so that nothing else is said about it first.
+
+    Raises
+    ------
+    InputError
+    """
+    Space(model, tuple(free), priors=None)
+
+
+def left_out(words: Sequence[str]) -> list[tuple[str | None, float, float]]:
+    """Return windows of time [s], each of one log or, where it names none, of all.
+
+    Raises
+    ------
+    InputError
+        If a word is no window.
+
+    Examples
+    --------
+    >>> left_out(["3..4.5", "run-2=100ms..200ms"])
+    [(None, 3.0, 4.5), ('run-2', 0.1, 0.2)]
+    """
+    found = []
+    for word in words:
+        name, equals, text = word.rpartition("=")
+        ends = text.split("..")
+        if len(ends) != 2 or (equals and not name):
+            raise InputError("--leave-out", got=word, allowed="START..STOP or LOG=START..STOP, such as 3s..4.5s")
+        start, stop = (quantity("--leave-out", end, "time", bare=True) for end in ends)
+        if not start < stop:
+            raise InputError("--leave-out", got=word, allowed="START..STOP, the earlier one first")
+        found.append((name.strip() or None, start, stop))
+    return found
+
+
+def without(logs: Sequence[Log], windows: Sequence[tuple[str | None, float, float]]) -> list[Log]:
+    """Return logs with windows left out.
+
+    Raises
+    ------
+    InputError
+        If a window names a log that there is not, or nothing is left of one.
+    """
+    known = [log.name for log in logs]
+    for name, *_ in windows:
+        if name is not None and name not in known:
+            raise UnknownNameError("log of --leave-out", name, known)
+    return [replace(log, left_out=(*log.left_out, *((start, stop) for name, start, stop in windows
+                                                    if name in (None, log.name)))) if windows else log
+            for log in logs]
+
+
+def limits_of(words: Sequence[str], angle: bool) -> Mapping[str | None, float]:
+    """Return the largest error that is allowed (SI), by kind of motion; None stands for every kind.
+
+    Examples
+    --------
+    >>> limits_of(["3 deg", "prbs=0.1 rad"], True)["prbs"]
+    0.1
+    """
+    found: dict[str | None, float] = {}
+    for word in words:
+        name, _, text = word.rpartition("=")
+        value = quantity("--max-error", text, "angle" if angle else "voltage")
+        if not value > 0.0:
+            raise InputError("--max-error", got=word, allowed="a positive number with a unit, such as 3deg")
+        found[name.strip() or None] = value
+    return found
