@@ -7,11 +7,11 @@ import pytest
 
 import servotwin as st
 from servotwin.errors import InputError
-from servotwin.robots import mjcf, scara, two_link
-from servotwin.robots.scara import LENGTHS, PINION, SERVO_MASS
+from servotwin.robots import mjcf_models as mjcf
+from servotwin.robots import scara, two_link
+from servotwin.robots.arm import HEIGHT, LENGTHS, PINION, SERVO_MASS
+from servotwin.robots.arm import TWO_LENGTHS as LINKS
 from servotwin.robots.task_run import tool_places
-from servotwin.robots.two_link import HEIGHT
-from servotwin.robots.two_link import LENGTHS as LINKS
 
 mujoco = pytest.importorskip("mujoco", reason="the extra `robots` is not installed")
 DRAWS = np.random.default_rng(3)

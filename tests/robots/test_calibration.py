@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from servotwin.errors import InputError
-from servotwin.robots.calibration import DEGREES, OPENING, RANGE, Calibration, joint_angles, read_calibration
+from servotwin.robots.motion import DEGREES, OPENING, RANGE, Calibration, joint_angles, read_calibration
 
 ELBOW = {"id": 3, "drive_mode": 0, "homing_offset": -1017, "range_min": 901, "range_max": 3100}  # middle 2000.5
 COUNT = 2.0 * math.pi / 4096

@@ -10,8 +10,7 @@ from robots.robots_cases import links
 from servotwin.errors import MissingExtraError, OutputError, UnknownNameError
 from servotwin.look.opencv import load_opencv
 from servotwin.robots import robot_model
-from servotwin.robots.camera import Camera, NoDrawingError, Trail, check_drawing
-from servotwin.robots.video import Video, png
+from servotwin.robots.camera import Camera, NoDrawingError, Trail, Video, check_drawing, png
 
 mujoco = pytest.importorskip("mujoco", reason="the extra `robots` is not installed")
 POSE = np.array([0.3, -0.5])

@@ -9,7 +9,7 @@ import pytest
 import servotwin as st
 from servotwin.errors import InputError
 from servotwin.robots import Motion, ServoDrive
-from servotwin.robots.ideal import blend_window, course, ideal_run
+from servotwin.robots.tracking import blend_window, course, ideal_run
 
 mujoco = pytest.importorskip("mujoco", reason="the extra `robots` is not installed")
 DT, G, START = 1e-3, 9.81, -0.1

@@ -18,7 +18,7 @@ from servotwin.robots import (
     unequal_servos,
     wheel_servo,
 )
-from servotwin.robots.mobile_robot import MASS, TRACK, WHEEL_RADIUS, WHEELS
+from servotwin.robots.mjcf_models import MASS, TRACK, WHEEL_RADIUS, WHEELS
 
 mujoco = pytest.importorskip("mujoco")
 

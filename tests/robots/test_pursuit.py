@@ -7,7 +7,7 @@ import pytest
 
 from servotwin.errors import InputError
 from servotwin.robots import Odometry, Pose, PurePursuit
-from servotwin.robots.pursuit import PursuitState
+from servotwin.robots.waypoints import PursuitState
 
 KNOWN = {"lookahead": 0.1, "speed": 0.1, "tolerance": 0.01, "track": 0.16}
 LINE = PurePursuit(waypoints=[(0.0, 0.0), (1.0, 0.0)], **KNOWN)

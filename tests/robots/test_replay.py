@@ -10,8 +10,7 @@ import servotwin as st
 from robots.robots_cases import links, servo
 from servotwin.errors import InputError
 from servotwin.robots import Motion, run_motion, validate_robot
-from servotwin.robots.gains import Gains, position_run
-from servotwin.robots.replay import ALL, IDEAL, LOADED, MOVING, RESTING, SERVOS
+from servotwin.robots.replay import ALL, IDEAL, LOADED, MOVING, RESTING, SERVOS, Gains, position_run
 
 pytestmark = pytest.mark.long
 

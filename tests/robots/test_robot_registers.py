@@ -4,7 +4,7 @@ import pytest
 
 import servotwin as st
 from servotwin.robots import Motion, Mount
-from servotwin.robots.registers import as_motion_says
+from servotwin.robots.run import as_motion_says
 
 STS = "feetech-sts3215-7v4"
 

@@ -11,8 +11,8 @@ from robots.robots_cases import hinge, links, servo
 from servotwin.datasheet import thermal_masses
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.robots import Motion, Mount, run_motion
-from servotwin.robots.heat import heating, lasting_torque, mean_heat, with_heat
 from servotwin.robots.model_file import joint_names, joint_ranges, robot_model
+from servotwin.robots.sizing import heating, lasting_torque, mean_heat, with_heat
 from servotwin.robots.tracking import best_delay
 
 mujoco = pytest.importorskip("mujoco", reason="the extra `robots` is not installed")

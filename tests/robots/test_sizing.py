@@ -13,8 +13,7 @@ from servotwin.datasheet.warming import masses_by_mass
 from servotwin.errors import InputError
 from servotwin.physics import winding_resistance
 from servotwin.robots import Motion, Mount, run_motion, sizing_of
-from servotwin.robots.heat import heating
-from servotwin.robots.sizing import supplied
+from servotwin.robots.sizing import heating, supplied
 
 mujoco = pytest.importorskip("mujoco", reason="the extra `robots` is not installed")
 SERVO, BUS_SERVO = servo(st.PulseServo), servo(st.DigitalServo)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from servotwin.robots.so101 import JOINTS, LIMITS, so101
+from servotwin.robots.mjcf_models import JOINTS, LIMITS, so101
 
 mujoco = pytest.importorskip("mujoco")
 

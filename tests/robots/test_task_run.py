@@ -9,8 +9,7 @@ import servotwin as st
 from servotwin.control import Encoder, Reference
 from servotwin.errors import InputError
 from servotwin.robots import follow, run_task, task_path, two_link
-from servotwin.robots.controlled import Delayed, DrivePort
-from servotwin.robots.steering import STEERINGS, Plain, RigidBody
+from servotwin.robots.controllers import STEERINGS, Delayed, DrivePort, Plain, RigidBody
 from servotwin.robots.task_run import Belief
 from servotwin.robots.tasks import circle
 

@@ -187,7 +187,7 @@ def fit(
     from servotwin.cli.shared_options import best_kept, end_if_stopped
     from servotwin.identification.arms import identify_arm
     from servotwin.identification.arms.identify_arm import UNKNOWN, mounts_of, plant_of
-    from servotwin.robots.episode import joints_of_dataset
+    from servotwin.robots.motion import joints_of_dataset
 
     limit = duration("--within", within)
     plant, unknown = plant_of(UNKNOWN, joints_of_dataset(logs)) if model_file == UNKNOWN else (None, ())

@@ -372,8 +372,8 @@ def asked_robot(model_file: str, dataset: Path, *, servo: Sequence[str], mount: 
 
     from servotwin.cli.terminal import patience
     from servotwin.robots import joint_names, joint_ranges, read_motion
-    from servotwin.robots.episode import episodes_of
     from servotwin.robots.model_file import Plant, plant_of
+    from servotwin.robots.motion import episodes_of
 
     found = plant_of(model_file, packages_of(package)) if plant is None else Plant(plant)
     joints = joint_names(found.model)

@@ -353,7 +353,7 @@ def picture_and_video(drawn: Callable[[int], Any], time: NDArray[np.float64], st
     rate : float
         [Hz]
     """
-    from servotwin.robots.video import Video, png
+    from servotwin.robots.camera import Video, png
     from servotwin.simulation.progress import shown
 
     picture.write_bytes(png(drawn(still)))

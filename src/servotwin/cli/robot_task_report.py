@@ -17,9 +17,9 @@ from servotwin.cli.robot_report import STYLE, figure, figures, film, joint_pages
 from servotwin.cli.robot_report import run_facts as facts
 from servotwin.cli.terminal import json_text, patience
 from servotwin.look import document, escape, table
-from servotwin.robots.comparison import CONDITIONS, FIDELITIES, NOMINAL
+from servotwin.robots.controllers import STEERINGS
 from servotwin.robots.replay import ALL, SERVOS
-from servotwin.robots.steering import STEERINGS
+from servotwin.robots.task_run import CONDITIONS, FIDELITIES, NOMINAL
 from servotwin.tables import csv_text
 from servotwin.text import shortened
 
@@ -32,11 +32,8 @@ if TYPE_CHECKING:
     from servotwin.robots import RobotValidation, Sizing, WaypointRun
     from servotwin.robots.arm import Arm
     from servotwin.robots.camera import Trail
-    from servotwin.robots.comparison import Comparison, Outcome
-    from servotwin.robots.kinematics import JointPath
-    from servotwin.robots.redundancy import Criterion
-    from servotwin.robots.task_run import IdealTask, TaskRun
-    from servotwin.robots.tasks import ToolPath
+    from servotwin.robots.task_run import Comparison, IdealTask, Outcome, TaskRun
+    from servotwin.robots.tasks import Criterion, JointPath, ToolPath
     Array = NDArray[np.float64]
 
 
@@ -447,7 +444,7 @@ def names(joints: int, *, ideal: bool, redundant: bool, picture: bool, video: bo
 
 def other_ways(arm: Arm, path: ToolPath, criterion: Criterion, joints: JointPath) -> dict[str, JointPath]:
     """Return how a redundant arm may move, without a criterion and with the one asked for, by name."""
-    from servotwin.robots.redundancy import LeastMotion
+    from servotwin.robots.tasks import LeastMotion
 
     if not arm.redundant:
         return {}
@@ -476,7 +473,7 @@ def ideal_facts(done: IdealTask, ways: Ways) -> dict[str, Any]:
 
 
 def _of_task(ways: Ways) -> dict[str, Any]:
-    from servotwin.robots.redundancy import LeastMotion, LeastTorque
+    from servotwin.robots.tasks import LeastMotion, LeastTorque
 
     return {"task": ways.joints.path.name, "redundant": ways.joints.arm.redundant, "ways": {
         name: {"limit_distance": way.limit_distance, "torque_rms": LeastTorque().measure(way),
@@ -565,8 +562,8 @@ def _writers(path: ToolPath, ways: Ways, traces: Sequence[tuple[str, Array, Arra
 def joint_uses(ways: Mapping[str, JointPath]) -> Any:
     """Return the picture of how joints are used by each criterion: hinges alone."""
     from servotwin import plotting
-    from servotwin.robots.kinematics import limits_of
     from servotwin.robots.model_file import joint_names
+    from servotwin.robots.tasks import limits_of
 
     arm = next(iter(ways.values())).arm
     model = arm.model()

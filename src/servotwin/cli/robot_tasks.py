@@ -19,11 +19,9 @@ if TYPE_CHECKING:
     from servotwin.models import Model
     from servotwin.robots import WaypointRun
     from servotwin.robots.arm import Arm
-    from servotwin.robots.comparison import Comparison, Outcome
-    from servotwin.robots.kinematics import JointPath
-    from servotwin.robots.redundancy import Criterion
-    from servotwin.robots.steering import Steering
-    from servotwin.robots.tasks import ToolPath
+    from servotwin.robots.controllers import Steering
+    from servotwin.robots.task_run import Comparison, Outcome
+    from servotwin.robots.tasks import Criterion, JointPath, ToolPath
 
 
 
@@ -282,7 +280,7 @@ def path_of(arm: Arm, task: str, size: str | None, speed: float) -> ToolPath:
 
 def _criterion(arm: Arm, name: str) -> Criterion:
     from servotwin.errors import UnknownNameError
-    from servotwin.robots.redundancy import CRITERIA, LeastMotion, check_redundant
+    from servotwin.robots.tasks import CRITERIA, LeastMotion, check_redundant
 
     known = {one.name: one for one in CRITERIA}
     if name not in known:
@@ -294,7 +292,7 @@ def _criterion(arm: Arm, name: str) -> Criterion:
 
 def _steering(name: str) -> Steering:
     from servotwin.errors import UnknownNameError
-    from servotwin.robots.steering import STEERINGS
+    from servotwin.robots.controllers import STEERINGS
 
     if name not in STEERINGS:
         raise UnknownNameError("controller", name, STEERINGS)
@@ -365,7 +363,7 @@ def compare(
     from servotwin.cli import robot_report as files
     from servotwin.cli import robot_task_report as words
     from servotwin.cli.shared_options import servo_of
-    from servotwin.robots.comparison import Comparison
+    from servotwin.robots.task_run import Comparison
 
     chosen = _cases(robot, task)
     comparison = Comparison(servo=servo_of(servo, []), bus_servo=servo_of(bus_servo, []), speed=speed)
@@ -385,19 +383,19 @@ def compare(
 
 def _cases(robots: list[str] | None, tasks: list[str] | None) -> list[Any]:
     from servotwin.errors import UnknownNameError
-    from servotwin.robots import comparison
+    from servotwin.robots import task_run
 
     for name in robots or []:
-        if name not in comparison.ROBOTS:
-            raise UnknownNameError("robot to compare on", name, comparison.ROBOTS)
-    known = {task for each in comparison.TASKS.values() for task in each}
+        if name not in task_run.ROBOTS:
+            raise UnknownNameError("robot to compare on", name, task_run.ROBOTS)
+    known = {task for each in task_run.TASKS.values() for task in each}
     for name in tasks or []:
         if name not in known:
             raise UnknownNameError("task to compare", name, sorted(known))
-    chosen = list(comparison.cases(robots or tuple(comparison.ROBOTS), tasks))
+    chosen = list(task_run.cases(robots or tuple(task_run.ROBOTS), tasks))
     if not chosen:
         raise UnknownNameError("task of these robots", ", ".join(tasks or []),
-                               [task for name in robots or comparison.ROBOTS for task in comparison.TASKS[name]])
+                               [task for name in robots or task_run.ROBOTS for task in task_run.TASKS[name]])
     return chosen
 
 

@@ -29,6 +29,10 @@ if TYPE_CHECKING:
 
 # --- Tables and texts as lines of a terminal of any width -------------------------------------------------------------
 
+# A table that is too wide wraps the words of its widest columns. Where that takes more lines, or a word does not fit,
+# it folds: the first columns stay beside each other, and the others follow below each row, each behind its name. A
+# number and its unit stay on one line; a word that is wider than the terminal, such as a path, is left whole.
+
 _GAP = 2  # blanks between columns
 _FOLD = "    "  # before what follows below a row
 _WORTH = 1.5  # times the lines of a table that folds: what one that wraps may take, which is easier to compare

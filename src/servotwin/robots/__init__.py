@@ -2,29 +2,35 @@
 
 from typing import Any
 
-from servotwin.robots.arm import Arm
+from servotwin.robots.arm import Arm, scara, two_link
 from servotwin.robots.command_map import CommandMap
-from servotwin.robots.contour import contour_error
-from servotwin.robots.drive import ServoDrive
-from servotwin.robots.kinematics import JointPath, follow
-from servotwin.robots.mobile_robot import mobile_robot
+from servotwin.robots.drive import DriveState, ServoDrive
+from servotwin.robots.mjcf_models import mobile_robot
 from servotwin.robots.model_file import joint_names, joint_ranges, robot_model
 from servotwin.robots.motion import Motion, read_motion
 from servotwin.robots.mount import Mount
-from servotwin.robots.pursuit import PurePursuit
 from servotwin.robots.recipe import Recipe, recipe_of
 from servotwin.robots.record import Record, ServoRecord
-from servotwin.robots.redundancy import AwayFromLimits, LeastMotion, LeastTorque
 from servotwin.robots.replay import JointError, Replay, RobotValidation, validate_robot
 from servotwin.robots.run import RobotRun, run_motion
-from servotwin.robots.scara import scara
 from servotwin.robots.sizing import Sizing, sizing_of
-from servotwin.robots.state import DriveState
 from servotwin.robots.task_run import TaskMetrics, TaskRun, ideal_task, run_task
-from servotwin.robots.tasks import ToolPath, task_path
-from servotwin.robots.two_link import two_link
-from servotwin.robots.waypoints import WaypointRun, ideal_waypoints, round_of, run_waypoints, unequal_servos
-from servotwin.robots.wheels import Odometry, Pose, SpeedMap, wheel_servo, wheel_speed_of, worn
+from servotwin.robots.tasks import AwayFromLimits, JointPath, LeastMotion, LeastTorque, ToolPath, follow, task_path
+from servotwin.robots.tracking import contour_error
+from servotwin.robots.waypoints import (
+    Odometry,
+    Pose,
+    PurePursuit,
+    SpeedMap,
+    WaypointRun,
+    ideal_waypoints,
+    round_of,
+    run_waypoints,
+    unequal_servos,
+    wheel_servo,
+    wheel_speed_of,
+    worn,
+)
 
 __all__ = [
     "Arm", "AwayFromLimits", "CommandMap", "DriveState", "JointError", "JointPath", "LeastMotion", "LeastTorque",

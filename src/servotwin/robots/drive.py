@@ -6,7 +6,7 @@ import ctypes
 import math
 import warnings
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, NoReturn
 
 import numpy as np
@@ -14,22 +14,50 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, ServotwinError, SimulationError, UnknownNameError
 from servotwin.models import Model
-from servotwin.robots.books import close_books
-from servotwin.robots.command_map import CommandMap
-from servotwin.robots.crews import Instance, crews_of
-from servotwin.robots.harbour import Harbour, goals_in
-from servotwin.robots.heat import heat_notes, warm_mounts
+from servotwin.robots.command_map import CommandMap, told
 from servotwin.robots.joints_layout import BLOCK, FAILED, FOREIGN, INSTANCE, MESSAGES, RECORD, WELL
 from servotwin.robots.mount import Mount, joints_of, treat_friction
 from servotwin.robots.places import load_mujoco, places
-from servotwin.robots.record import Record
-from servotwin.robots.solver import TOO_FEW, set_iterations
-from servotwin.robots.state import DriveState
-from servotwin.robots.told import told
-from servotwin.robots.wiring import arrays_of, check_options, maps_of, put_into_model, words_of
+from servotwin.robots.record import TOO_FEW, Record, set_iterations
+from servotwin.robots.servo_groups import (
+    Harbour,
+    Instance,
+    arrays_of,
+    check_options,
+    close_books,
+    crews_of,
+    goals_in,
+    maps_of,
+    put_into_model,
+    words_of,
+)
+from servotwin.robots.sizing import heat_notes, warm_mounts
 from servotwin.simulation import VectorSimulator
 from servotwin.simulation.compile.calls import joint_addresses
 from servotwin.simulation.start import Status
+
+# --- What MuJoCo and the servos remember, as something to keep --------------------------------------------------------
+
+@dataclass(frozen=True, eq=False)
+class DriveState:
+    """The state of MuJoCo's data and of the servos in it; picklable.
+
+    Parameters
+    ----------
+    engine : ndarray
+        MuJoCo's state, `mjSTATE_INTEGRATION`.
+    constraint : ndarray, shape (nv,)
+        Forces of contacts and limits at the last step, which the servos meet in the next one.
+    servos : ndarray
+        What the servos remember, and what they were told.
+    """
+
+    engine: NDArray[np.float64]
+    constraint: NDArray[np.float64]
+    servos: NDArray[np.float64]
+
+
+# --- `ServoDrive`: servos at the joints of a MuJoCo model -------------------------------------------------------------
 
 Array = NDArray[np.float64]
 _FIRST_ROWS = 4096  # of a record
@@ -416,4 +444,3 @@ class ServoDrive:
         instance.block[:] = state.servos
         block = self._block(data)
         block[BLOCK.index("serial")], block[BLOCK.index("restored")] = -1.0, 1.0
-

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, overload
@@ -13,9 +14,347 @@ from numpy.typing import ArrayLike, NDArray
 from servotwin import units
 from servotwin.errors import InputError, UnitError, UnknownNameError
 from servotwin.logs.joint_tables import is_joint_table
-from servotwin.robots.episode import episode_goals
+from servotwin.logs.lerobot_data import Dataset, Joint, Rows, open_dataset
+from servotwin.logs.sidecar import read_json
 from servotwin.tables import TextTable, read_table
-from servotwin.units.words import unit_word, units_written
+from servotwin.units.words import scaled_unit, unit_word, units_written
+
+# --- What LeRobot's normalised goals mean: counts of a servo, and from these angles of a joint ------------------------
+
+# A calibration of LeRobot says of each joint between which counts it moves, `range_min` and `range_max`. A goal becomes
+# a whole count as `_unnormalize` makes it (huggingface/lerobot, src/lerobot/motors/motors_bus.py, commit
+# 049856c7cb2c719d0644004b5884a51c3ab9ed2b); what is behind the point is cut off:
+#
+# - -100 to 100: range_min + (x + 100)/200 (range_max - range_min), x held within -100 and 100;
+# - 0 to 100, the gripper: range_min + x/100 (range_max - range_min), x held within 0 and 100;
+# - degrees: (range_min + range_max)/2 + 4095/360 x, held nowhere: LeRobot gives 4095 counts to 360 degrees.
+#
+# `drive_mode` turns the first two round, -x and 100 - x, and leaves degrees as they are. `homing_offset` is in the
+# servo, whose counts have it already. A servo has 4096 counts a turn, so the angle of a joint from the middle of its
+# calibrated range is 2π/4096 (count - (range_min + range_max)/2): LeRobot's degrees up to the last count and one part
+# in 4096. A dataset holds goals as float32, so where one lies on a count, it may become the count before.
+
+RANGE, OPENING, DEGREES = "-100 to 100", "0 to 100", "degrees"
+_COUNTS = 4096  # a turn, of Feetech STS and SMS and of Dynamixel X
+_ANGLE = 2.0 * math.pi / _COUNTS  # of one count [rad]
+_FORM = '{"shoulder_pan": {"drive_mode": 0, "range_min": 700, "range_max": 3300}, ...}, as LeRobot writes it'
+
+
+@dataclass(frozen=True, kw_only=True)
+class Calibration:
+    """The calibration of one joint.
+
+    Parameters
+    ----------
+    range_min, range_max : int
+        Counts of its servo at both ends of its range.
+    inverted : bool
+        Whether -100 is at `range_max`.
+
+    Examples
+    --------
+    >>> elbow = Calibration(range_min=900, range_max=3100)
+    >>> elbow.counts(np.array([-100.0, 0.0, 50.0]), RANGE).tolist()
+    [900.0, 2000.0, 2550.0]
+    >>> np.degrees(elbow.angles(elbow.counts(np.array([90.0]), DEGREES))).round(2).tolist()
+    [89.91]
+    """
+
+    range_min: int
+    range_max: int
+    inverted: bool = False
+
+    def counts(self, goals: NDArray[np.float64], form: str) -> NDArray[np.float64]:
+        """Return the whole counts that LeRobot sends for goals.
+
+        Parameters
+        ----------
+        goals : (n,) array
+        form : {"-100 to 100", "0 to 100", "degrees"}
+        """
+        return np.trunc(self._unrounded(goals, form))
+
+    def read_counts(self, positions: NDArray[np.float64], form: str) -> NDArray[np.float64]:
+        """Return the whole counts that positions were made of.
+
+        Examples
+        --------
+        >>> Calibration(range_min=900, range_max=3100).read_counts(np.array([49.9999]), RANGE).tolist()
+        [2550.0]
+        """
+        return np.rint(self._unrounded(positions, form))
+
+    def _unrounded(self, goals: NDArray[np.float64], form: str) -> NDArray[np.float64]:
+        if form == DEGREES:
+            return np.asarray(goals * (_COUNTS - 1) / 360.0 + (self.range_min + self.range_max) / 2.0)
+        if self.inverted:
+            goals = -goals if form == RANGE else 100.0 - goals
+        return np.asarray(range_share(goals, form) * (self.range_max - self.range_min) + self.range_min)
+
+    def angles(self, counts: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the angles from the middle of the range [rad]."""
+        return np.asarray(_ANGLE * (counts - (self.range_min + self.range_max) / 2.0))
+
+
+def range_share(goals: NDArray[np.float64], form: str) -> NDArray[np.float64]:
+    """Return how far into a range normalised goals are: 0 at its lower end, 1 at its upper one.
+
+    Examples
+    --------
+    >>> range_share(np.array([-120.0, 50.0]), RANGE).tolist(), range_share(np.array([50.0]), OPENING).tolist()
+    ([0.0, 0.75], [0.5])
+    """
+    return np.clip((goals + 100.0) / 200.0 if form == RANGE else goals / 100.0, 0.0, 1.0)
+
+
+def joint_angles(goals: NDArray[np.float64], form: str, calibration: Calibration | None,
+                 limits: tuple[float, float] | None, *, measured: bool = False) -> NDArray[np.float64]:
+    """Return goals as angles of a joint [rad].
+
+    Parameters
+    ----------
+    goals : (n,) array
+    form : {"-100 to 100", "0 to 100", "degrees"}
+        All but degrees need a calibration or limits.
+    calibration : Calibration, optional
+    limits : (float, float), optional
+        Of the joint in the robot's model. Without a calibration they are the ends of -100 to 100. With one, they only
+        say where the calibrated range lies: the middle of both is the same, or where 0 to 100 is meant, the lower end.
+        Unless given, the middle is at 0 [rad]
+    measured : bool
+        They are positions, not goals: rounded to the nearest count, not cut off.
+
+    Raises
+    ------
+    InputError
+        If both are missing, and the goals are no degrees.
+
+    Examples
+    --------
+    >>> joint_angles(np.array([0.0, 50.0]), OPENING, None, (-0.2, 1.8)).tolist()
+    [-0.2, 0.8]
+    """
+    middle = 0.0 if limits is None else 0.5 * (limits[0] + limits[1])
+    if calibration is not None:
+        counts = calibration.read_counts(goals, form) if measured else calibration.counts(goals, form)
+        if form == OPENING and limits is not None:
+            closed = calibration.counts(np.zeros(1), form)
+            return np.asarray(limits[0] + _ANGLE * np.abs(counts - closed))
+        return middle + calibration.angles(counts)
+    if form == DEGREES:
+        return middle + np.radians(goals)
+    if limits is None:
+        raise InputError(f"goals of {form}", allowed="with a calibration, or limits of the joint")
+    return limits[0] + (limits[1] - limits[0]) * range_share(goals, form)
+
+
+def read_calibration(source: str | Path | Mapping[str, Any], *, drive_mode: bool = True) -> dict[str, Calibration]:
+    """Return LeRobot's calibration of a robot, by joint.
+
+    Parameters
+    ----------
+    source : str, Path or mapping
+        Its JSON file, ``~/.cache/huggingface/lerobot/calibration/robots/TYPE/ID.json``, or what such a file holds.
+    drive_mode : bool
+        Whether LeRobot heeds `drive_mode`, as it does with Feetech; Dynamixel servos do so themselves.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is no calibration.
+
+    Examples
+    --------
+    >>> read_calibration({"gripper": {"id": 6, "drive_mode": 0, "homing_offset": 12, "range_min": 2030,
+    ...                               "range_max": 3500}})["gripper"].range_max
+    3500
+    """
+    is_file = not isinstance(source, Mapping)
+    where = f"{source}" if is_file else "calibration"
+    content = read_json(source) if isinstance(source, (str, Path)) else source
+    if not isinstance(content, Mapping) or not content:
+        raise InputError(where, got=content, allowed=_FORM)
+    return {str(joint): _calibration(f"{where}: {joint}", said, drive_mode) for joint, said in content.items()}
+
+
+def _calibration(where: str, said: object, drive_mode: bool) -> Calibration:
+    if not isinstance(said, Mapping):
+        raise InputError(where, got=said, allowed=_FORM)
+    low, high, inverted = (said.get(key, default) for key, default in (
+        ("range_min", None), ("range_max", None), ("drive_mode", 0)))
+    for key, value in (("range_min", low), ("range_max", high)):
+        if not isinstance(value, int) or isinstance(value, bool):
+            raise InputError(f"{where} {key}", got="nothing" if value is None else value, allowed="a whole number")
+    if not low < high:
+        raise InputError(f"{where} range_min and range_max", got=f"{low} and {high}", allowed="the smaller one first")
+    if inverted not in (0, 1):
+        raise InputError(f"{where} drive_mode", got=inverted, allowed="0 or 1")
+    return Calibration(range_min=low, range_max=high, inverted=bool(inverted) and drive_mode)
+
+
+# --- The goals of an episode of a LeRobot dataset, as angles of the robot's joints ------------------------------------
+
+ALL = "*"
+_NORMALISED = "range"
+_DYNAMIXEL = ("koch", "omx", "viperx", "widowx", "aloha")  # beginnings of `robot_type`
+_OLD_UNITS = '{"*": "deg", "shoulder_lift": "-deg+90", "elbow_flex": "deg-90"}'
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Goals:
+    """Goals of an episode.
+
+    Parameters
+    ----------
+    time : (n,) array
+        Counted from the first frame [s]
+    angles, measured : dict of str to (n,) array
+        Goals and measured positions by joint [rad]
+    source : str
+        Dataset and episode.
+    robot : str
+        LeRobot's `robot_type`, empty where the dataset does not say it.
+    """
+
+    time: NDArray[np.float64]
+    angles: dict[str, NDArray[np.float64]]
+    measured: dict[str, NDArray[np.float64]]
+    source: str
+    robot: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Form:
+    """What a joint's goals are: their form, after scale and offset."""
+
+    form: str
+    degrees: Callable[[NDArray[np.float64]], NDArray[np.float64]] = lambda goals: goals
+
+
+def episode_goals(path: Path, joints: Mapping[str, str], *, unit: str | Mapping[str, str] | None,
+                  calibration: str | Path | Mapping[str, Any] | None, episode: int | None,
+                  ranges: Mapping[str, tuple[float, float]] | None) -> Goals:
+    """Return the goals of an episode; parameters are those of `read_motion`.
+
+    Parameters
+    ----------
+    joints : mapping
+        "angle", "length" or nothing of each joint of the robot.
+
+    Raises
+    ------
+    InputError
+        If it is no dataset, or what its goals mean is not known.
+    UnknownNameError
+        If the robot has no such joint.
+    """
+    dataset = open_dataset(path)
+    for joint in dataset.joints:
+        if joint.name not in joints:
+            raise UnknownNameError(f"joint of the robot (in {dataset.folder})", joint.name, joints)
+        if joints[joint.name] == "length":
+            raise UnitError(f"{dataset.folder}: {joint.name}", got="an angle", allowed=units_written("length"))
+    rows = dataset.rows()
+    start, stop, number = _episode(dataset, rows, episode)
+    forms = _forms(dataset, rows, unit)
+    robot = str(dataset.info.get("robot_type") or "")
+    drive_mode = not robot.startswith(_DYNAMIXEL)
+    known = None if calibration is None else read_calibration(calibration, drive_mode=drive_mode)
+    angles: dict[str, NDArray[np.float64]] = {}
+    measured: dict[str, NDArray[np.float64]] = {}
+    for joint in dataset.joints:
+        form, limits = forms[joint.name], None if dataset.unit_from else (ranges or {}).get(joint.name)
+        one = None if known is None else _calibrated(known, joint, calibration)
+        if form.form != DEGREES and one is None and limits is None:
+            raise InputError(f"{dataset.folder}: {joint.name} has {form.form} of its calibrated range",
+                             allowed="with calibration=, a file of LeRobot, or ranges=, the limits of the joint in rad")
+        for found, some, at in ((angles, rows.actions, joint.action), (measured, rows.states, joint.state)):
+            values = np.asarray(some[start:stop, at], dtype=np.float64)
+            if not np.all(np.isfinite(values)):
+                raise InputError(f"{dataset.folder}: {joint.name} in episode {number}", allowed="finite numbers",
+                                 got=float(values[~np.isfinite(values)][0]))
+            found[joint.name] = joint_angles(form.degrees(values), form.form, one, limits, measured=found is measured)
+    time = np.asarray(rows.time[start:stop] - rows.time[start])
+    return Goals(time=time, angles=angles, measured=measured, source=f"{path}, episode {number}", robot=robot)
+
+
+def episodes_of(path: Path) -> tuple[int, ...]:
+    """Return the numbers of all episodes of a dataset."""
+    return tuple(number for _, _, number in open_dataset(path).rows().episodes())
+
+
+def _episode(dataset: Dataset, rows: Rows, episode: int | None) -> tuple[int, int, int]:
+    """Return the first row of an episode, the one after its last, and its number."""
+    found = {number: (start, stop, number) for start, stop, number in rows.episodes()}
+    if episode is None:
+        return next(iter(found.values()))
+    if isinstance(episode, bool) or episode not in found:
+        first, last = min(found), max(found)
+        raise InputError(f"{dataset.folder}: episode", got=episode,
+                         allowed=f"{first} to {last}" if len(found) > 1 else f"{first}")
+    return found[episode]
+
+
+def _calibrated(known: Mapping[str, Calibration], joint: Joint, source: object) -> Calibration:
+    if joint.name not in known:
+        where = "calibration" if isinstance(source, Mapping) else source
+        raise InputError(f"{where}: joints", got=", ".join(known), allowed=f"also {joint.name}")
+    return known[joint.name]
+
+
+def _forms(dataset: Dataset, rows: Rows, unit: str | Mapping[str, str] | None) -> dict[str, _Form]:
+    """Return what the goals of each joint are."""
+    said = unit if isinstance(unit, Mapping) else {} if unit is None else {ALL: unit}
+    for name in said:
+        if name != ALL and not any(name in (joint.name, joint.column) for joint in dataset.joints):
+            raise UnknownNameError(f"joint of {dataset.folder}", name, [joint.name for joint in dataset.joints])
+    degrees = dataset.degrees(rows)
+    made, lacking = {}, []
+    for joint in dataset.joints:
+        word = said.get(joint.name) or said.get(joint.column) or ("" if joint.is_gripper else said.get(ALL, ""))
+        if word:
+            made[joint.name] = _form(word, joint)
+        elif joint.is_gripper:
+            made[joint.name] = _Form(form=OPENING)
+        elif degrees and not joint.is_old:
+            made[joint.name] = _Form(form=DEGREES)
+        else:
+            lacking.append(joint)
+    if lacking:
+        raise _unknown(dataset, rows, lacking)
+    return made
+
+
+def _form(word: object, joint: Joint) -> _Form:
+    what = f"unit of {joint.name}"
+    if word == _NORMALISED:
+        return _Form(form=OPENING if joint.is_gripper else RANGE)
+    if not isinstance(word, str):
+        raise UnitError(what, got=word, allowed=f"{_NORMALISED}, or {units_written('angle')}")
+    unit, dimension, scale, offset = scaled_unit(what, word)
+    if dimension != "angle":
+        raise UnitError(what, got=word, allowed=f"{_NORMALISED}, or {units_written('angle')}")
+    factor = units.to_si(1.0, unit, "angle") / units.to_si(1.0, "deg", "angle")
+    return _Form(form=DEGREES, degrees=lambda goals: factor * (scale * goals + offset))
+
+
+def _unknown(dataset: Dataset, rows: Rows, joints: list[Joint]) -> InputError:
+    names = ", ".join(joint.name for joint in joints)
+    if any(joint.is_old for joint in joints):
+        return InputError(f"{dataset.folder}: zero of {names} is not known (recorded before June 2025)",
+                          allowed=f"unit=, which moves it to the middle of the range: {_OLD_UNITS} for an SO-100")
+    goals = np.concatenate([rows.actions[:, joint.action] for joint in joints])
+    return InputError(
+        f"{dataset.folder}: unit of {names} is not known (goals {np.nanmin(goals):.4g} to {np.nanmax(goals):.4g}: "
+        f"degrees, or -100 to 100 of a range)", allowed='unit="deg" or unit="range"')
+
+
+def joints_of_dataset(path: Path) -> tuple[str, ...]:
+    """Return the names of the joints of a dataset."""
+    return tuple(joint.name for joint in open_dataset(path).joints)
+
+
+# --- What the joints of a robot are to do, from a table or a recorded episode of LeRobot ------------------------------
 
 _TIMES = {"time": "s", "time_s": "s", "time_ms": "ms"}
 _DIMENSIONS = ("angle", "length")  # of a hinge and of a slide
@@ -141,7 +480,7 @@ def read_motion(path: str | Path, joints: Iterable[str] | Mapping[str, str], *,
     a dataset has beside its goals are `measured`.
 
     Goals of a dataset are degrees, or -100 to 100 of the range in which a joint was calibrated; a gripper has 0 to 100.
-    Angles count from the middle of that range, as LeRobot's degrees do; `servotwin.robots.calibration` says how.
+    Angles count from the middle of that range, as LeRobot's degrees do; as `Calibration` has it.
     Datasets from before June 2025 have their zero elsewhere, so their unit has to be said.
 
     Parameters

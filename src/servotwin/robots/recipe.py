@@ -11,22 +11,244 @@ with it, and F does not.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING
+from functools import cached_property, partial
+from typing import Any, NamedTuple
 
-from servotwin import physics
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin import loads, physics, signals
+from servotwin.datasheet.conditions import changed
+from servotwin.datasheet.full_drive import FullDrive
+from servotwin.datasheet.lift import GRAVITY
 from servotwin.errors import InputError
 from servotwin.loads import Load
-from servotwin.models import BoundedServo, DigitalServo, Model
+from servotwin.models import AveragedServo, BoundedServo, DigitalServo, Model, mid_travel
 from servotwin.models.terms.friction import sliding_friction
 from servotwin.physics.motor import back_emf, electromagnetic_torque, steady_armature_current
 from servotwin.robots.mount import SERVOS
-from servotwin.robots.recipe_twin import Droops, droops_of_twin, inertia_under, lift_of_twin
+from servotwin.robots.places import load_mujoco
+from servotwin.simulation.simulator import simulate
 from servotwin.units import is_finite
 
-if TYPE_CHECKING:
-    from servotwin.robots.recipe_error import RecipeError
+# --- What a servo does that a recipe of MuJoCo's actuators has to copy: what it lifts, and how far a load -------------
+
+WAY, REST, RAMP, SETTLE = math.radians(60.0), 0.3, 1.6, 1.4  # rad, s: a goal stands, comes slowly, and stands
+LAST = 20  # of 0.01 s, over which what pulses do to a shaft that stands is averaged
+_ARM = 0.1  # m
+_GONE = ("stops.lower_angle", "stops.upper_angle", "potentiometer.noise")
+
+
+class Droops(NamedTuple):
+    """Commanded less actual angle under a load that pulls down, where the shaft has come up, and down, slowly [rad]."""
+
+    up: float
+    down: float
+
+
+def without_ends(model: Model) -> Model:
+    """Return a model without stops, which would hold what the servo does not, and without noise."""
+    return changed(model, {name: None for name in _GONE if model.servo.get(name) is not None})
+
+
+def eased(time: Array, way: float) -> Array:
+    """Return a goal [rad] that goes half a way below 0 to half a way above, slowly, and stands there."""
+    return np.asarray(-0.5 * way * np.cos(math.pi * np.clip((time - REST) / RAMP, 0.0, 1.0)))
+
+
+def inertia_under(torque: float) -> float:
+    """Return the inertia of a mass on an arm of 0.1 m whose weight makes a torque [kg m²]."""
+    return torque * _ARM / GRAVITY
+
+
+def lift_of_twin(model: Model) -> float:
+    """Return the most torque that a servo lifts from rest, as `curves` has it [N m]."""
+    drive = FullDrive(BoundedServo(model.servo) if isinstance(model, AveragedServo) else model)
+    return float(min(drive.stall_torque, drive.starting_torque))
+
+
+def droops_of_twin(model: Model, torque: float, inertia: float) -> Droops:
+    """Return where a servo stands under a torque [N m] with an inertia [kg m²] at its goal.
+
+    Raises
+    ------
+    InputError
+        If it does not hold so much for as long as that takes.
+    """
+    free, middle, time = without_ends(model), mid_travel(model), np.arange(0.0, REST + RAMP + SETTLE, 0.01)
+    found = []
+    for way in (WAY, -WAY):
+        goal = middle + 0.5 * way
+        result = simulate(free, signals.samples(time, middle + eased(time, way), unit="rad", hold="linear"),
+                          duration=REST + RAMP + SETTLE, output_step=0.01,
+                          load=loads.Constant(torque) + loads.Inertia(inertia))
+        trips = [remark.kind for remark in result.remarks if remark.kind.startswith("tripped")]
+        last = result["output_angle"][-LAST:]
+        if trips or not result.status.ok or abs(goal - last[-1]) > 0.75 * WAY:
+            raise InputError(f"load of a recipe of {model.servo.name}", got=f"{torque:.3g} N m, under which it "
+                             f"{'is ' + trips[0] if trips else 'does not come up'}", allowed="less [N m]")
+        found.append(goal - float(last.mean()))
+    return Droops(*found)
+
+
+# --- How far a recipe of MuJoCo's actuators is off its servo: both do the same, MuJoCo's and the twin by --------------
+
+Array = NDArray[np.float64]
+_STEP, _SWING, _FREQUENCY = math.radians(30.0), math.radians(20.0), 0.5  # rad, rad, Hz
+_LONG = 2.0  # s, of each
+_LOOK = 0.01  # s
+_TIMESTEP = 0.001  # s, of MuJoCo
+_HALVINGS = 8
+_RAISED = math.radians(5.0)  # that a servo has to raise what it lifts by
+_FROM = math.radians(60.0)  # rad below a goal: full drive
+
+
+class Actuator(NamedTuple):
+    """What one of MuJoCo's actuators does by a recipe.
+
+    Parameters
+    ----------
+    lift : float
+        Most torque that it lifts from rest [N m].
+    droops, droops_at_half : Droops
+        Under the load of the recipe and under half of it [rad].
+    step_rms, sine_rms : float
+        Its angle less the servo's under that load, after a step of 30° and through a sine of ±20° at 0.5 Hz [rad].
+    """
+
+    lift: float
+    droops: Droops
+    droops_at_half: Droops
+    step_rms: float
+    sine_rms: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecipeError:
+    """Both actuators of a recipe beside the servo.
+
+    Parameters
+    ----------
+    load : float
+        [N m]
+    lift : float
+        Of the servo [N m].
+    droops, droops_at_half : Droops
+        Of the servo under the load and under half of it [rad].
+    position, dcmotor : Actuator
+    lacks : tuple of str
+    """
+
+    load: float
+    lift: float
+    droops: Droops
+    droops_at_half: Droops
+    position: Actuator
+    dcmotor: Actuator
+    lacks: tuple[str, ...]
+
+    def __str__(self) -> str:
+        """Return a table, and what the recipe lacks."""
+        rows = [("", "servo", "<position>", "<dcmotor>"), ("lift", *(
+            f"{value:.3g} N m" for value in (self.lift, self.position.lift, self.dcmotor.lift)))]
+        for torque, name in ((self.load, "droops"), (0.5 * self.load, "droops_at_half")):
+            for way in Droops._fields:
+                rows.append((f"stands off, come {way}, {torque:.3g} N m", *(
+                    f"{math.degrees(getattr(getattr(one, name), way)):.2f} deg"
+                    for one in (self, self.position, self.dcmotor))))
+        for name, words in (("step_rms", "off after a step of 30 deg, rms"), ("sine_rms", "off in a sine, rms")):
+            rows.append((words, "", *(
+                f"{math.degrees(getattr(one, name)):.2f} deg" for one in (self.position, self.dcmotor))))
+        return "\n".join([f"{a:<36}{b:>12}{c:>12}{d:>12}".rstrip() for a, b, c, d in rows]
+                         + [f"lacks {words}" for words in self.lacks])
+
+
+def error_of(recipe: Recipe) -> RecipeError:
+    """Return how far both actuators are off the servo."""
+    half = droops_of_twin(recipe.model, 0.5 * recipe.load, inertia_under(0.5 * recipe.load))
+    moves: list[tuple[Array, Goals]] = [(_twin(recipe, goals), goals) for goals in (_step_goals, _sine_goals)]
+    found = [_done(recipe, text("joint"), moves) for text in (recipe.position, recipe.dcmotor)]
+    return RecipeError(load=recipe.load, lift=recipe.lift, droops=recipe.droops, droops_at_half=half, position=found[0],
+                       dcmotor=found[1], lacks=recipe.lacks)
+
+
+Goals = Callable[[Array], Array]
+
+
+def _step_goals(time: Array) -> Array:
+    return np.where(time < REST, 0.0, _STEP)
+
+
+def _sine_goals(time: Array) -> Array:
+    return np.where(time < REST, 0.0, _SWING * np.sin(2.0 * math.pi * _FREQUENCY * (time - REST)))
+
+
+def _twin(recipe: Recipe, goals: Goals) -> Array:
+    """Return the angles of the servo about mid-travel under the load of the recipe."""
+    middle, time = mid_travel(recipe.model), np.arange(0.0, REST + _LONG + _TIMESTEP, _TIMESTEP)
+    command = signals.samples(time, middle + goals(time), unit="rad", hold="previous")
+    result = simulate(without_ends(recipe.model), command, duration=REST + _LONG, output_step=_LOOK,
+                      load=loads.Constant(recipe.load) + loads.Inertia(inertia_under(recipe.load)))
+    if not result.status.ok:
+        raise InputError(f"error of a recipe of {recipe.model.servo.name}", got=result.status.message, allowed="a run")
+    return np.asarray(result["output_angle"] - middle)
+
+
+def _done(recipe: Recipe, actuator: str, moves: Sequence[tuple[Array, Goals]]) -> Actuator:
+    off = [float(np.sqrt(np.mean((_followed(recipe, actuator, recipe.load, goals, REST + _LONG) - twin)**2)))
+           for twin, goals in moves]
+    return Actuator(_lifted(recipe, actuator), _droops(recipe, actuator, recipe.load),
+                    _droops(recipe, actuator, 0.5 * recipe.load), *off)
+
+
+def arm_of(recipe: Recipe, actuator: str, inertia: float, *, joint: str | None = None) -> Any:
+    """Return an MjModel of a joint `joint` with an actuator of a recipe and an inertia [kg m²], without gravity."""
+    return load_mujoco().MjModel.from_xml_string(
+        f'<mujoco><option timestep="{_TIMESTEP}" integrator="implicitfast" gravity="0 0 0"/><worldbody><body>'
+        f'<joint name="joint" axis="0 0 1" {joint or recipe.joint()}/><inertial pos="0 0 0" mass="1" '
+        f'diaginertia="{inertia:.9g} {inertia:.9g} {inertia:.9g}"/></body></worldbody>'
+        f"<actuator>{actuator}</actuator></mujoco>")
+
+
+def _followed(recipe: Recipe, actuator: str, torque: float, goals: Goals, duration: float, start: float = 0.0) -> Array:
+    """Return the angles of a joint under a torque that pulls down, at times that are 0.01 s apart [rad]."""
+    mujoco = load_mujoco()
+    model = arm_of(recipe, actuator, inertia_under(torque))
+    data, every = mujoco.MjData(model), round(_LOOK / _TIMESTEP)
+    data.qpos[0], data.qfrc_applied[0] = start, -torque
+    angles = [start]
+    table = goals(np.asarray(_TIMESTEP * np.arange(round(duration / _TIMESTEP)) + 1e-9, np.float64))
+    for k, goal in enumerate(table.tolist(), 1):
+        data.ctrl[0] = goal
+        mujoco.mj_step(model, data)
+        if k % every == 0:
+            angles.append(float(data.qpos[0]))
+    return np.array(angles)
+
+
+def _droops(recipe: Recipe, actuator: str, torque: float) -> Droops:
+    """Return where the joint stands off after a goal that comes slowly, as that of `droops_of_twin`."""
+    found = []
+    for way in (WAY, -WAY):
+        last = _followed(recipe, actuator, torque, partial(eased, way=way), REST + RAMP + SETTLE, -0.5 * way)[-LAST:]
+        found.append(0.5 * way - float(last.mean()))
+    return Droops(*found)
+
+
+def _lifted(recipe: Recipe, actuator: str) -> float:
+    """Return the most torque that is raised from rest by full drive, by halving [N m]."""
+    low, high = 0.0, 2.0 * recipe.most_torque
+    for _ in range(_HALVINGS):
+        half = 0.5 * (low + high)
+        risen = _followed(recipe, actuator, half, lambda time: np.full(len(time), _FROM), 0.5)[-1] > _RAISED
+        low, high = (half, high) if risen else (low, half)
+    return 0.5 * (low + high)
+
+
+# --- What comes nearest to a servo among MuJoCo's own actuators -------------------------------------------------------
 
 STICKS = "0.9999 0.9999 0.001"
 """`solimpfriction` of a joint with which MuJoCo's friction loss all but holds; as it is by default, it creeps."""
@@ -115,8 +337,6 @@ class Recipe:
     @cached_property
     def error(self) -> RecipeError:
         """How far both actuators are off the servo, by running them in MuJoCo; `print` shows it."""
-        from servotwin.robots.recipe_error import error_of
-
         return error_of(self)
 
     @property

@@ -15,30 +15,115 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, SimulationError, UnknownNameError
 from servotwin.models import Model
 from servotwin.parameters.groups import Supply
+from servotwin.parameters.registers.robots import as_robot_has_it, said_of, set_of_robot
 from servotwin.robots.command_map import unused_ranges
 from servotwin.robots.contacts import fall_of, leave_out, links_of, overlap_words, overlaps, robot_bodies
 from servotwin.robots.coupling import couple, couplings_of, led
 from servotwin.robots.drive import ServoDrive
-from servotwin.robots.heat import warm_mounts
-from servotwin.robots.ideal import IdealRun, blend_window, ideal_run
 from servotwin.robots.model_file import joint_names, joint_ranges, plant_of
 from servotwin.robots.motion import Motion
 from servotwin.robots.mount import Mount
-from servotwin.robots.notes import notes_of
 from servotwin.robots.places import load_mujoco
 from servotwin.robots.record import FROM_NOWHERE, Record
-from servotwin.robots.registers import as_motion_says
-from servotwin.robots.sizing import supplied
-from servotwin.robots.tracking import Tracking, tracking_of
+from servotwin.robots.sizing import supplied, warm_mounts
+from servotwin.robots.tracking import IdealRun, Tracking, blend_window, ideal_run, tracking_of
 from servotwin.simulation.progress import Progress, shown
-from servotwin.simulation.remarks import Sag, may_fall, sag_in
+from servotwin.simulation.remarks import NOT_AT_REST, Sag, floor_of, held_back, may_fall, sag_in, watches_its_supply
 from servotwin.units import is_finite
+
+# --- What is odd about a motion ---------------------------------------------------------------------------------------
+
+_SLACK = math.radians(0.5)  # rad, of ends that goals are rounded to
+
+
+def notes_of(run: RobotRun) -> tuple[str, ...]:
+    """Return sentences on what was assumed of servos, goals out of reach, collisions, energies, and joints that swing.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> from servotwin.robots import Motion, run_motion
+    >>> high = Motion(time=[0.0, 0.5], angles={"gripper": [1.5, 2.0]}, source="too far")
+    >>> run = run_motion("so101", {"gripper": st.DigitalServo(st.load_servo("feetech-sts3215-12v"))}, high, settle=0.0)
+    >>> notes_of(run)
+    ('goals of joint gripper go from 85.9 to 115 deg, beyond its range in the model, -10 to 100 deg',)
+    """
+    said = list(run.said)
+    ranges = joint_ranges(run.model)
+    for joint in run.motion.joints:
+        goals, mount, servo = run.motion.angles[joint], run.mounts[joint], run.mounts[joint].model.servo
+        if mount.model.endless:  # such as a bridge without its chip, whose goals are duties
+            continue
+        lows = [x for x in (servo.stops.lower_angle, servo.firmware.lower_goal) if x is not None]
+        highs = [x for x in (servo.stops.upper_angle, servo.firmware.upper_goal) if x is not None]
+        angles, ends = (goals - mount.zero) / mount.gain, (max(lows, default=-math.inf), min(highs, default=math.inf))
+        if _beyond(angles, ends, _SLACK):
+            said.append(f"goals of joint {joint} go {_between(angles, slides=False)} at the servo, beyond "
+                        f"what it takes, {_ends(*ends, slides=False)}")
+        slides = run.slides(joint)
+        if joint in ranges and _beyond(goals, ranges[joint], _SLACK * (mount.ratio if slides else 1.0)):
+            said.append(f"goals of joint {joint} go {_between(goals, slides=slides)}, beyond its range in the model, "
+                        f"{_ends(*ranges[joint], slides=slides)}")
+    said += [words for joints, supply, sag in run.sags for words in _sag_words(run, joints, supply, sag)]
+    swings = (f"joint {joint} {remark.words}" for joint in run.mounts for remark in run.tracking[joint].remarks
+              if remark.kind == NOT_AT_REST)
+    return (*said, *(touch.words for touch in run.ideal.touches), *run.record.notes, *swings)
+
+
+def _sag_words(run: RobotRun, joints: tuple[str, ...], supply: Supply, sag: Sag) -> list[str]:
+    """Return that a supply holds servos back, and that it falls below what anybody knows of them."""
+    who = "the supply" if len(joints) == len(run.mounts) else f"the supply of {', '.join(joints)}"
+    said = [f"{who} holds back: {held_back(sag).words.partition(': ')[2]}, at {sag.time:.2f} s, of "
+            f"{supply.open_circuit_voltage:g} V"] if sag.holds_back else []
+    below = {joint: floor_of(run.mounts[joint].model.servo).voltage for joint in joints
+             if not watches_its_supply(run.mounts[joint].model)}
+    low = [joint for joint, floor in below.items() if sag.voltage < floor]
+    if low:
+        said.append(f"{who} falls to {sag.voltage:.2f} V: below {below[low[0]]:g} V nobody knows what the servo of "
+                    f"{low[0]} does" + (f", and {len(low) - 1} more" if len(low) > 1 else ""))
+    return said
+
+
+def _beyond(values: np.ndarray[tuple[int], np.dtype[np.float64]], ends: tuple[float, float], slack: float) -> bool:
+    return bool(values.min() < ends[0] - slack or values.max() > ends[1] + slack)
+
+
+def _between(values: np.ndarray[tuple[int], np.dtype[np.float64]], *, slides: bool) -> str:
+    return f"from {_ends(float(values.min()), float(values.max()), slides=slides)}"
+
+
+def _ends(low: float, high: float, *, slides: bool) -> str:
+    factor, unit = (1e3, "mm") if slides else (math.degrees(1.0), "deg")
+    return f"{factor * low:.3g} to {factor * high:.3g} {unit}"
+
+
+# --- Registers of servos that follow an episode of LeRobot ------------------------------------------------------------
+
+def as_motion_says(mounts: Mapping[str, Mount], motion: Motion) -> tuple[dict[str, Mount], tuple[str, ...]]:
+    """Return mounts with the servos as the robot of a motion has them, and a line on what was assumed; none if nothing.
+
+    Parameters
+    ----------
+    mounts : mapping of str to Mount
+    motion : Motion
+        Its `robot` says which; empty: nothing is assumed.
+    """
+    found, changed = dict(mounts), dict[str, str]()
+    for joint, mount in mounts.items():
+        servo = as_robot_has_it(mount.model.servo, motion.robot, joint)
+        if servo is not mount.model.servo:
+            found[joint] = replace(mount, model=type(mount.model)(servo))
+            changed[joint] = set_of_robot(motion.robot, joint)
+    return found, (said_of(motion.robot, *changed.values()),) if changed else ()
+
+
+# --- `run_motion`: a robot whose servos follow a motion, and how well they do -----------------------------------------
 
 Array = NDArray[np.float64]
 SETTLE = 0.5  # s, before the motion and after it
 _HOLDS = ("linear", "previous")
 _OVERLAPS = ("keep", "ignore")
-_SLACK = 1e-6  # rad or m, of limits at which a joint begins
+_LIMIT_SLACK = 1e-6  # rad or m, of limits at which a joint begins
 _AFTER = 0.1  # s, for which a robot is followed again beyond the first energy from nowhere, to find its cause
 _NO_ENERGY = 1e-6  # J
 _MANY = 100  # iterations of a solver
@@ -271,7 +356,7 @@ def _lying(model: Any, motion: Motion, mounts: Mapping[str, Mount], overlap: str
         leave_out(model, links_of(model, (*there, *before)))
     for joint, (low, high) in joint_ranges(model).items():
         at = float(start[model.jnt_qposadr[model.joint(joint).id]])
-        if joint not in motion.angles and not low - _SLACK <= at <= high + _SLACK:
+        if joint not in motion.angles and not low - _LIMIT_SLACK <= at <= high + _LIMIT_SLACK:
             said.append(f"joint {joint} begins at {at:.4g}, beyond its range in the model, {low:.4g} to {high:.4g} "
                         "(rad or m)")
     return _Lying(tuple(said), deepest, f"{deepest} (overlap=ignore {way})" if deepest and not ignored else "")

@@ -6,29 +6,23 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from servotwin import loads
+from servotwin.datasheet import SpeedMap, wheel_speed_of
+from servotwin.datasheet.turning import endless
 from servotwin.errors import InputError, UnknownNameError
-from servotwin.models import Model
+from servotwin.loads import Load
+from servotwin.models import Model, PulseServo
+from servotwin.parameters import Servo, load_servo
 from servotwin.robots.drive import ServoDrive
-from servotwin.robots.mobile_robot import MASS, TRACK, WHEEL_RADIUS, WHEELS
+from servotwin.robots.mjcf_models import MASS, TRACK, WHEEL_RADIUS, WHEELS
 from servotwin.robots.model_file import robot_model
 from servotwin.robots.mount import Mount
 from servotwin.robots.places import load_mujoco
-from servotwin.robots.pursuit import PurePursuit, PursuitState
-from servotwin.robots.wheels import (
-    Odometry,
-    Pose,
-    SpeedMap,
-    endless,
-    inertia_at_wheel,
-    wheel_servo,
-    wheel_speed_of,
-    worn,
-)
 from servotwin.simulation.progress import Progress, shown
 from servotwin.units import is_finite
 
@@ -36,7 +30,323 @@ if TYPE_CHECKING:
     from servotwin.parameters.groups import Supply
     from servotwin.robots.record import Record
 
+
+
+# --- Wheels on servos that turn endlessly, and where a robot believes that they have taken it -------------------------
+
+NEUTRAL = 1.5  # rad: where the potentiometer of a rebuilt servo stands, near the middle of its range; assumed
+
+
+def wheel_servo(servo: Servo | str = "hitec-hs-755hb", fixed_angle: float = NEUTRAL) -> PulseServo:
+    """Return the model of a servo rebuilt to turn endlessly, as a wheel has it.
+
+    Parameters
+    ----------
+    servo : Servo or str
+        Of the catalog, or a path.
+    fixed_angle : float
+        Where its potentiometer stands [rad].
+
+    Examples
+    --------
+    >>> round(1e6 * wheel_servo().neutral_pulse)
+    1492
+    """
+    found = load_servo(servo) if isinstance(servo, str) else servo
+    if found.potentiometer.fixed_angle is None:
+        found = found.continuous(fixed_angle)
+    return PulseServo(found)
+
+
+def worn(model: PulseServo, *, neutral: float = 0.0, torque: float = 1.0) -> PulseServo:
+    """Return a wheel's servo with its neutral off, or weaker than it was, as no two servos are the same.
+
+    Parameters
+    ----------
+    model : PulseServo
+    neutral : float
+        By how much its neutral pulse is longer [s].
+    torque : float
+        What its motor has left of its torque per current and back-EMF per speed: a motor whose magnets are weaker
+        stalls with less torque and runs faster, until friction tells.
+
+    Raises
+    ------
+    InputError, ParameterError
+        If the servo does not turn endlessly, or a number is not possible.
+
+    Examples
+    --------
+    >>> new = wheel_servo()
+    >>> round(1e6 * (worn(new, neutral=1e-5).neutral_pulse - new.neutral_pulse), 6)
+    10.0
+    """
+    servo = endless(model).servo
+    per_angle = model.value("potentiometer.feedback_gain") * model.value("electronics.one_shot_slope")
+    return PulseServo(servo.replace({
+        "potentiometer.fixed_angle": model.value("potentiometer.fixed_angle") + neutral / per_angle,
+        "motor.torque_constant": torque * model.value("motor.torque_constant"),
+        "motor.back_emf_constant": torque * model.value("motor.back_emf_constant")}))
+
+
+class Pose(NamedTuple):
+    """Where a robot is on the floor, and where it looks.
+
+    Parameters
+    ----------
+    x, y : float
+        [m]
+    heading : float
+        From the x axis towards y, unbounded [rad]
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    heading: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Odometry:
+    """Where two wheels that do not slip take a robot: along an arc while both turn evenly.
+
+    Parameters
+    ----------
+    radius : float
+        Of the wheels [m]
+    track : float
+        Between their points of contact [m]
+
+    Raises
+    ------
+    InputError
+        If one of them is not positive.
+
+    Examples
+    --------
+    >>> turned = Odometry(radius=0.03, track=0.16).step(Pose(), -math.pi * 0.08 / 0.03, math.pi * 0.08 / 0.03)
+    >>> round(turned.x, 12), round(turned.y, 12), round(turned.heading, 12) == round(math.pi, 12)
+    (0.0, 0.0, True)
+    """
+
+    radius: float
+    track: float
+
+    def __post_init__(self) -> None:
+        """Check."""
+        for name in ("radius", "track"):
+            value = getattr(self, name)
+            if not (is_finite(value) and value > 0.0):
+                raise InputError(f"{name} of an odometry", got=value, allowed="a positive number [m]")
+
+    def step(self, pose: Pose, left: float, right: float) -> Pose:
+        """Return the pose after both wheels have turned forward by these angles [rad]."""
+        way, turn = 0.5 * self.radius * (left + right), self.radius * (right - left) / self.track
+        chord = way * float(np.sinc(0.5 * turn / math.pi))
+        middle = pose.heading + 0.5 * turn
+        return Pose(pose.x + chord * math.cos(middle), pose.y + chord * math.sin(middle), pose.heading + turn)
+
+    def wheel_speeds(self, speed: float, turn_rate: float) -> tuple[float, float]:
+        """Return the speeds of left and right wheel [rad/s] of a robot that goes [m/s] and turns [rad/s]."""
+        return ((speed - 0.5 * self.track * turn_rate) / self.radius,
+                (speed + 0.5 * self.track * turn_rate) / self.radius)
+
+
+def inertia_at_wheel(mass: float, radius: float) -> Load:
+    """Return what half of a robot's mass [kg] is to the servo of a wheel [m] while it goes straight.
+
+    Examples
+    --------
+    >>> round(inertia_at_wheel(2.0, 0.025).total_inertia, 9)
+    0.000625
+    """
+    return loads.as_load(loads.Inertia(0.5 * mass * radius**2))
+
+
+# --- Pure pursuit: a robot steers along the arc that leads to a point of its path some way ahead ----------------------
+
 Array = NDArray[np.float64]
+_SAME = 1e-12
+
+
+class PursuitState(NamedTuple):
+    """What a pursuit remembers: how far along its path it has come [m], and whether it has arrived."""
+
+    along: float = 0.0
+    arrived: bool = False
+
+
+class PursuitDecision(NamedTuple):
+    """What a pursuit asks of the robot.
+
+    Parameters
+    ----------
+    speed, turn_rate : float
+        [m/s], [rad/s]
+    goal : tuple of float
+        The point that it steers to [m].
+    state : PursuitState
+    """
+
+    speed: float
+    turn_rate: float
+    goal: tuple[float, float]
+    state: PursuitState
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PurePursuit:
+    """The controller of Coulter, "Implementation of the Pure Pursuit Path Tracking Algorithm", CMU-RI-TR-92-01 (1992).
+
+    The goal is the point of the path that lies a look-ahead distance L away; with y its place to the left of the robot,
+    the arc that leads there has the curvature 2 y/L². Beside that the robot, which can turn on the spot, does so while
+    its goal is behind it, and goes no faster than both of its wheels can.
+
+    It is a plain function of the pose that the robot believes in, with the state that it hands back.
+
+    Parameters
+    ----------
+    waypoints : array_like, shape (n, 2)
+        Corners of the path, of which the first is where it begins [m].
+    lookahead : float
+        L [m]
+    speed : float
+        On a straight line [m/s]
+    tolerance : float
+        It has arrived where the end of the path is no further away than this [m].
+    track : float
+        Between its wheels [m]
+    most : float
+        Speed of a wheel over ground that is not exceeded; that of the straight line unless given [m/s].
+
+    Raises
+    ------
+    InputError
+        If a number is not positive, or the waypoints are no path.
+
+    Examples
+    --------
+    >>> along = PurePursuit(waypoints=[(0.0, 0.0), (1.0, 0.0)], lookahead=0.1, speed=0.1, tolerance=0.01, track=0.16)
+    >>> decision = along.step(PursuitState(), Pose(0.2, -0.06, 0.0))
+    >>> round(decision.turn_rate / decision.speed, 9)  # 2 · 0.06/0.1²
+    12.0
+    """
+
+    waypoints: ArrayLike
+    lookahead: float
+    speed: float
+    tolerance: float
+    track: float
+    most: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check."""
+        for name in ("lookahead", "speed", "tolerance", "track", "most"):
+            value = getattr(self, name)
+            if not (value is None and name == "most") and not (is_finite(value) and value > 0.0):
+                raise InputError(f"{name} of a pursuit", got=value, allowed="a positive number (SI)")
+        try:
+            points = np.array(self.waypoints, np.float64)
+        except (TypeError, ValueError):
+            raise InputError("waypoints", got=self.waypoints, allowed="pairs of numbers [m]") from None
+        if points.ndim != 2 or points.shape[1:] != (2,) or len(points) < 2 or not np.isfinite(points).all():
+            raise InputError("waypoints", got=f"an array of shape {points.shape}",
+                             allowed="at least two pairs of finite numbers [m]")
+        if np.any(np.hypot(*np.diff(points, axis=0).T) < _SAME):
+            raise InputError("waypoints", got="the same point twice on end", allowed="points that differ")
+        object.__setattr__(self, "waypoints", points)
+
+    @cached_property
+    def _corners(self) -> Array:
+        return np.asarray(self.waypoints)
+
+    @cached_property
+    def _lengths(self) -> Array:
+        """How far along the path each corner is [m]."""
+        return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self._corners, axis=0).T))])
+
+    @property
+    def length(self) -> float:
+        """Of the path [m]."""
+        return float(self._lengths[-1])
+
+    def at(self, along: float) -> tuple[float, float]:
+        """Return the point so far along the path [m]."""
+        return (float(np.interp(along, self._lengths, self._corners[:, 0])),
+                float(np.interp(along, self._lengths, self._corners[:, 1])))
+
+    def apart(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Return how far points are from the path [m]."""
+        p = np.stack(np.broadcast_arrays(x, y), axis=-1)[..., np.newaxis, :].astype(np.float64)
+        a, d = self._corners[:-1], np.diff(self._corners, axis=0)
+        share = np.clip(np.sum((p - a) * d, axis=-1) / np.sum(d * d, axis=-1), 0.0, 1.0)
+        return np.asarray(np.hypot(*np.moveaxis(p - a - share[..., np.newaxis] * d, -1, 0)).min(axis=-1))
+
+    def step(self, state: PursuitState, pose: Pose) -> PursuitDecision:
+        """Decide from where the robot believes to be.
+
+        Returns
+        -------
+        PursuitDecision
+            With the state for the next time; no speed once it has arrived.
+        """
+        near = self._nearest(state.along, pose)
+        end = self.at(self.length)
+        left = math.hypot(end[0] - pose.x, end[1] - pose.y)
+        # a path that closes passes its end at the beginning too: only who has most of it behind has arrived
+        arrived = state.arrived or (left <= self.tolerance and self.length - near <= self.lookahead)
+        if arrived:
+            return PursuitDecision(0.0, 0.0, end, PursuitState(near, True))
+        goal = self.at(self._ahead(near, pose))
+        dx, dy = goal[0] - pose.x, goal[1] - pose.y
+        ahead = math.cos(pose.heading) * dx + math.sin(pose.heading) * dy
+        aside = math.cos(pose.heading) * dy - math.sin(pose.heading) * dx
+        most = self.speed if self.most is None else self.most
+        if ahead <= 0.0:
+            return PursuitDecision(0.0, math.copysign(2.0 * self.speed / self.track, aside), goal,
+                                   PursuitState(near, False))
+        curvature = 2.0 * aside / max(dx * dx + dy * dy, _SAME)
+        speed = min(self.speed, most / (1.0 + 0.5 * self.track * abs(curvature)))
+        return PursuitDecision(speed, speed * curvature, goal, PursuitState(near, False))
+
+    def _nearest(self, along: float, pose: Pose) -> float:
+        """Return how far along the path its nearest point is, from `along` on and no further than the look-ahead."""
+        low, high = along, min(along + self.lookahead, self.length)
+        best, least = along, math.inf
+        for k in range(len(self._lengths) - 1):
+            a, b = max(low, self._lengths[k]), min(high, self._lengths[k + 1])
+            if a > b:
+                continue
+            corner, way = self._corners[k], (self._corners[k + 1] - self._corners[k])
+            way = way / math.hypot(*way)
+            s = self._lengths[k] + (pose.x - corner[0]) * way[0] + (pose.y - corner[1]) * way[1]
+            s = float(min(max(s, a), b))
+            x, y = self.at(s)
+            apart = math.hypot(x - pose.x, y - pose.y)
+            if apart < least - _SAME:
+                best, least = s, apart
+        return best
+
+    def _ahead(self, near: float, pose: Pose) -> float:
+        """Return how far along the first point beyond `near` is that lies the look-ahead away; the end if none does."""
+        for k in range(len(self._lengths) - 1):
+            if self._lengths[k + 1] <= near:
+                continue
+            corner, way = self._corners[k], self._corners[k + 1] - self._corners[k]
+            long = math.hypot(*way)
+            ux, uy = way / long
+            px, py = corner[0] - pose.x, corner[1] - pose.y
+            middle, rest = -(px * ux + py * uy), self.lookahead**2 - (px * uy - py * ux) ** 2
+            if rest < 0.0:  # the whole straight is further away: to its nearest point
+                s = float(min(max(self._lengths[k] + middle, near, self._lengths[k]), self._lengths[k + 1]))
+                return s
+            s = self._lengths[k] + middle + math.sqrt(rest)
+            if s <= self._lengths[k + 1]:
+                return float(max(s, near))
+        return self.length
+
+
+# --- The mobile robot on a round of waypoints: where it drives, and where it believes that it does --------------------
+
 _Two = tuple[float, float]  # of left and right
 SQUARE = ((0.0, 0.0), (0.6, 0.0), (0.6, 0.6), (0.0, 0.6), (0.0, 0.0))
 """Corners of a round of 2.4 m [m]."""
@@ -45,7 +355,7 @@ ROUNDS = ("square", "circle")
 _CORNERS = 24  # of a circle
 _DIRECTIONS = (1, -1)  # of the servos, which look outwards on both sides
 _NEUTRAL_OFF, _WEAKER = 8e-6, 0.9  # of `unequal_servos`: s, and of torque per current; assumed
-_SAME = 1e-9
+_SAME_STEP = 1e-9
 
 
 def unequal_servos(servo: str = "hitec-hs-755hb") -> tuple[Model, Model]:
@@ -210,7 +520,7 @@ def run_waypoints(servos: Sequence[Model] | None = None, waypoints: ArrayLike = 
     speeds = wheel_speed_of(nominal, inertia_at_wheel(MASS, WHEEL_RADIUS))
     _check_speed(speed, speeds.most * WHEEL_RADIUS)
     own, mujoco = robot_model("mobile"), load_mujoco()
-    steps = max(1, math.ceil(frame / own.opt.timestep - _SAME))
+    steps = max(1, math.ceil(frame / own.opt.timestep - _SAME_STEP))
     own.opt.timestep = frame / steps
     mounts = {name: Mount(model, direction=way) for name, model, way in zip(WHEELS, (left, right), _DIRECTIONS,
                                                                             strict=True)}
@@ -368,7 +678,7 @@ def _two(servos: Sequence[Model] | None) -> tuple[Model, Model]:
 def _frame(left: Model, right: Model, nominal: Model) -> float:
     """Return the frame of all servos [s], which the maps of speeds check."""
     frames = [endless(model).frame_period for model in (left, right, nominal)]
-    if max(frames) - min(frames) > _SAME * frames[0]:
+    if max(frames) - min(frames) > _SAME_STEP * frames[0]:
         raise InputError("frame_period of the wheels' servos", got=", ".join(f"{one:g} s" for one in frames),
                          allowed="one frame for both and for what the robot takes them for")
     return frames[0]
@@ -386,3 +696,6 @@ def _check_numbers(duration: float, pulse_resolution: float, encoders: int | Non
         raise InputError("pulse_resolution", got=pulse_resolution, allowed="a number of seconds that is not negative")
     if encoders is not None and (isinstance(encoders, bool) or not isinstance(encoders, int) or encoders < 1):
         raise InputError("encoders", got=encoders, allowed="counts of a turn, a whole number of at least 1")
+
+
+__all__ = ['Odometry', 'Pose', 'SpeedMap', 'endless', 'inertia_at_wheel', 'wheel_servo', 'wheel_speed_of', 'worn']

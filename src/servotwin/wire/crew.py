@@ -15,7 +15,7 @@ from servotwin.errors import ServotwinError
 from servotwin.models import DigitalServo
 from servotwin.parameters.firmware import Firmware
 from servotwin.parameters.groups import Supply
-from servotwin.robots.unlike import OF_THE_BUS, differing, of_one_form
+from servotwin.robots.servo_groups import OF_THE_BUS, differing, of_one_form
 from servotwin.simulation import VectorSimulator
 
 Array = NDArray[np.float64]

@@ -64,7 +64,7 @@ from servotwin.parameters.registers.robots import as_robot_has_it, said_of, set_
 from servotwin.robots import Motion, Mount, RobotValidation, joint_names, robot_model, validate_robot
 from servotwin.robots.contacts import leave_out_measured
 from servotwin.robots.coupling import couplings_of
-from servotwin.robots.episode import joints_of_dataset
+from servotwin.robots.motion import joints_of_dataset
 from servotwin.units import is_finite
 
 # --- The robot of a fit: its model, its servos, and what stands for them where nobody says ----------------------------
