@@ -32,7 +32,7 @@ def test_the_command(cli, tmp_path, monkeypatch):
     page = (tmp_path / "out" / "index.html").read_text()
     assert "Where it is worst" in page
     with monkeypatch.context() as one_a_page:
-        for module in ("servotwin.plotting", "servotwin.plotting.replays"):
+        for module in ("servotwin.plotting", "servotwin.plotting.robots"):
             one_a_page.setattr(f"{module}.JOINTS_A_PAGE", 1)
         assert "shoulder" in cli(*words, "--episode", "0", "--out", "pages").out
     pages = {"windows.png", "windows-2.png"}

@@ -9,7 +9,7 @@ import pytest
 import servotwin as st
 from servotwin import control
 from servotwin.control import Reference
-from servotwin.control.smoothing import held, resting, second_rate, smoothed
+from servotwin.control.controllers import held, resting, second_rate, smoothed
 from servotwin.errors import InputError
 
 T = 1e-3

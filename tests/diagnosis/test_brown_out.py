@@ -7,7 +7,7 @@ import pytest
 
 import servotwin as st
 from servotwin.datasheet.conditions import on_supply
-from servotwin.diagnosis.brown_out import BOARDS, MAY_RESET, RESETS, RUNS_ON, brown_out
+from servotwin.diagnosis.api import BOARDS, MAY_RESET, RESETS, RUNS_ON, brown_out
 from servotwin.errors import InputError, UnknownNameError
 
 STEP = st.signals.step(-60.0, 60.0, at=0.1, unit="deg")

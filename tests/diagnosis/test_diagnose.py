@@ -8,8 +8,7 @@ import pytest
 import servotwin as st
 from diagnosis.planted_servos import PLANTED, SOUND, servo_of
 from servotwin.diagnosis import CAUSES, SYMPTOMS
-from servotwin.diagnosis.numbers import patient_of
-from servotwin.diagnosis.trials import Strength, Trials, ranked
+from servotwin.diagnosis.causes import Strength, Trials, patient_of, ranked
 
 
 def names(found):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import servotwin as st
-from servotwin.diagnosis.record import NO_NOISE, Noise, end_of, holds_of, noise_of
+from servotwin.diagnosis.symptoms import NO_NOISE, Noise, end_of, holds_of, noise_of
 from servotwin.loads import Constant, Inertia, Load
 
 ENCODER, CONVERTER = math.radians(360.0 / 4096), math.radians(300.0 / 1024)  # counts [rad]

@@ -13,7 +13,7 @@ import pytest
 import servotwin as st
 from servotwin.errors import InputError
 from servotwin.export import fmu
-from servotwin.export.fmu_variables import base_units
+from servotwin.export.fmu import base_units
 from servotwin.models import default_model
 
 fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed")
@@ -304,7 +304,7 @@ def test_bad_input(monkeypatch, tmp_path):
         fmu(model, fmi="1.0")
     with pytest.raises(InputError, match="Motor"):
         fmu(st.DCMotor(st.load_servo("hitec-hs-755hb")))
-    monkeypatch.setattr("servotwin.export.fmu_binary.compilers", lambda: ())
+    monkeypatch.setattr("servotwin.export.fmu.compilers", lambda: ())
     with pytest.raises(InputError, match="ziglang"):
         fmu(model)
     path = fmu(model, sources=True).write(tmp_path / "a.fmu")

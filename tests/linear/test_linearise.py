@@ -9,7 +9,7 @@ import pytest
 import servotwin as st
 from linear.bare_servos import bare
 from servotwin.errors import InputError
-from servotwin.linear.balance import harmonic
+from servotwin.linear.linearise import harmonic
 
 OMEGA = np.array([3.0, 12.0, 30.0])
 

@@ -9,8 +9,8 @@ from html.parser import HTMLParser
 import pytest
 
 from servotwin.errors import OutputError, OutputExistsError
+from servotwin.paper import page as pages
 from servotwin.paper import report as paper
-from servotwin.paper import robots_page
 from servotwin.parameters import load_servo
 
 MODELS = ("averaged", "bounded", "pulse")
@@ -132,11 +132,11 @@ def test_the_robots_do_their_tasks(report, page):
 
 def test_without_mujoco_the_robots_are_left_out(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
-    left_out = robots_page.run_robots(load_servo("hitec-hs-755hb"))
+    left_out = pages.run_robots(load_servo("hitec-hs-755hb"))
     assert left_out == "mujoco is needed for this: pip install 'servotwin[robots]'"
-    assert robots_page.pictures(left_out) == ()
-    assert left_out in robots_page.section(left_out)
-    assert robots_page.headline(left_out) == {}
+    assert pages.robot_pictures(left_out) == ()
+    assert left_out in pages.robot_section(left_out)
+    assert pages.headline(left_out) == {}
 
 
 @pytest.mark.long

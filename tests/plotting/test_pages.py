@@ -96,15 +96,15 @@ PICTURES = {
         [plotting.ShaftTrace(name, "", [("alone", PART.cold)], plotting.Cloud(TIME, TIME), plotting.Cloud(TIME, TIME),
                              None, 0.1, 0.1) for name in names(n)], page=page),
         lambda figure: [ax.get_title(loc="left") for ax in figure.axes if ax.axison], scaled=False),
-    "windows": Case("plotting.replays.JOINTS_A_PAGE", lambda n, page: plotting.replay_windows(
+    "windows": Case("plotting.robots.JOINTS_A_PAGE", lambda n, page: plotting.replay_windows(
         [plotting.ReplayTrace(name, TIME, TIME, TIME, {"servos": TIME}) for name in names(n)], page=page), titles,
         scaled=False),
-    "paths": Case("plotting.paths.PATHS_A_PAGE", lambda n, page: plotting.robot_paths(
+    "paths": Case("plotting.robots.PATHS_A_PAGE", lambda n, page: plotting.robot_paths(
         [plotting.PathTrace(name, LINE * (k + 1), LINE) for k, name in enumerate(names(n))], LINE[:, :2], page=page),
         titles),
-    "voltages": Case("plotting.characteristics.CURVES_A_PAGE", lambda n, page: plotting.speed_curves(
+    "voltages": Case("plotting.panels.CURVES_A_PAGE", lambda n, page: plotting.speed_curves(
         sheet_of(n), page=page), volts),
-    "servos": Case("plotting.characteristics.CURVES_A_PAGE", lambda n, page: plotting.compared_curves(
+    "servos": Case("plotting.panels.CURVES_A_PAGE", lambda n, page: plotting.compared_curves(
         sheets(n), page=page), lambda figure: [label.removesuffix(", 6 V") for label in lines()(figure)]),
     "holding": Case("plotting.panels.CURVES_A_PAGE", lambda n, page: plotting.holding_curves(
         sheet_of(n), page=page), volts),
@@ -114,15 +114,15 @@ PICTURES = {
         [plotting.Curve(name, TIME, TIME * k) for k, name in enumerate(names(n))], x_label="x (1)", y_label="y (1)",
         below=[plotting.Curve(name, TIME, -TIME * k) for k, name in enumerate(names(n))], below_label="d (1)",
         page=page), lines(1)),
-    "loops": Case("plotting.loops.LOOPS_A_PAGE", lambda n, page: plotting.loop_curve(
+    "loops": Case("plotting.bode.LOOPS_A_PAGE", lambda n, page: plotting.loop_curve(
         [loop(k + 1.0) for k in range(n)], page=page), volts, scaled=False),
-    "tool": Case("plotting.tool_paths.CURVES_A_PAGE", lambda n, page: plotting.tool_paths(
+    "tool": Case("plotting.panels.CURVES_A_PAGE", lambda n, page: plotting.tool_paths(
         LINE, [plotting.ToolTrace(name, TIME * (k + 1), LINE, TIME * k) for k, name in enumerate(names(n))], page=page),
         lines(1)),
-    "use": Case("plotting.tool_paths.CURVES_A_PAGE", lambda n, page: plotting.joint_use(
+    "use": Case("plotting.panels.CURVES_A_PAGE", lambda n, page: plotting.joint_use(
         ["elbow"], [plotting.JointUse(name, np.zeros((2, 1)), np.ones(1)) for name in names(n)], page=page),
         lambda figure: figure.axes[0].get_legend_handles_labels()[1], scaled=False),
-    "ranking": Case("plotting.ranking.CURVES_A_PAGE", lambda n, page: plotting.ranking(
+    "ranking": Case("plotting.panels.CURVES_A_PAGE", lambda n, page: plotting.ranking(
         ["plain", "PID"], {name: [10.0**k, np.nan] for k, name in enumerate(names(n))}, x_label="error (mm)",
         page=page), lines()),
     "sines": Case("cli.linear_report.CURVES_A_PAGE", sines, lambda figure: [
@@ -154,7 +154,7 @@ def test_every_thing_is_drawn_once_on_some_page(monkeypatch, name):
         monkeypatch.setattr(import_module(f"servotwin.{module}"), "finished", lambda figure, foot="": figure,
                             raising=False)
     monkeypatch.setattr(import_module(f"servotwin.{where}"), limit, 2)
-    monkeypatch.setattr("servotwin.plotting.loops._POINTS", 11)
+    monkeypatch.setattr(import_module("servotwin.plotting.bode"), "_POINTS", 11)
     for count in (1, 2, 3, 7):
         figures = [picture.draw(count, page) for page in plotting.pages(count, 2)]
         shown = [picture.shown(figure) for figure in figures]

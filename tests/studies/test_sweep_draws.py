@@ -10,9 +10,16 @@ from servotwin.errors import InputError, ParameterError, UnitError, UnknownNameE
 from servotwin.loads import Load
 from servotwin.simulation.lanes.inputs import LOAD_NAMES
 from servotwin.studies import distributions as d
-from servotwin.studies.draws import SAMPLINGS, checked_table, distributions_of, drawn, noise_seeds
-from servotwin.studies.names import dimension_of, parameter
-from servotwin.studies.words import distribution_of
+from servotwin.studies.kinds import distribution_of
+from servotwin.studies.plan import (
+    SAMPLINGS,
+    checked_table,
+    dimension_of,
+    distributions_of,
+    drawn,
+    noise_seeds,
+    parameter,
+)
 
 P = np.linspace(0.001, 0.999, 41)
 NUMBERS = [d.Uniform(-1.0, 3.0), d.Normal(2.0, 0.3), d.LogNormal(3.0, 0.2), d.Triangular(1.0, 1.5, 4.0),

@@ -11,9 +11,8 @@ from servotwin.errors import InputError, ParameterError, UnknownNameError
 from servotwin.parameters import Quantity
 from servotwin.studies import variance_share
 from servotwin.studies.distributions import Choice, Normal, Uniform, stated
-from servotwin.studies.joint import own_spread, scaled_spread
-from servotwin.studies.stated import Together
-from servotwin.studies.tornado import Bar, chance_share, tornado_of
+from servotwin.studies.joint import Together, own_spread, scaled_spread
+from servotwin.studies.study import Bar, chance_share, tornado_of
 
 STEP = st.signals.step(0.0, 60.0, at=0.0, unit="deg")
 STEP_LATER = st.signals.step(0.0, 60.0, at=0.1, unit="deg")

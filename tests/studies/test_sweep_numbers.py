@@ -10,7 +10,7 @@ import servotwin as st
 from servotwin.errors import InputError, OutputError
 from servotwin.studies import variance_share
 from servotwin.studies.metrics import lane_metrics, output_times, step_time
-from servotwin.studies.tornado import bar_of
+from servotwin.studies.study import bar_of
 
 STEP = st.signals.step(0.0, 60.0, at=0.1, unit="deg")
 

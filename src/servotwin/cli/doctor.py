@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from servotwin.cli.option_values import CommandWords
     from servotwin.diagnosis import Cause, Diagnosis, Finding, Looked, Measured
-    from servotwin.diagnosis.brown_out import BrownOut
+    from servotwin.diagnosis.api import BrownOut
     from servotwin.logs import Log
     from servotwin.models import Model
 
@@ -413,7 +413,7 @@ def _diagnose(made: Model, log: Log | None, words: CommandWords, load: list[str]
                                load=option_values.described(load), log=None if log is None else log.name)
     more = []
     if board is not None:
-        from servotwin.diagnosis.brown_out import brown_out
+        from servotwin.diagnosis.api import brown_out
 
         own = option_values.load_from(load, made)
         seen = brown_out(made, signal, board, log=log, load=own if log is None or own != Load() else log.load,

@@ -27,8 +27,7 @@ from servotwin.identification.report.pictures import (
     tables_of,
 )
 from servotwin.logs.mend_names import MENDS
-from servotwin.studies.kinds import Distribution, Normal, Offset, Relative, Uniform
-from servotwin.studies.words import distribution_of
+from servotwin.studies.kinds import Distribution, Normal, Offset, Relative, Uniform, distribution_of
 from servotwin.units.quantities import number_and_unit, quantity
 
 if TYPE_CHECKING:

@@ -212,7 +212,7 @@ def _run(model: Model, words: Any, load: list[str], metric: list[str], options: 
 
 
 def _how_to_go_on(folder: Path | None) -> str | None:
-    from servotwin.studies.folder import STUDY
+    from servotwin.studies.study import STUDY
 
     if folder is None or not (folder / STUDY).exists():
         return None

@@ -5,24 +5,35 @@ robot, and on hardware.
 """
 
 from servotwin.control import tuning
-from servotwin.control.bare import bare_bridge
-from servotwin.control.compensation import DeadbandCompensation, PlayCompensation
-from servotwin.control.computed_torque import ComputedTorque
-from servotwin.control.controller import Controller, Decision, PlainCommand
+from servotwin.control.controller import Controller, Decision, Encoder, PlainCommand, Sensor, Tap
 from servotwin.control.controller import Measured as Measured
-from servotwin.control.feedforward import Feedforward
-from servotwin.control.inverse import LoadModel, ServoInverse, inverse_of, joined
-from servotwin.control.levels import AheadOfServo, ThroughServo
-from servotwin.control.loop import ControlRun, run_loop
-from servotwin.control.observer import DisturbanceObserver
-from servotwin.control.pid import Pid
-from servotwin.control.ports import Port, SimulatedServo
+from servotwin.control.controllers import (
+    ComputedTorque,
+    DeadbandCompensation,
+    DisturbanceObserver,
+    Feedforward,
+    Pid,
+    PlayCompensation,
+)
+from servotwin.control.inverse import AheadOfServo, LoadModel, ServoInverse, ThroughServo, inverse_of, joined
+from servotwin.control.loop import ControlRun, check_stable, closed_loop_poles, run_loop
+from servotwin.control.ports import Port, SimulatedServo, bare_bridge
 from servotwin.control.predictive import PredictiveControl
-from servotwin.control.reference import Path, Reference, Trajectory
-from servotwin.control.sensors import Encoder, Sensor, Tap
-from servotwin.control.shaping import InputShaper, Shaped, zero_vibration, zero_vibration_derivative
-from servotwin.control.stability import check_stable, closed_loop_poles
-from servotwin.control.trajectories import hold, quintic, s_curve, sampled, step, trapezoid
+from servotwin.control.reference import (
+    InputShaper,
+    Path,
+    Reference,
+    Shaped,
+    Trajectory,
+    hold,
+    quintic,
+    s_curve,
+    sampled,
+    step,
+    trapezoid,
+    zero_vibration,
+    zero_vibration_derivative,
+)
 
 __all__ = [
     "AheadOfServo", "ComputedTorque", "ControlRun", "Controller", "DeadbandCompensation", "Decision",

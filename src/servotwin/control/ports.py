@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from servotwin.control.controller import Measured
+from servotwin import physics
+from servotwin.control.controller import ANGLE, VOLTAGE, Measured, Readings
 from servotwin.control.inverse import ServoInverse, inverse_of
-from servotwin.control.sensors import Readings
-from servotwin.control.wires import Wire, wire_of
 from servotwin.errors import InputError
 from servotwin.loads import as_load
+from servotwin.models import DCMotor, DigitalServo, GearedMotor, Model
+from servotwin.models.switched import SwitchedServo
+from servotwin.parameters import Servo
 from servotwin.physics import feedback_voltage
 from servotwin.physics.pieces import Piece, Pieces, constant_pieces
 from servotwin.signals import Signal
@@ -26,13 +30,152 @@ from servotwin.units import is_finite
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from servotwin.control.sensors import Sensor
+    from servotwin.control.controller import Sensor
     from servotwin.loads import Load, Part
-    from servotwin.models import Model
-    from servotwin.parameters import Servo
-
     Array = NDArray[np.float64]
 
+
+
+# --- How a command gets to a simulated servo --------------------------------------------------------------------------
+
+@dataclass(frozen=True, kw_only=True)
+class Wire:
+    """What is sent for a command.
+
+    Parameters
+    ----------
+    takes : str
+        "armature_voltage" or "command_angle".
+    unit : str
+        Of what is sent, as signals have it.
+    carried : callable
+        What is sent for a command, the nearest that the wire can carry (SI).
+    at_rest : callable
+        What is sent to a servo that rests at an angle (SI).
+    frame, lag : float
+        How often a new command can matter, and how long it needs besides until it acts [s].
+    """
+
+    takes: str
+    unit: str
+    carried: Callable[[float], float]
+    at_rest: Callable[[float], float]
+    frame: float = 0.0
+    lag: float = 0.0
+
+
+def wire_of(model: Model, believed: Servo, resolution: float) -> Wire:
+    """Return how commands get to a model; pulses have steps of `resolution` [s] and the calibration of a servo."""
+    if isinstance(model, DCMotor | GearedMotor):
+        V = model.servo.get("supply.open_circuit_voltage")
+        most = V if isinstance(V, float) else math.inf
+        return Wire(takes=VOLTAGE, unit="V", carried=lambda v: _within(v, -most, most), at_rest=lambda q: 0.0)
+    if isinstance(model, DigitalServo) and model.takes_goals:
+        tick, late = model.value("firmware.control_period"), model.value_or("firmware.compute_delay", 0.0)
+        if "potentiometer.fixed_angle" in model.servo.names():
+            return _duties(model, tick, late)
+        lower, upper = _travel(model, "firmware.lower_goal", "firmware.upper_goal")
+        return Wire(takes=ANGLE, unit="rad", carried=lambda q: _within(q, lower, upper),
+                    at_rest=lambda q: _within(q, lower, upper), frame=tick, lag=late)
+    if isinstance(model, SwitchedServo):
+        return _pulses(model, believed, resolution)
+    lower, upper = _travel(model)
+    return Wire(takes=ANGLE, unit="rad", carried=lambda q: _within(q, lower, upper), at_rest=lambda q: q)
+
+
+def _duties(model: DigitalServo, tick: float, late: float) -> Wire:
+    """Return the wire to a bridge whose goals are duties, `bare_bridge`: v = d (V_oc − V_ce0)."""
+    V = model.value("supply.open_circuit_voltage") - model.value_or("supply.bridge_drop_voltage", 0.0)
+    return Wire(takes=VOLTAGE, unit="rad", carried=lambda v: _within(v / V, -1.0, 1.0), at_rest=lambda q: 0.0,
+                frame=tick, lag=late)
+
+
+def _pulses(model: SwitchedServo, believed: Servo, resolution: float) -> Wire:
+    """Return the wire that carries pulses, of the width that stands for an angle: T_0 + (p q + b_o)/s_r."""
+    def number(name: str, default: float | None = None) -> float:
+        value = believed.get(name)
+        if isinstance(value, float):
+            return value
+        if default is None:
+            raise InputError(f"pulses for {believed.name}", got=f"no {name}", allowed="a servo that gives it")
+        return default
+
+    slope, T_0 = number("electronics.one_shot_slope"), number("electronics.one_shot_offset", 0.0)
+    p, b_o = number("potentiometer.feedback_gain"), number("potentiometer.feedback_offset", 0.0)
+    frame = model.frame_period
+    shortest = max(model.value_or("electronics.pulse_width_min", 0.0), resolution, 1e-9)
+    longest = min(model.value_or("electronics.pulse_width_max", math.inf), 0.999 * frame)
+
+    def width(q: float) -> float:
+        t = physics.pulse_width_from_feedback(physics.feedback_voltage(q, p, b_o), slope, T_0)
+        return _within(resolution * round(t / resolution) if resolution > 0.0 else t, shortest, longest)
+
+    return Wire(takes=ANGLE, unit="s", carried=width, at_rest=width, frame=frame,
+                lag=model.value_or("firmware.compute_delay", 0.0))
+
+
+def _travel(model: Model, *goals: str) -> tuple[float, float]:
+    names = [("stops.lower_angle", "stops.upper_angle"), goals] if goals else [("stops.lower_angle",
+                                                                               "stops.upper_angle")]
+    given = [(model.value_or(low, -math.inf), model.value_or(high, math.inf)) for low, high in names]
+    return max(low for low, _ in given), min(high for _, high in given)
+
+
+def _within(value: float, lower: float, upper: float) -> float:
+    return min(max(value, lower), upper)
+
+
+# --- The bridge of a servo without its chip: a goal is a duty, every millisecond --------------------------------------
+
+_TAPPED = ("potentiometer.feedback_gain", "potentiometer.feedback_offset")  # still there for who taps it
+
+
+def bare_bridge(servo: Servo, *, duty_steps: int = 1000, period: float = 1e-3, delay: float = 0.0) -> DigitalServo:
+    """Return motor, gear and bridge of a servo without its own loop, told by duties: the chip is bypassed.
+
+    Its program hands a goal on as the duty, as servos with a mode for PWM do; `SimulatedServo` takes voltages for it
+    and sends v/(V_oc − V_ce0). The potentiometer can still be tapped; end stops do not count.
+
+    Parameters
+    ----------
+    servo : Servo
+        Analog or digital; of its program nothing is left.
+    duty_steps : int
+        Of full duty.
+    period : float
+        Of the program [s].
+    delay : float
+        From a tick until its duty holds [s].
+
+    Raises
+    ------
+    InputError
+        If a number makes no sense.
+    MissingParameterError
+        If the servo lacks numbers of motor, gear or supply.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> bridge = bare_bridge(st.load_servo("hitec-hs-755hb"))
+    >>> result = st.simulate(bridge, st.signals.constant(0.5, unit="rad"), duration=0.5)
+    >>> f"{result['output_speed'][-1]:.3f} rad/s at {result['duty'][-1]:g} of the duty"
+    '1.952 rad/s at 0.5 of the duty'
+    """
+    if not (isinstance(duty_steps, int) and duty_steps >= 1):
+        raise InputError("duty_steps", got=duty_steps, allowed="a whole number of at least 1")
+    if not (is_finite(period) and period > 0.0):
+        raise InputError("period of the bridge", got=period, allowed="a positive number of seconds")
+    gone = ("firmware.", "electronics.", "potentiometer.", "stops.")
+    nothing = dict.fromkeys(name for name in servo.names() if name.startswith(gone) and name not in _TAPPED)
+    return DigitalServo(servo.replace({
+        **nothing, "firmware.control_period": period, "firmware.compute_delay": delay, "firmware.command_kind": "goal",
+        "firmware.proportional_gain": 1.0, "firmware.duty_quantum": 1.0 / duty_steps,
+        "firmware.deadband_angle": 0.0, "firmware.lower_goal": -1.0, "firmware.upper_goal": 1.0,
+        "potentiometer.fixed_angle": 0.0}, source="the chip bypassed"))
+
+
+# --- What a controller is wired to ------------------------------------------------------------------------------------
 
 class Port(Protocol):
     """Four things to do with a servo, or with all servos of a robot at once."""

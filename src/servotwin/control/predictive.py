@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from servotwin.control.controller import VOLTAGE, Decision, Measured, check_numbers, check_period, clipped
+from servotwin.control.controllers import Smoothed, disturbance, held, resting, smoothed
 from servotwin.control.inverse import ServoInverse
-from servotwin.control.observer import disturbance
 from servotwin.control.reference import Reference
-from servotwin.control.smoothing import Smoothed, held, resting, smoothed
 from servotwin.errors import InputError, MissingExtraError
 
 if TYPE_CHECKING:

@@ -24,8 +24,7 @@ from servotwin.text import LONGEST_STEM, identifier, is_taken
 if TYPE_CHECKING:
 
     from servotwin.loads import Load, Part
-from servotwin.export.c_text import CCode
-from servotwin.export.c_writing import Writing
+from servotwin.export.c_writing import CCode, Writing
 
 _NAME = re.compile(rf"[a-z][a-z0-9_]{{0,{LONGEST_STEM - 1}}}")
 _KNOWN = (AveragedServo, AveragedServoInductive, BoundedServo, PulseServo, PulseServoInductive, DigitalServo)

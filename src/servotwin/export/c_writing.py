@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
+import math
+import os
+import tempfile
 import textwrap
-from dataclasses import replace
-from functools import cache
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache, reduce
+from pathlib import Path
+from string import Template
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from servotwin import __version__
-from servotwin.export.c_header import HEADER, MADE, events_of, signals_of
-from servotwin.export.c_making import making
-from servotwin.export.c_source import ADVANCING, IN_PARTS, SOURCE
-from servotwin.export.features import features_of, left_out, recipe_of
-from servotwin.models import (
-    AveragedServo,
-    AveragedServoInductive,
-    BoundedServo,
-    DigitalServo,
-)
+from servotwin.errors import OutputError, OutputExistsError
+from servotwin.models import AveragedServo, AveragedServoInductive, BoundedServo, DigitalServo
+from servotwin.models.engine.demands import demanded
+from servotwin.models.engine.events.crossings import NAMES
 from servotwin.models.engine.log import COUNTS, EVENTS, LEFT, Happened, Log, Row
 from servotwin.models.engine.memory import BEAT, Inputs, Lowest, Memories, Memory, Point
 from servotwin.models.engine.run.alone import Alone, Seen
@@ -28,13 +28,41 @@ from servotwin.models.state.modes import Mode, Vector
 from servotwin.models.state.records import numbers_in, record_of
 from servotwin.models.terms import wiring
 from servotwin.models.terms.control import Firm
+from servotwin.models.terms.dependence import (
+    AT_COMMANDS,
+    AT_STOPS,
+    BEYOND,
+    BY_SHARE,
+    CURVED_Q,
+    DROPS,
+    DRY,
+    FADING,
+    ON_HEAT,
+    ON_I,
+    ONE_WAY,
+    PLAY,
+    PROGRAM,
+    PULSES,
+    PWM,
+    REGULATED,
+    SHOWN,
+    SLACK,
+    SPRING,
+    STEEP_W,
+    STEPS,
+    STRAIGHT,
+    TABLE,
+)
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
+from servotwin.models.terms.firmware import present as programmed
 from servotwin.models.terms.frame import NO_CHIP, Chip, Decision, Frame
-from servotwin.models.terms.given import Given
-from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.given import Given, Hung, hung_of
+from servotwin.models.terms.numbers import ACTS, NOTHING, Numbers
 from servotwin.models.terms.sensor import table_of
 from servotwin.models.terms.wiring import Wiring
 from servotwin.physics.pieces import Piece
+from servotwin.simulation.compile import Recipe
+from servotwin.simulation.compile.c_types import identifier
 from servotwin.simulation.compile.kinds import FLOAT64, INT64, Array, Kind, Record, Tuple
 from servotwin.simulation.compile.signatures import named
 from servotwin.simulation.compile.standalone import Standalone
@@ -44,7 +72,405 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from servotwin.loads import Load
-from servotwin.export.c_text import CCode
+
+
+
+# --- The header of an exported servo: structs, what calls return, functions -------------------------------------------
+
+HEADER = Template('''/* $title
+ *
+ * Printed by servotwin $version from the kernels that simulate it in Python: $digits.
+ * C99, no allocation, no globals, SI units. Compile ${name}.c beside it and link with the maths library.
+ *
+ *     ${name}_state servo;
+ *     ${name}_signals now;
+ *     ${name}_init(&servo, &${name}_table, $example, 0);
+ *     ${name}_advance(&servo, &${name}_table, 0.02, $example, 0.0, NULL);
+ *     ${name}_observe(&servo, &${name}_table, $example, 0.0, &now);
+ *
+ * The command is $command. Several servos are several states; a state may be copied,
+ * kept and taken up again. What the servo does not have is left out of the code:
+$absent
+ */
+#ifndef ${guard}_H
+#define ${guard}_H
+
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* What a call returns. Unless it is ${guard}_DONE, nothing has changed. */
+enum {
+    ${guard}_DONE = 0,
+    ${guard}_DIVERGED = 1,       /* numbers beyond what one holds */
+    ${guard}_STEP_TOO_SMALL = 2, /* a motion that no step is short enough for */
+    ${guard}_CHATTER = 3,        /* events without time going on */
+    ${guard}_TOO_FAST = 4,       /* more oscillations than can be followed */
+    ${guard}_CROWDED = 5,        /* pulses that come before two others are decided upon */
+    ${guard}_NOT_FINITE = -1,    /* a time or a torque is no number */
+    ${guard}_BAD_COMMAND = -2,   /* a command that the servo does not take, or no number */
+    ${guard}_IN_THE_PAST = -3,   /* the servo is further already */
+    ${guard}_OTHER_CODE = -4     /* parameters that ask for what was left out of this code */
+};
+
+/* What happens, of an event. */
+enum {
+$events
+};
+
+/* What the servo is, term by term, at its output shaft; lengths of time in seconds, words as numbers. */
+$structs
+
+typedef struct {
+    ${name}_numbers numbers;
+$more} ${name}_servo;
+
+/* All that it remembers. */
+typedef struct {
+    ${name}_memory memory;
+$remembered    int64_t seed;
+} ${name}_state;
+
+/* Something that happened: when [s$since], at which output angle [rad], and what. */
+$event
+
+/* Room for events; `count` is set to how many there were, of which the first `room` are kept. */
+typedef struct {
+    ${name}_event *rows;
+    int64_t room;
+    int64_t count;
+} ${name}_events;
+
+/* Signals (SI), those of the motor at its own shaft. */
+typedef struct {
+$signals
+} ${name}_signals;
+
+/* The numbers of $id. */
+extern const ${name}_servo ${name}_table;
+
+/* Put the servo to rest at t = 0, where it has no error under a command; the seed is that of its noise. */
+int ${name}_init(${name}_state *state, const ${name}_servo *servo, $real command, int64_t seed);
+
+/* Go on to a time since the start [s] under a command from now on, and a torque that is constant meanwhile, beside that
+ * of the load; positive pushes towards -q [N m]. `events` may be NULL. */
+int ${name}_advance(${name}_state *state, const ${name}_servo *servo, double until, $real command, $real torque,
+    ${name}_events *events);
+
+/* Look at the servo as it stands, before anything happens at its time. */
+int ${name}_observe(const ${name}_state *state, const ${name}_servo *servo, $real command, $real torque,
+    ${name}_signals *signals);
+
+/* The time since the start [s]. */
+double ${name}_time(const ${name}_state *state);
+
+/* The command under which the servo has no error at an angle [rad]. */
+$real ${name}_command(const ${name}_servo *servo, $real angle);
+$making
+#ifdef __cplusplus
+}
+#endif
+
+#endif
+''')
+
+MADE = Template('''
+/* The parameters of the servo file, SI, words as their places among those allowed; NAN: not given. */
+extern const ${name}_given ${name}_given_table;
+
+/* Make a servo of parameters, with the load of the table; ${guard}_OTHER_CODE, and nothing changes, where they ask
+ * for what was left out. They are not checked otherwise. */
+int ${name}_make(${name}_servo *servo, const ${name}_given *given);
+''')
+
+
+def events_of(guard: str) -> str:
+    """Return the numbers of all events."""
+    first = [(number, words) for number, words in enumerate(NAMES) if NAMES.index(words) == number]
+    return ",\n".join(f"    {guard}_{words.upper().replace(' ', '_')} = {number}" for number, words in first)
+
+
+def signals_of(names: Sequence[tuple[str, str, str]]) -> str:
+    """Return the members of the struct of signals, each with unit and meaning."""
+    width = max(len(name) for name, *_ in names)
+    return "\n".join(f"    double {name};{' ' * (width - len(name))} /* {meaning} [{unit}] */"
+                     for name, unit, meaning in names)
+
+
+# --- The source of an exported servo, around its kernels: its numbers, and the functions that others call -------------
+
+SOURCE = Template('''/* $title
+ *
+ * Printed by servotwin $version from its kernels; see $name.h.
+ */
+#include "$name.h"
+
+$kernels
+const ${name}_servo ${name}_table = {
+$table$beat};
+
+/* The memory of a servo as the kernels take it. */
+static $memories memories_of(const ${name}_state *state) {
+    ${name}_state *own = (${name}_state *)(uintptr_t)state;
+    $memories all = {{&own->memory, {1}}, $firms};
+    return all;
+}
+
+/* What a servo is told, with room for its one command. */
+static $inputs inputs_of(const ${name}_state *state, const ${name}_servo *servo, $real command, $real torque,
+    $real *piece) {
+    $inputs all = {{piece, {1, 7}}, {NULL, {0, 7}}, torque + servo->numbers.torque, $period, {NULL, {0}}, $curve,
+        state->seed, servo->numbers.accuracy, $program};
+    for (int k = 0; k < 7; k++)
+        piece[k] = 0;
+$since    piece[1] = servo->numbers.wiring.gain * command + servo->numbers.wiring.offset;
+    return all;
+}
+
+int ${name}_init(${name}_state *state, const ${name}_servo *servo, $real command, int64_t seed) {
+    const $memories all = memories_of(state);
+    const array_double_2 curve = $curve;
+    const int status = (int)$start(&servo->numbers, curve, &all, command);
+    if (status == 0)
+        $begun
+    return status;
+}
+
+$advancing
+int ${name}_observe(const ${name}_state *state, const ${name}_servo *servo, $real command, $real torque,
+    ${name}_signals *signals) {
+    $real piece[7];
+    const $memories all = memories_of(state);
+    const $inputs told = inputs_of(state, servo, command, torque, piece);
+    const int status = (int)$answer(&servo->numbers, command, torque);
+    if (status != 0)
+        return status;
+    const $seen seen = $observe(&servo->numbers, &told, &all);
+$signals
+    return 0;
+}
+
+double ${name}_time(const ${name}_state *state) {
+    return $zero(double)state->memory.frames * (double)state->memory.beat + (double)state->memory.point.time;
+}
+
+$real ${name}_command(const ${name}_servo *servo, $real angle) {
+    return servo->numbers.wiring.per_angle * angle + servo->numbers.wiring.at_zero;
+}
+''')
+
+ADVANCING = Template('''int ${name}_advance(
+    ${name}_state *state, const ${name}_servo *servo, double until, double command, double torque,
+    ${name}_events *events) {
+    double piece[7];
+    int64_t counts[$counts] = {[$left] = INT64_MAX};
+    const $memories all = memories_of(state);
+    const $inputs told = inputs_of(state, servo, command, torque, piece);
+    const $rows rows = {events != NULL ? events->rows : NULL, {events != NULL ? events->room : 0}};
+    const $log log = {{NULL, {0}}, rows, {NULL, {0}}, {counts, {$counts}}};
+$keeping    const int status = (int)$advance(&servo->numbers, &told, &all, until, command, &log);
+    if (events != NULL)
+        events->count = counts[$events];
+$restoring    return status;
+}
+''')
+
+IN_PARTS = Template('''int ${name}_advance(
+    ${name}_state *state, const ${name}_servo *servo, double until, float command, float torque,
+    ${name}_events *events) {
+    /* Times of the memory count from the end of the last part, so that floats have digits for them. */
+    static const double longest = 0.25;
+    const ${name}_state before = *state;
+    const double now = ${name}_time(state);
+    double left;
+    float piece[7];
+    int64_t counts[$counts] = {[$left] = INT64_MAX};
+    int status;
+    const $memories all = memories_of(state);
+    const $inputs told = inputs_of(state, servo, command, torque, piece);
+    const $rows rows = {events != NULL ? events->rows : NULL, {events != NULL ? events->room : 0}};
+    const $log log = {{NULL, {0}}, rows, {NULL, {0}}, {counts, {$counts}}};
+    if (!(until - until == 0.0))
+        return ${guard}_NOT_FINITE;
+    do {
+        const float late = (float)(state->begun - now);
+        const int64_t kept = counts[$events];
+        left = until - state->begun;
+        const float part = (float)(left > longest ? longest : left);
+        status = (int)$advance(&servo->numbers, &told, &all, part, command, &log);
+        for (int64_t n = kept; n < counts[$events] && n < rows.n[0]; n++)
+            rows.p[n].time += late;
+        const int64_t frames = state->memory.frames;
+        const double passed = (double)frames * servo->beat;
+        state->begun += passed;
+        state->memory.frames = 0;
+$passing    } while (status == 0 && left > longest);
+    if (events != NULL)
+        events->count = counts[$events];
+    if (status != 0)
+        *state = before;
+    return status;
+}
+''')
+
+
+# --- What the code of a servo has to follow, and which kernels therefore are in it ------------------------------------
+
+ENTRIES = ("start", "advance", "answer", "observe")
+APART = ("heat.T_amb",)  # stands apart too, for where nothing gets warm
+_ALWAYS = STRAIGHT | DRY | AT_STOPS | SHOWN
+
+
+def features_of(numbers: Numbers, chip: Chip, program: Firmware, table: bool) -> int:
+    """Return all that a servo asks of the code that follows it: flags of `terms.dependence`."""
+    flags = _ALWAYS | demanded(numbers, chip, program, Piece()) | (TABLE if table else 0)
+    if programmed(program):
+        flags |= BEYOND | AT_COMMANDS | ONE_WAY
+    rooms = numbers._asdict() | {"chip": chip, "firmware": program}
+    for path, acts in ACTS.items():
+        room, *fields = path.split(".")
+        if path not in APART and room in rooms and not acts & flags and reduce(getattr, fields, rooms[room]) != reduce(
+                getattr, fields, NOTHING[room]):
+            flags |= acts
+    return flags
+
+
+def recipe_of(flags: int) -> Recipe:
+    """Return the recipe of a servo that asks for this; what else there is is left out."""
+    always = PROGRAM | PWM if flags & PROGRAM else 0
+    return Recipe("alone", tuple(f"servotwin.models.engine.run.alone:{entry}" for entry in ENTRIES), knows=flags,
+                  always=always, never=("ALL", "READINGS"))
+
+
+_WORDS = {
+    ON_I: "inductance", CURVED_Q: "a pendulum", ON_HEAT: "heat", PLAY: "play of the gear",
+    SPRING: "a spring between two bodies",
+    FADING: "friction that fades", BY_SHARE: "friction by torque", REGULATED: "a limit of current",
+    SLACK: "play of the potentiometer", STEPS: "its steps", TABLE: "its table", DROPS: "drops and open bridges",
+    PULSES: "pulses", PROGRAM: "a program", STEEP_W: "smoothed friction"}
+
+
+def left_out(flags: int) -> str:
+    """Return in words what the code of a servo that asks for this does not follow."""
+    return ", ".join(word for flag, word in _WORDS.items() if not flags & flag) or "nothing"
+
+
+# --- The function of an exported servo that makes its numbers of parameters, around the kernels that pack -------------
+
+_KERNELS = "servotwin.models.engine.run.alone"
+_ENTRIES = ((BoundedServo, "bounded"), (AveragedServo, "averaged"), (AveragedServoInductive, "averaged"),
+            (DigitalServo, "digital"))
+_MAKING = Template('''
+const ${name}_given ${name}_given_table = $given;
+
+int ${name}_make(${name}_servo *servo, const ${name}_given *given) {
+    static const $hung hung = $load;
+    ${name}_servo next = ${name}_table;
+    next.numbers = $made(given, &hung, $error, $torque, $accuracy);
+$program    const ${name}_numbers *own = &next.numbers;
+    if (($asks(own, $own_program) & ~INT64_C($flags)) != 0
+        || $absent)
+        return ${guard}_OTHER_CODE;
+    *servo = next;
+    return 0;
+}
+''')
+_MADE_PROGRAM = Template('''    typedef char same_words[sizeof(next.program) == sizeof($kind) ? 1 : -1];
+    const $kind program = $made(given);
+    memcpy(&next.program, &program, sizeof(same_words) * sizeof program);
+''')
+
+
+def making(text: Standalone, recipe: Recipe, model: Any, load: Load, alone: Alone, *, name: str) -> str:
+    """Return the function that makes a servo of what is given of it, and print its kernels into a text.
+
+    It refuses what asks for something that the code does not follow, which the recipe says.
+    """
+    digital = isinstance(model, DigitalServo)
+    made = next((entry for kind, entry in _ENTRIES if isinstance(model, kind)), "pulsed")
+    entries: dict[str, tuple[Kind, ...]] = {made: (named(Given), named(Hung), FLOAT64, FLOAT64, FLOAT64),
+                                            "asks": (named(type(alone)), named(Firmware))}
+    entries |= {"program": (named(Given),)} if digital else {}
+    names = text.add(Recipe("alone_making", tuple(f"{_KERNELS}:{entry}" for entry in entries)), entries)
+    types = text.types
+    program = _MADE_PROGRAM.substitute(kind=types.of(named(Firmware)), made=names["program"]) if digital else ""
+    return _MAKING.substitute(
+        name=name, guard=name.upper(), made=names[made], program=program, asks=names["asks"],
+        own_program="&program" if digital else f"&(const {types.of(named(Firmware))}){{0}}", flags=str(recipe.knows),
+        absent=_is_absent(recipe, chip=alone.chip.frame_period > 0.0, digital=digital), hung=types.of(named(Hung)),
+        load=types.initial(named(Hung), hung_of(load)), given=types.initial(named(Given), model.given),
+        error=repr(float(getattr(model, "standing_error", 0.0))),  # of a servo without pulses nothing stands
+        torque=repr(float(alone.torque)), accuracy=repr(alone.accuracy))
+
+
+def _is_absent(recipe: Recipe, *, chip: bool, digital: bool) -> str:
+    """Return the condition that a number is not what it is where its term is absent, of those that code leaves out."""
+    places = {name: f"own->plant.{name}" for name in Numbers._fields}
+    places |= ({"chip": "own->chip"} if chip else {}) | ({"firmware": "next.program"} if digital else {})
+    found = []
+    for path in sorted(recipe.absent):
+        room, *fields = path.split(".")
+        if room in places and path not in APART:
+            neutral: float = reduce(getattr, fields, NOTHING[room])
+            value = f"{'-' if neutral < 0.0 else ''}INFINITY" if math.isinf(neutral) else repr(float(neutral))
+            found.append(f"!({'.'.join([places[room], *map(identifier, fields)])} == {value})")
+    return "\n        || ".join(found) or "0"
+
+
+# --- The two texts of a servo as C ------------------------------------------------------------------------------------
+
+@dataclass(frozen=True)
+class CCode:
+    """A servo as C99.
+
+    Attributes
+    ----------
+    name : str
+        Begins the names of the files, types and functions.
+    header, source : str
+        The two texts.
+    left_out : str
+        What the numbers of the servo have no use for, and the code does not follow.
+    table : tuple of float
+        All numbers of the servo in the order in which the struct of its table has them, the table of a potentiometer
+        apart: what another servo with the same things left out may have in its place.
+    """
+
+    name: str
+    header: str
+    source: str
+    left_out: str
+    table: tuple[float, ...]
+
+    def write(self, folder: str | Path, *, overwrite: bool = False) -> tuple[Path, Path]:
+        """Write `name.h` and `name.c` into a folder, which is made where there is none; return their paths.
+
+        Raises
+        ------
+        OutputExistsError
+            If a file is there and `overwrite` is not given; then nothing has changed.
+        OutputError
+            If they cannot be written.
+        """
+        paths = Path(folder) / f"{self.name}.h", Path(folder) / f"{self.name}.c"
+        for path in paths:
+            if path.exists() and not overwrite:
+                raise OutputExistsError(path)
+        try:
+            Path(folder).mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(prefix=".servotwin-", dir=folder) as aside:
+                for path, text in zip(paths, (self.header, self.source), strict=True):
+                    (Path(aside) / path.name).write_text(text, encoding="utf-8")
+                for path in paths:
+                    os.replace(Path(aside) / path.name, path)
+        except OSError as error:
+            raise OutputError(f"{folder} cannot be written ({error.strerror or error})") from None
+        return paths
+
+
+# --- How a servo gets into C: its kernels, structs and numbers, put into the header and the source --------------------
 
 _COMMANDS = ("command_voltage", "command_angle", "pulse_width")  # are what the caller says
 _SAME, _NEARLY = "the digits are the same, but for rounding", "angles are those to about 1e-5 rad"

@@ -16,7 +16,7 @@ from servotwin.errors import InputError
 from servotwin.linear.frequency_response import frequency_response
 from servotwin.linear.linearise import linearise
 from servotwin.linear.sampled import SampledServo, mid_pulse, sampled
-from servotwin.linear.state_space import state_space
+from servotwin.linear.transfer_function import state_space
 from servotwin.loads import as_load
 from servotwin.models import (
     AveragedServo,
@@ -31,7 +31,7 @@ from servotwin.models import (
 if TYPE_CHECKING:
     import control
 
-    from servotwin.linear.response import FrequencyResponse
+    from servotwin.linear.frequency_response import FrequencyResponse
     from servotwin.loads import Load, Part
 
 Array = NDArray[np.float64]

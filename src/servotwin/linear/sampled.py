@@ -6,20 +6,19 @@ import math
 import warnings
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import expm
+from scipy.optimize import brentq
 
 from servotwin import signals
 from servotwin.errors import InputError
-from servotwin.linear.bursts import Bursts
-from servotwin.linear.law import Law
-from servotwin.linear.plant import plant_of
-from servotwin.linear.ticks import Ticks
-from servotwin.linear.transfer_function import check_model
+from servotwin.linear.transfer_function import Plant, check_model, plant_of
 from servotwin.loads import as_load
 from servotwin.models import DigitalServo, PulseServo, PulseServoInductive, mid_travel
+from servotwin.models.terms.firmware import Firmware
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
@@ -29,8 +28,305 @@ if TYPE_CHECKING:
     from servotwin.loads import Load, Part
     from servotwin.models import Model
 
+
+
+# --- What every loop that decides now and then can tell of itself -----------------------------------------------------
+
+
+
+class Law(Protocol):
+    """A loop that is linear, and the same again after some decisions."""
+
+    @property
+    def period(self) -> float:
+        """From a decision to the next [s]."""
+
+    @property
+    def ticks(self) -> int:
+        """After how many decisions it is the same again."""
+
+    def open_loop(self, omega: Array, error: float = 0.0) -> Complex:
+        """Return the loop, cut where it decides, for errors of an amplitude [rad]; shape of `omega` [rad/s]."""
+
+    def closed_loop(self, omega: Array, amplitude: float = 0.0) -> Complex:
+        """Return the fundamental of the output over a command's of an amplitude [rad]; shape of `omega` [rad/s]."""
+
+    def monodromy(self, gain: float = 1.0) -> Array:
+        """Return the transition of the closed loop until it is the same again, its gain `gain` times its own."""
+
+
+# --- A linear system over a time in which its input does not change ---------------------------------------------------
+
+
+
+class Step(NamedTuple):
+    """x(t + T) = transition x(t) + gain u."""
+
+    transition: Array
+    gain: Array
+
+
+def step_of(A: Array, B: Array, time: float) -> Step:
+    """Return the step of ẋ = A x + B u over a time [s] (Van Loan, IEEE Trans. Autom. Control 23 (1978), 395).
+
+    Examples
+    --------
+    >>> step = step_of(np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([0.0, 2.0]), 3.0)
+    >>> step.transition.tolist(), step.gain.tolist()
+    ([[1.0, 3.0], [0.0, 1.0]], [9.0, 6.0])
+    """
+    n = len(B)
+    whole = np.zeros((n + 1, n + 1))
+    whole[:n, :n], whole[:n, n] = A * time, B * time
+    found = expm(whole)
+    return Step(found[:n, :n], found[:n, n])
+
+
+# --- The loop of a pulse servo at its frames: each decision is one burst of full voltage, as long as the --------------
+
+# Behind the end of the pulses, d after the edge, the bridge drives for t_on = K s_µ |e|. A short burst is an impulse of
+# voltage, of area A k_s T_f p e. One that is not short begins with its first volt and ends with its last, so it comes
+# later in the mean than an impulse, the more so the larger the error; for an error that goes as E sin θ from frame to
+# frame, its describing function is (4/πE) ∫ f(E sin θ) sin θ dθ over a quarter of a turn, of what one burst does (Gelb
+# & Vander Velde, Multiple-Input Describing Functions, 1968, ch. 2). At E → 0 that is the impulse.
+
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+
+_NODES, _WEIGHTS = (0.5 * (np.polynomial.legendre.leggauss(24)[0] + 1.0) * 0.5 * math.pi,
+                    np.polynomial.legendre.leggauss(24)[1] * 0.25 * math.pi)  # over a quarter of a turn
+_ERRORS = np.geomspace(1e-3, 30.0, 60)  # of the command's amplitude, among which that of the error is looked for
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Bursts:
+    """What decides at every frame, and what that does to the plant.
+
+    Parameters
+    ----------
+    plant : Plant
+    period : float
+        T_f [s]
+    delay : float
+        d, from the edge to the end of its pulse [s].
+    spread : float
+        By how much the later of the two pulses ends later, of the error: ½ s_µ [s/rad].
+    stretch : float
+        K s_µ: for how long the bridge drives, of the error [s/rad].
+    voltage : float
+        Behind R_a while it drives [V].
+    """
+
+    plant: Plant
+    period: float
+    delay: float
+    spread: float
+    stretch: float
+    voltage: float
+
+    @property
+    def ticks(self) -> int:
+        """Every frame is the same."""
+        return 1
+
+    @property
+    def transition(self) -> Array:
+        """Of the plant from edge to edge, shape (n, n)."""
+        return step_of(self.plant.A, self.plant.B, self.period).transition
+
+    def jump(self, error: float = 0.0) -> Array:
+        """Return what a frame's burst leaves in the plant at the next edge, per error of an amplitude [rad]."""
+        A, B = self.plant.A, self.plant.B
+        if error == 0.0:
+            found: Array = expm(A * (self.period - self.delay)) @ B * self.voltage * self.stretch
+            return found
+        found = np.zeros(len(B))
+        for e, length, start, share in self._bursts(error):
+            left = self.period - start - length
+            found += share / e * self.voltage * (expm(A * left) @ step_of(A, B, length).gain)
+        return found
+
+    def spectrum(self, omega: float, error: float = 0.0) -> complex:
+        """Return the fundamental of the voltage over that of the error, whose samples have an amplitude [V/rad]."""
+        if error == 0.0:
+            return complex(self.voltage * self.stretch / self.period * np.exp(-1j * omega * self.delay))
+        found = 0j
+        for e, length, start, share in self._bursts(error):
+            found += share / e * (np.exp(-1j * omega * start) * (1.0 - np.exp(-1j * omega * length)) / (1j * omega))
+        return complex(self.voltage / self.period * found)
+
+    def _bursts(self, error: float) -> list[tuple[float, float, float, float]]:
+        """Return error, length, start and weight of the bursts over a quarter of a turn of the error's phase."""
+        sizes = error * np.sin(_NODES)
+        shares = 4.0 / math.pi * np.sin(_NODES) ** 2 * _WEIGHTS
+        return [(e, min(self.stretch * e, self.period), self.delay + self.spread * e, share)
+                for e, share in zip(sizes.tolist(), shares.tolist(), strict=True)]
+
+    def open_loop(self, omega: Array, error: float = 0.0) -> Complex:
+        """Return L*, angle at the edges over error, shape of `omega`."""
+        z = np.exp(1j * np.asarray(omega) * self.period)[..., np.newaxis, np.newaxis] * np.eye(len(self.plant.B))
+        moved = np.linalg.solve(z - self.transition, self.jump(error)[:, np.newaxis])[..., 0]
+        return np.asarray(moved @ self.plant.angle, np.complex128)
+
+    def closed_loop(self, omega: Array, amplitude: float = 0.0) -> Complex:
+        """Return the fundamental of the output angle over a commanded angle's, shape of `omega`."""
+        found = [self._at(w, self._error(w, amplitude)) for w in np.ravel(omega).tolist()]
+        return np.array(found).reshape(np.shape(omega))
+
+    def _at(self, omega: float, error: float) -> complex:
+        if math.isnan(error):
+            return complex(math.nan, math.nan)
+        one = np.array([omega])
+        return complex((self.plant.response(one) * self.spectrum(omega, error)
+                        / (1.0 + self.open_loop(one, error)))[0])
+
+    def _error(self, omega: float, amplitude: float) -> float:
+        """Return the amplitude of the error under a commanded sine: where E |1 + L*(E)| is that of the command."""
+        if amplitude == 0.0:
+            return 0.0
+
+        def beyond(error: float) -> float:
+            return error * abs(1.0 + complex(self.open_loop(np.array([omega]), error)[0])) - amplitude
+
+        sizes = (amplitude * _ERRORS).tolist()
+        above = next((k for k, size in enumerate(sizes) if beyond(size) > 0.0), 0)
+        if above == 0:
+            return math.nan
+        return float(brentq(beyond, sizes[above - 1], sizes[above], rtol=1e-9))
+
+    def monodromy(self, gain: float = 1.0) -> Array:
+        """Return the transition of the closed loop over a frame, its gain `gain` times its own."""
+        return self.transition - gain * np.outer(self.jump(), self.plant.angle)
+
+
+# --- The loop of a digital servo at its ticks: P, I and D of what it measures, each duty held for a tick --------------
+
+# The derivative is renewed every m-th tick and held between, so the loop is the same again after m ticks, not after
+# one: its fundamental is taken over m of them. Counts, dead zone, limits and profile are left out.
+
+_SAME = 1e-9  # of a tick
+
+
+class _Tick(NamedTuple):
+    """z' = transition z + drive d + told r, and the duty u = law z + direct r on which the program decides."""
+
+    transition: Array
+    drive: Array
+    told: Array
+    law: Array
+    direct: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Ticks:
+    """What decides at every tick, and what that does to the plant.
+
+    Parameters
+    ----------
+    plant : Plant
+    firmware : Firmware
+    voltage : float
+        Of the bridge at a duty of 1 [V].
+    command : (float, float)
+        Delay of the command [s], and for how long it is held [s].
+    """
+
+    plant: Plant
+    firmware: Firmware
+    voltage: float
+    command: tuple[float, float]
+
+    @property
+    def period(self) -> float:
+        """T_c [s]."""
+        return self.firmware.T_c
+
+    @property
+    def ticks(self) -> int:
+        """After how many ticks the loop is the same again."""
+        return round(self.firmware.m) if self.firmware.k_d > 0.0 else 1
+
+    def open_loop(self, omega: Array, error: float = 0.0) -> Complex:
+        """Return minus the fundamental of the duty decided over that of the duty applied, shape of `omega`."""
+        return -self._fundamental(np.asarray(omega), closed=False)
+
+    def closed_loop(self, omega: Array, amplitude: float = 0.0) -> Complex:
+        """Return the fundamental of the output angle over a commanded angle's, shape of `omega`."""
+        omega = np.asarray(omega, dtype=np.float64)
+        delay, held = self.command
+        told = np.exp(-1j * omega * (delay + 0.5 * held)) * np.sinc(omega * held / (2.0 * np.pi))
+        applied = np.exp(-1j * omega * (self.firmware.T_d + 0.5 * self.period)) * np.sinc(
+            omega * self.period / (2.0 * np.pi))
+        found: Complex = (self.plant.response(omega) * self.voltage * applied * told
+                          * self._fundamental(omega, closed=True))
+        return found
+
+    def _fundamental(self, omega: Array, *, closed: bool) -> Complex:
+        """Return the fundamental of the duty decided, over a command's or, with the loop open, over a duty's."""
+        ticks = self._all
+        size, flat = len(ticks[0].drive), np.ravel(omega)
+        turn = np.exp(1j * flat * self.period)
+        z, moved = np.zeros((len(flat), size), complex), np.broadcast_to(np.eye(size), (len(flat), size, size))
+        steps = [(t.transition + np.outer(t.drive, t.law), t.told + t.drive * t.direct) if closed else
+                 (t.transition, t.drive) for t in ticks]
+        for k, (transition, told) in enumerate(steps):  # from nothing; then what has to be there for it to go on
+            z, moved = z @ transition.T + np.outer(turn**k, told), transition @ moved
+        z = np.linalg.solve(turn[:, None, None] ** len(ticks) * np.eye(size) - moved, z[..., None])[..., 0]
+        duty: Complex = np.zeros(len(flat), np.complex128)
+        for k, (tick, (transition, told)) in enumerate(zip(ticks, steps, strict=True)):
+            duty += (z @ tick.law) * turn**-k + (tick.direct if closed else 0.0)
+            z = z @ transition.T + np.outer(turn**k, told)
+        return (duty / len(ticks)).reshape(np.shape(omega))
+
+    def over_a_turn(self) -> tuple[Array, Array]:
+        """Return the closed loop until it is the same again, under an angle r held meanwhile: z' = A z + B r."""
+        A, B = np.eye(len(self._all[0].drive)), np.zeros(len(self._all[0].drive))
+        for tick in self._all:
+            closed = tick.transition + np.outer(tick.drive, tick.law)
+            A, B = closed @ A, closed @ B + tick.told + tick.drive * tick.direct
+        return A, B
+
+    def monodromy(self, gain: float = 1.0) -> Array:
+        """Return the transition of the closed loop until it is the same again, its gain `gain` times its own."""
+        found = np.eye(len(self._all[0].drive))
+        for tick in self._all:
+            found = (tick.transition + gain * np.outer(tick.drive, tick.law)) @ found
+        return found
+
+    @cached_property
+    def _all(self) -> list[_Tick]:
+        """The ticks until the loop is the same again: the first one renews the derivative."""
+        return [self._tick(renews=self.firmware.k_d > 0.0), *[self._tick(renews=False)] * (self.ticks - 1)]
+
+    def _tick(self, *, renews: bool) -> _Tick:
+        fw, plant, n = self.firmware, self.plant, len(self.plant.B)
+        late = int((fw.T_d + _SAME * fw.T_c) // fw.T_c)  # whole ticks by which a duty comes late
+        rest = max(fw.T_d - late * fw.T_c, 0.0)
+        y_at, D_at, x_at, J_at, first = n, n + 1, n + 2, n + 3, n + 4
+        size = first + late + 1  # duties that wait: of the latest tick first
+        unit = np.eye(size + 2)
+        r, d = unit[size], unit[size + 1]
+        q = np.concatenate([plant.angle, np.zeros(size + 2 - n)])
+        y = (1.0 - fw.weight) * unit[y_at] + fw.weight * q
+        e = r - y
+        x = -y if fw.of_measurement > 0.0 else e
+        D = fw.k_d * (x - unit[x_at]) / (fw.m * fw.T_c) if renews else unit[D_at] * (fw.k_d > 0.0)
+        integrates = fw.k_i > 0.0 and fw.at_rest == 0.0
+        J = unit[J_at] + fw.k_i * fw.T_c * e if integrates else 0.0 * e
+        u = fw.k_p * e + J + D
+        waiting = [d, *unit[first:size]]
+        before, after = step_of(plant.A, plant.B, rest), step_of(plant.A, plant.B, fw.T_c - rest)
+        state = np.zeros((n, size + 2))
+        state[:, :n] = after.transition @ before.transition
+        state += self.voltage * (np.outer(after.transition @ before.gain, waiting[late + 1])
+                                 + np.outer(after.gain, waiting[late]))
+        then = x if renews else unit[x_at] * (fw.k_d > 0.0)
+        new = np.vstack([state, y, D, then, J, *waiting[:late + 1]])
+        return _Tick(new[:, :size], new[:, size + 1], new[:, size], u[:size], float(u[size]))
+
+
+# --- The loop of a servo that decides now and then: a pulse servo every frame, a digital one every tick ---------------
+
 
 _FINEST = 600  # frequencies at which margins are looked for
 _LOWEST = 1e-3  # of half the rate, the first of them

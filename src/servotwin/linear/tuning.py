@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -12,25 +13,196 @@ from numpy.typing import NDArray
 
 from servotwin import physics, signals
 from servotwin.errors import InputError
-from servotwin.linear.bursts import Bursts
-from servotwin.linear.gains import Gain, between, gains_of
-from servotwin.linear.outer_loop import OuterLoop, stepped
-from servotwin.linear.sampled import Margins, SampledServo, sampled
+from servotwin.linear.sampled import Bursts, Margins, SampledServo, sampled
 from servotwin.linear.transfer_function import check_model
-from servotwin.loads import as_load
+from servotwin.loads import Load, as_load
 from servotwin.models import DigitalServo, PulseServo, PulseServoInductive, mid_travel
-from servotwin.simulation import simulate_many
+from servotwin.parameters import REGISTER_FAMILIES
+from servotwin.simulation import Simulator, simulate_many
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from servotwin.loads import Load, Part
+    from servotwin.loads import Part
     from servotwin.models import Model
-
     _Tuned = DigitalServo | PulseServo | PulseServoInductive
 
+
+
+# --- The gains that a servo can be given ------------------------------------------------------------------------------
+
+_TRIED = 60  # P gains for each D, evenly by their logarithm
+_RANGE = (0.02, 50.0)  # of P without a register, over what the servo has
+_NEXT = 1e-4  # of a gain: nothing is between two that are nearer
+_LEADS = (0.0, 0.005, 0.01, 0.02, 0.04)  # s, D over P without a register; as long as ticks and motors take
+
+
+class _Names(NamedTuple):
+    P: str
+    D: str
+    most: int
+    tried: tuple[int, ...]  # of D
+
+
+_REGISTERS = {
+    "feetech-sts": _Names("P_Coefficient", "D_Coefficient", 254, (0, 8, 16, 32, 64, 128, 254)),
+    "dynamixel-x": _Names("Position_P_Gain", "Position_D_Gain", 16383, (0, 250, 500, 1000, 2000, 4000, 8000, 16000)),
+    **dict.fromkeys(("dynamixel-mx", "dynamixel-xl320"), _Names("P_Gain", "D_Gain", 254, (0, 8, 16, 32, 64, 128, 254))),
+}
+
+
+class Gain(NamedTuple):
+    """A servo with other gains, or with a loop around it: what was set, and to what."""
+
+    settings: dict[str, float]
+    model: DigitalServo | PulseServo | PulseServoInductive
+
+
+def gains_of(model: DigitalServo, *, derivative: bool) -> list[list[Gain]]:
+    """Return servos with other gains P, growing, in a list for every D; that of the servo alone unless asked."""
+    names = _REGISTERS.get(str(model.servo.sheet.get("registers")))
+    if names is None:
+        return _by_number(model, derivative=derivative)
+    values = np.unique(np.round(np.geomspace(1.0, names.most, 2 * _TRIED)).astype(int)).tolist()
+    own: tuple[int | None, ...] = names.tried if derivative else (None,)
+    return [[_set(model, names, P, D) for P in values] for D in own]
+
+
+def _set(model: DigitalServo, names: _Names, P: int, D: int | None) -> Gain:
+    settings = {names.P: P} | ({} if D is None else {names.D: D})
+    with warnings.catch_warnings():  # of registers that were not asked for
+        warnings.simplefilter("ignore")
+        servo = REGISTER_FAMILIES[str(model.servo.sheet["registers"])](settings, servo=model.servo)
+    return Gain(dict(settings), DigitalServo(servo))
+
+
+def _by_number(model: DigitalServo, *, derivative: bool) -> list[list[Gain]]:
+    P_own = model.value("firmware.proportional_gain")
+    found = []
+    for lead in _LEADS if derivative else (None,):
+        row = []
+        for P in (P_own * np.geomspace(*_RANGE, _TRIED)).tolist():
+            settings = {"firmware.proportional_gain": P}
+            if lead is not None:
+                settings["firmware.derivative_gain"] = lead * P
+            row.append(Gain(settings, DigitalServo(model.servo.replace(settings))))
+        found.append(row)
+    return found
+
+
+def between(low: Gain, high: Gain) -> Gain | None:
+    """Return a gain between two of one row, or around one servo; None where nothing is between them.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> model = st.PulseServo(st.load_servo("hitec-hs-755hb"))
+    >>> between(Gain({"outer_gain": 0.1}, model), Gain({"outer_gain": 0.4}, model)).settings
+    {'outer_gain': 0.2}
+    """
+    model = low.model
+    names = _REGISTERS.get(str(model.servo.sheet.get("registers")))
+    if names is not None and names.P in low.settings and isinstance(model, DigitalServo):
+        P = int(low.settings[names.P] + high.settings[names.P]) // 2
+        D = low.settings.get(names.D)
+        return None if P == low.settings[names.P] else _set(model, names, P, None if D is None else int(D))
+    if all(high.settings[name] <= value * (1.0 + _NEXT) for name, value in low.settings.items()):
+        return None
+    settings = {name: math.sqrt(value * high.settings[name]) for name, value in low.settings.items()}
+    return Gain(settings, DigitalServo(model.servo.replace(settings)) if isinstance(model, DigitalServo) else model)
+
+
+# --- A loop around a pulse servo --------------------------------------------------------------------------------------
+
+# c[n+1] = c[n] + g (r − q[n]): what a microcontroller can do about droop, dead zone and friction. The servo itself gets
+# the angle c as a pulse; g is the part of the error that is made good in a frame.
+
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OuterLoop:
+    """The loop of a servo at its frames, and an integrator around it.
+
+    Parameters
+    ----------
+    inner : Bursts
+    gain : float
+        g, of the error that the command makes good in a frame [1].
+    """
+
+    inner: Bursts
+    gain: float
+
+    @property
+    def ticks(self) -> int:
+        """Every frame is the same."""
+        return 1
+
+    @property
+    def period(self) -> float:
+        """T_f [s]."""
+        return self.inner.period
+
+    @cached_property
+    def _steps(self) -> tuple[Array, Array]:
+        """Return transition and input of plant and command, for what is added to the command at an edge."""
+        n, jump = len(self.inner.plant.B), self.inner.jump()
+        transition = np.zeros((n + 1, n + 1))
+        transition[:n, :n], transition[:n, n], transition[n, n] = self.inner.monodromy(), jump, 1.0
+        return transition, np.append(jump, 1.0)  # what is added counts in this very frame
+
+    def open_loop(self, omega: Array, error: float = 0.0) -> Complex:
+        """Return the loop, angle at the edges over the error that is integrated, shape of `omega`."""
+        transition, told = self._steps
+        z = np.exp(1j * np.asarray(omega) * self.period)[..., np.newaxis, np.newaxis] * np.eye(len(told))
+        moved = np.linalg.solve(z - transition, self.gain * told[:, np.newaxis])[..., 0]
+        return np.asarray(moved @ np.append(self.inner.plant.angle, 0.0), np.complex128)
+
+    def closed_loop(self, omega: Array, amplitude: float = 0.0) -> Complex:
+        """Return the fundamental of the output angle over a wanted angle's, shape of `omega`."""
+        omega = np.asarray(omega, dtype=np.float64)
+        z = np.exp(1j * omega * self.period)
+        added = self.gain * z / (z - 1.0) / (1.0 + self.open_loop(omega))  # command over wanted angle
+        return np.asarray(added * self.inner.closed_loop(omega), np.complex128)
+
+    def monodromy(self, gain: float = 1.0) -> Array:
+        """Return the transition of the closed loop over a frame, its gain `gain` times its own."""
+        transition, told = self._steps
+        return transition - gain * self.gain * np.outer(told, np.append(self.inner.plant.angle, 0.0))
+
+
+def stepped(model: PulseServo | PulseServoInductive, load: Load, gain: float, *, start: float, step: float,
+            frames: int) -> Array:
+    """Return the output angle at the edges of a simulated step of the wanted angle, all terms counted.
+
+    Parameters
+    ----------
+    model : PulseServo or PulseServoInductive
+    load : Load
+    gain : float
+        g [1]
+    start, step : float
+        Where the servo rests, and by how much the wanted angle steps [rad].
+    frames : int
+    """
+    simulator, T_f = Simulator(model, load=load), model.frame_period
+    asked, wanted = start, start + step
+    state = simulator.initial(signals.constant(asked, unit="rad"))
+    angles = [state["output_angle"]]
+    low, high = (model.value_or(f"stops.{side}_angle", side_at) for side, side_at in (
+        ("lower", -np.inf), ("upper", np.inf)))
+    for k in range(frames):
+        asked = min(max(asked + gain * (wanted - state["output_angle"]), low), high)
+        state = simulator.advance(state, (k + 1) * T_f, signals.constant(asked, unit="rad"))
+        angles.append(state["output_angle"])
+    return np.array(angles)
+
+
+# --- Which gain gives a wanted margin or overshoot under a load, and what stiffness that buys -------------------------
+
 
 _STEP = math.radians(10.0)
 _DURATION = 2.0  # s, in which a step comes to rest

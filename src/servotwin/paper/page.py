@@ -3,20 +3,346 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from servotwin import __version__
-from servotwin.look import document, escape, fixed, number, picture, plain
-from servotwin.paper import linear, robots_page, tables, vibration_page
-from servotwin.paper.findings import corrections, disagreements
-from servotwin.paper.study import LABELS, LOAD_INERTIA, SERVO, BenchStudy, PaperStudy
+import numpy as np
+
+from servotwin import __version__, plotting
+from servotwin.errors import MissingExtraError
+from servotwin.look import document, escape, fixed, number, picture, plain, table
+from servotwin.models import PulseServo
+from servotwin.paper import linear, tables
+from servotwin.paper.figures import Drawing, Picture
+from servotwin.paper.study import (
+    CIRCUITS,
+    LABELS,
+    LOAD_INERTIA,
+    LOOKED_AT,
+    SERVO,
+    SHOWN_ROW,
+    SOFT,
+    BenchStudy,
+    PaperStudy,
+)
+from servotwin.paper.tables import corrections, disagreements
+from servotwin.parameters import load_servo
+from servotwin.plotting import Curve, Limit
 
 if TYPE_CHECKING:
-    from servotwin.paper.figures import Drawing
-    from servotwin.paper.robots_page import RobotsPart
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
 
+    from servotwin.paper.study import Stand
+    from servotwin.parameters import Servo
+    from servotwin.robots import TaskRun, WaypointRun
+    Array = NDArray[np.float64]
     Images = Mapping[str, Drawing]
+
+
+
+# --- The robots of Figures 28 to 30, each at one short task: pictures, tables and words for the report ----------------
+
+FIGURES = "<!-- figures -->"
+_SIZE, _SPEED = 0.04, 0.12  # m and m/s: a small circle, so that it is short
+_ROUTE = ((0.0, 0.0), (0.35, 0.0), (0.35, 0.35))  # m
+_COUNTS = 512  # of an encoder on a wheel
+_ARMS = {"figure-28": "Figure 28: redundant SCARA robot", "figure-29": "Figure 29: SCARA robot"}
+_CONTROLLERS = {"plain": "plain commands", "feedforward": "(40) as feedforward"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Robots:
+    """What the three robots did.
+
+    Parameters
+    ----------
+    arms : mapping of str to mapping of str to TaskRun
+        By the name of the figure and that of the controller.
+    torques : mapping of str to float
+        Largest torque that the circle takes of a vertical joint of the redundant arm, by criterion [N m].
+    drives : mapping of str to WaypointRun
+        Of the mobile robot: on equal servos, and on unequal ones with and without encoders.
+    """
+
+    arms: Mapping[str, Mapping[str, TaskRun]]
+    torques: Mapping[str, float]
+    drives: Mapping[str, WaypointRun]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotsPart:
+    """What the report has of the robots: pictures, tables and words, headline numbers, and why they are left out."""
+
+    drawings: tuple[Drawing, ...]
+    words: str  # HTML; FIGURES where the pictures belong
+    headline: Mapping[str, float]
+    left_out: str
+
+
+def robots_part(formats: Sequence[str]) -> RobotsPart:
+    """Let the robots do their tasks, and draw what they did."""
+    robots = run_robots(load_servo(SERVO))
+    return RobotsPart(drawings=tuple(picture.drawn(formats) for picture in robot_pictures(robots)),
+                      words=robot_section(robots), headline=headline(robots),
+                      left_out=robots if isinstance(robots, str) else "")
+
+
+def run_robots(servo: Servo) -> Robots | str:
+    """Let the three robots do their tasks; where an extra is missing, return what to say."""
+    try:
+        return _done(servo)
+    except MissingExtraError as error:
+        return str(error)
+
+
+def _done(servo: Servo) -> Robots:
+    from servotwin.robots import (
+        LeastMotion,
+        LeastTorque,
+        follow,
+        ideal_task,
+        run_task,
+        run_waypoints,
+        scara,
+        task_path,
+        unequal_servos,
+    )
+    from servotwin.robots.controllers import STEERINGS
+
+    model, arms = PulseServo(servo), {}
+    for name, third_link in (("figure-28", True), ("figure-29", False)):
+        arm = scara(third_link=third_link)
+        joints = follow(arm, task_path(arm, "circle", size=_SIZE, speed=_SPEED))
+        arms[name] = {controller: run_task(arm, model, joints.path, steering=STEERINGS[controller](),
+                                           joint_path=joints) for controller in _CONTROLLERS}
+    arm = arms["figure-28"]["plain"].arm
+    path, torques = task_path(arm, "circle", size=_SIZE, speed=_SPEED), {}
+    for criterion in (LeastMotion(), LeastTorque()):
+        taken = ideal_task(criterion.solve(arm, path)).torque
+        torques[criterion.name] = float(max(np.abs(taken[joint]).max() for joint in ("shoulder", "elbow", "third")))
+    worn = unequal_servos()
+    drives = {"equal servos, odometry of pulses": run_waypoints(waypoints=_ROUTE),
+              "unequal servos, odometry of pulses": run_waypoints(worn, _ROUTE),
+              "unequal servos, encoders": run_waypoints(worn, _ROUTE, encoders=_COUNTS)}
+    return Robots(arms=arms, torques=torques, drives=drives)
+
+
+def robot_pictures(robots: Robots | str) -> tuple[Picture, ...]:
+    """Return the pictures of the robots' ways; none where an extra is missing."""
+    if isinstance(robots, str):
+        return ()
+    drives = [plotting.PathTrace(words, run.path, run.believed) for words, run in robots.drives.items()]
+    columns = {f"{name}_{axis}_m": side[:, k].tolist()
+               for words, run in zip(("equal", "unequal", "encoders"), robots.drives.values(), strict=True)
+               for name, side in ((words, run.path), (f"{words}_believed", run.believed))
+               for k, axis in enumerate("xy")}
+    longest = max(len(column) for column in columns.values())
+    padded = {name: column + [math.nan] * (longest - len(column)) for name, column in columns.items()}
+    return (*(_arm(name, title, robots.arms[name]) for name, title in _ARMS.items()),
+            Picture(name="figure-30", title="Figure 30: mobile robot", columns=padded,
+                    caption="The paper's Figure 30 is a photograph of its mobile robot. Here one drives along three "
+                    "points on two HS-755HB that turn endlessly.", figure=plotting.robot_paths(drives, _ROUTE)))
+
+
+def _arm(name: str, title: str, runs: Mapping[str, TaskRun]) -> Picture:
+    traces: list[plotting.ToolTrace] = []
+    columns: dict[str, list[float]] = {}
+    for controller, run in runs.items():
+        time, places = run.run.time[run.moving], run.tool[run.moving]
+        traces.append(plotting.ToolTrace(_CONTROLLERS[controller], time, places, run.contour.error))
+        columns |= {f"{controller}_{axis}_m": places[:, k].tolist() for k, axis in enumerate("xyz")}
+        columns |= {f"{controller}_distance_m": run.contour.error.tolist()}
+    first = next(iter(runs.values()))
+    columns = {"time_s": first.run.time[first.moving].tolist()} | columns
+    links = "three" if name == "figure-28" else "two"
+    return Picture(name=name, title=title, columns=columns, figure=plotting.tool_paths(first.path.path.line, traces),
+                   caption=f"The paper's {title.partition(':')[0]} is a photograph. Here a SCARA robot of {links} "
+                   f"links draws a circle of {number(1e3 * _SIZE)} mm with an HS-755HB at each joint: the tool's path, "
+                   "and its distance from the circle.")
+
+
+def robot_section(robots: Robots | str) -> str:
+    """Return the words and tables, and FIGURES where the pictures belong."""
+    if isinstance(robots, str):
+        return f'<div class="note"><p>The robots are left out. {robots}</p></div>\n'
+    least, most = robots.torques["torque"], robots.torques["none"]
+    return f"""<p>The model is to serve “the development of control techniques for SCARA type robots with and without
+link redundancy, … mobile robots, etc.” (§VII). The paper shows three of them and no dimensions: those here are assumed,
+made for the servo <code>hitec-hs-755hb</code> and simulated with its pulses at every joint.</p>
+<div class="figures">{FIGURES}</div>
+{_arms(robots)}
+<p>With the third link the arm may choose its posture. The one in which the circle takes the least torque needs
+{number(least, 2)} N m at most of its vertical axes; without a criterion it is {number(most, 2)} N m.</p>
+{_drives(robots)}
+<p>The wheels of a mobile robot turn without end: the potentiometer stands still, the pulse sets a speed, and a neutral
+that is off is a speed that is off. Odometry from the pulses sent does not see that; encoders do.</p>
+"""
+
+
+def _arms(robots: Robots) -> str:
+    rows = [[title.partition(": ")[2], _CONTROLLERS[controller], fixed(1e3 * run.metrics.contour_rms, 2),
+             fixed(1e3 * run.metrics.contour_largest, 2), fixed(1e3 * run.metrics.tool_rms, 1),
+             fixed(run.metrics.energy, 1)]
+            for name, title in _ARMS.items() for controller, run in robots.arms[name].items()]
+    return table(("robot", "controller", "distance from the circle, rms (mm)", "largest (mm)",
+                  "behind its time, rms (mm)", "energy (J)"), rows, text_columns=2,
+                 caption=f"A circle of {number(1e3 * _SIZE)} mm at {number(_SPEED)} m/s, pulse servos")
+
+
+def _drives(robots: Robots) -> str:
+    rows = [[words, fixed(1e3 * run.missed, 0), fixed(1e3 * float(run.off_belief[-1]), 0)]
+            for words, run in robots.drives.items()]
+    return table(("mobile robot", "misses the last point by (mm)", "believes to be elsewhere by (mm)"), rows,
+                 caption="Three points, 0.7 m")
+
+
+def headline(robots: Robots | str) -> dict[str, float]:
+    """Return the numbers that count."""
+    if isinstance(robots, str):
+        return {}
+    found = {f"{name.replace('-', '_')}_{controller}_contour_rms_mm": 1e3 * run.metrics.contour_rms
+             for name, runs in robots.arms.items() for controller, run in runs.items()}
+    return found | {"figure_30_unequal_missed_mm": 1e3 * robots.drives["unequal servos, odometry of pulses"].missed}
+
+
+# --- Pictures, table and words of the vibration for the report --------------------------------------------------------
+
+_OVERVIEW = 2.5  # s
+_CLOSE = (2.0, 2.3)  # s: some swings
+_WORDS = {"common": "one soft supply", "separate": "separate supplies"}
+
+
+def vibration_pictures(study: PaperStudy) -> tuple[Picture, ...]:
+    """Return the two pictures of the vibration."""
+    return _overview(study), _frames(study)
+
+
+def _overview(study: PaperStudy) -> Picture:
+    """Draw the angle over time, and below it the supply as the program saw it when it looked."""
+    time = np.arange(0.0, _OVERVIEW, 2e-3)
+    drawn, seen, columns = [], [], {"time_s": time.tolist()}
+    for name, words in _WORDS.items():
+        one = study.vibration.circuits[name]
+        angle = np.degrees(one.run.result.at("output_angle", time))
+        looks, volts = _seen(study, one)
+        columns |= {f"{name}_output_angle_deg": angle.tolist(), f"{name}_sampled_at_s": looks.tolist(),
+                    f"{name}_control_supply_V": volts.tolist()}
+        drawn.append(Curve(words, time, angle))
+        seen.append(Curve("", np.repeat(looks, 2)[1:], np.repeat(volts, 2)[:-1]))
+    figure = plotting.curves(drawn, x_label="time (s)", y_label="output angle $q$ (°)", below=seen,
+                             below_label="supply seen\nby the program (V)", height=4.4,
+                             limits=[Limit("asked for", math.degrees(study.vibration.target))])
+    _scale_supply(figure.axes[1], study)
+    figure.axes[0].legend(loc="lower right", handlelength=3.2)
+    caption = (f"A step from {_angle(study, 0)}° to {_angle(study, SHOWN_ROW)}° on a supply of "
+               f"{number(SOFT)} Ω. Below: what the supply of the control circuit is at the instants at which its "
+               "program reads the command. With a supply of its own it is always the same.")
+    return Picture(name="figure-vibration", title="Not in the paper: the vibration, and its cure", caption=caption,
+                   figure=figure, columns=columns)
+
+
+def _frames(study: PaperStudy) -> Picture:
+    """Draw some swings: what each pulse asks for, the angle, the supply, and where it is looked at."""
+    one = study.vibration.circuits["common"]
+    time = np.linspace(*_CLOSE, 3001)
+    angle, asked = (np.degrees(one.run.result.at(name, time)) for name in ("output_angle", "command_angle"))
+    bus = one.run.result.at("bus_voltage", time)
+    looks, volts = _seen(study, one)
+    inside = (looks > _CLOSE[0]) & (looks < _CLOSE[1])
+    looks, volts = looks[inside], volts[inside]
+    figure = plotting.curves(
+        [Curve("asked for by the pulse", time, asked, style=1), Curve("output angle", time, angle, style=0)],
+        x_label="time (s)", y_label="angle (°)", height=4.4,
+        below=[Curve("", time, bus, style=0), Curve("", looks, volts, points=True, style=1)],
+        below_label="supply (V)")
+    _scale_supply(figure.axes[1], study)
+    figure.axes[0].margins(y=0.25)  # room for the legend
+    figure.axes[0].legend(loc="upper center", ncols=2, handlelength=3.2)
+    caption = ("Some frames of the same run on one soft supply. Below: the supply, and where the program looks at the "
+               "command (marks). Behind a look into a sag the next pulse asks for less, behind a look at a supply that "
+               "has recovered it asks for the full angle, and the shaft jumps.")
+    return Picture(name="figure-vibration-frames", title="Not in the paper: how the vibration lives", caption=caption,
+                   figure=figure, columns={
+                       "time_s": time.tolist(), "output_angle_deg": angle.tolist(), "command_angle_deg": asked.tolist(),
+                       "supply_V": bus.tolist(), "sampled_at_s": looks.tolist(), "sampled_supply_V": volts.tolist()})
+
+
+def _seen(study: PaperStudy, one: Stand) -> tuple[Array, Array]:
+    """Return when the program looked [s], and what the supply of the control circuit was [V]."""
+    looks = one.control.sampling_times(one.run.pulses)
+    looks = looks[looks < _OVERVIEW]
+    sag = study.supply - one.run.result.at("bus_voltage", looks)
+    return looks, study.supply - one.control.command_share * sag
+
+
+def _scale_supply(ax: Axes, study: PaperStudy) -> None:
+    """Show the voltages at which a supply sags, and not zero."""
+    lowest = study.vibration.circuits["common"].still.lowest_bus
+    ax.set_ylim(lowest - 0.15, study.supply + 0.15)
+
+
+def _angle(study: PaperStudy, row: int) -> str:
+    return fixed(float(study.table["q_deg"][row]), 0)
+
+
+def vibration_section(study: PaperStudy, figures: Callable[[Sequence[str]], str]) -> str:
+    """Return the words, tables and pictures; `figures` makes HTML of names."""
+    common, apart = (study.vibration.circuits[name] for name in ("common", "separate"))
+    delay = number(1e3 * common.control.sampling_delay)
+    return f"""<p>“In the context of implementation initially developed, the servomotor presented vibrations and little
+jumps when positioning in a specific angle.” The authors cured it with a source for the servo that is independent of
+that of the control circuit, with delays between the samples of the command, and with a stable reference for the
+converter. The paper's equations cannot show it. The pulse servo can, on a bench on which all hangs on one supply:
+the voltage that commands it, v<sub>i</sub>, falls in proportion with the supply (a potentiometer across it), and the
+program reads it {delay} ms after the end of each pulse and makes the next pulse of what it read.</p>
+<p><strong>With one supply of {number(SOFT)} Ω the shaft never comes to rest: {_swing(common)} from end to end,
+{fixed(common.still.frequency, 0)} times a second, with {fixed(common.still.current, 2)} A (rms) in the motor. With a
+supply of its own for the control circuit, and nothing else changed, it stands: in
+{fixed(common.run.result.ended - LOOKED_AT, 1)} s it moves by {_swing(apart)}, all of it creep towards the edge of the
+deadband.</strong></p>
+<div class="figures">{figures(("figure-vibration", "figure-vibration-frames"))}</div>
+{_circuits(study)}
+<p>The servo starts to move where the pulse ends, so a program that looks just then looks into the sag of that very
+move. It reads less, the next pulse is shorter, and the shaft turns back; that drive makes the supply sag, too, and the
+command stays too low. So the shaft goes where the sagging supply sends it. There the drives become shorter than
+{delay} ms, the program sees a supply that has recovered, sends a pulse for the full angle, and the shaft jumps. Hence a
+late sample is a cure as well, and so is a reference that sags along with the command. A reference that sags alone is no
+better than a command that does.</p>
+{_angles(study)}
+<p>At some angles the shaft vibrates, at others it creeps and jumps now and then. The paper does not mention that the
+mean angle is then wrong by many degrees; it has to be if the command sags in proportion, and somebody who turns a knob
+until the dial is right would not notice. A regulator or a capacitor before the potentiometer makes all of it smaller.
+The {number(SOFT)} Ω, the proportion and the instant of the sample are assumed: the paper gives none of them. So this
+shows that the paper's explanation works, and not that its bench was this one.</p>
+"""
+
+
+def _circuits(study: PaperStudy) -> str:
+    rows = [[words, fixed(math.degrees(one.off), 1), fixed(math.degrees(one.still.swing), 2),
+             fixed(one.still.frequency, 1), fixed(one.still.current, 2), fixed(one.still.lowest_bus, 2)]
+            for name, (words, _, _) in CIRCUITS.items() for one in (study.vibration.circuits[name],)]
+    return table(("circuit", "mean less target (°)", "swing, end to end (°)", "swings (1/s)", "current (A rms)",
+                  "lowest supply of the servo (V)"), rows,
+                 caption=f"At {_angle(study, SHOWN_ROW)}°, from {number(LOOKED_AT)} s on")
+
+
+def _angles(study: PaperStudy) -> str:
+    pairs = zip(study.vibration.common, study.vibration.separate, strict=True)
+    rows = [[f"{_angle(study, k)}°", fixed(math.degrees(one.off), 1), fixed(math.degrees(one.still.swing), 2),
+             fixed(one.still.frequency, 1), fixed(math.degrees(two.off), 1), fixed(math.degrees(two.still.swing), 2),
+             fixed(two.still.frequency, 1)] for k, (one, two) in enumerate(pairs)]
+    return table(("row of Table II", "one supply: mean less target (°)", "swing (°)", "swings (1/s)",
+                  "separate: mean less target (°)", "swing (°)", "swings (1/s)"), rows,
+                 caption=f"At every angle of Table II, reached from {_angle(study, 0)}° (0° from {_angle(study, 1)}°)")
+
+
+def _swing(one: Stand) -> str:
+    return f"{fixed(math.degrees(one.still.swing), 2)}°"
+
+
+# --- The report as one HTML page that needs nothing but itself --------------------------------------------------------
 
 _SECTIONS = (
     ("summary", "Summary"), ("values", "What the paper does not give"), ("step", "The step from 0 to 180°"),
@@ -35,8 +361,8 @@ def page(study: PaperStudy, robots: RobotsPart, drawings: Sequence[Drawing]) -> 
     parts = {
         "summary": _summary(study), "values": _values(study), "step": _step(study, images),
         "bench": _bench(study, images), "measured": _measured(study, images),
-        "fits": _fits(study), "vibration": vibration_page.section(study, lambda names: _figures(names, images)),
-        "robots": robots.words.replace(robots_page.FIGURES,
+        "fits": _fits(study), "vibration": vibration_section(study, lambda names: _figures(names, images)),
+        "robots": robots.words.replace(FIGURES,
                                        _figures([drawn.name for drawn in robots.drawings], images)),
         "models": _models(study, images),
         "corrections": tables.findings_table(corrections(study), "What the equations need"),

@@ -23,10 +23,10 @@ from servotwin.parameters.output_file import undone
 from servotwin.tables import csv_text
 
 if TYPE_CHECKING:
-    from servotwin.paper.robots_page import RobotsPart
+    from servotwin.paper.page import RobotsPart
 
 _PAGE = "report.html"
-_ROBOTS = ("import pickle, sys; from servotwin.paper.robots_page import robots_part; "
+_ROBOTS = ("import pickle, sys; from servotwin.paper.page import robots_part; "
            "pickle.dump(robots_part(sys.argv[1:]), sys.stdout.buffer)")
 _TABLES = ("table-2.csv", "fits.csv", "parameters.csv")
 
@@ -143,13 +143,13 @@ def _remove_empty(folders: Sequence[Path]) -> None:
 def _write_all(folder: Path, formats: Sequence[str],
                tell: Callable[[str, float], None]) -> tuple[dict[str, float], str]:
     """Write everything; return headline numbers, and what is left out."""
-    from servotwin.paper import figures, vibration_page
-    from servotwin.paper.page import page
+    from servotwin.paper import figures
+    from servotwin.paper.page import page, vibration_pictures
 
     with _robots_aside(formats) as robots_part:
         study = run_study(tell)
         pictures = (*figures.pictures(study, lambda done: tell("drawing", 0.35 + 0.2 * done)),
-                    *vibration_page.pictures(study))
+                    *vibration_pictures(study))
         drawings = []
         for k, picture in enumerate(pictures):
             tell(f"writing {picture.name}", 0.55 + 0.3 * k / len(pictures))
@@ -195,7 +195,7 @@ def _robots_of(process: subprocess.Popen[bytes] | None, formats: Sequence[str]) 
         if process.returncode == 0:
             part: RobotsPart = pickle.loads(content)
             return part
-    from servotwin.paper.robots_page import robots_part
+    from servotwin.paper.page import robots_part
 
     return robots_part(formats)
 

@@ -6,37 +6,41 @@ even as possible: `page=2` draws the second, and `pages` says which there are.
 """
 
 from servotwin.look import COLOURS, CURVES_A_PAGE, LINES, axes_grid, finished, pages, readable, to_bytes
-from servotwin.plotting.block_diagrams import PAPER_DIAGRAMS, block_diagram
-from servotwin.plotting.bode import Response, bode, root_locus
-from servotwin.plotting.characteristics import (
+from servotwin.plotting.block_diagrams import PAPER_DIAGRAMS, Diagram, Formula, block_diagram, formula_svg
+from servotwin.plotting.bode import LOOPS_A_PAGE, Response, bode, loop_curve, root_locus
+from servotwin.plotting.files import save
+from servotwin.plotting.panels import (
+    Curve,
+    JointUse,
+    Limit,
+    ToolTrace,
     bandwidth_curves,
     compared_curves,
+    curves,
     holding_curves,
+    joint_use,
     lift_curve,
+    pulses,
+    ranking,
     speed_curves,
+    tool_paths,
 )
-from servotwin.plotting.diagram import Diagram
-from servotwin.plotting.files import save
-from servotwin.plotting.formula import Formula, formula_svg
-from servotwin.plotting.loops import LOOPS_A_PAGE, loop_curve
-from servotwin.plotting.measured import log_over_time
-from servotwin.plotting.panels import Curve, Limit, curves, pulses
-from servotwin.plotting.paths import PATHS_A_PAGE, PathTrace, robot_paths
-from servotwin.plotting.ranking import ranking
-from servotwin.plotting.replays import ReplayTrace, replay_windows
-from servotwin.plotting.responses import SHOWN, Shown, shown, time_response
+from servotwin.plotting.responses import SHOWN, Shown, log_over_time, metric_shown, shown, time_response, tornado
 from servotwin.plotting.robots import (
     JOINTS_A_PAGE,
+    PATHS_A_PAGE,
     Cloud,
     JointTrace,
+    PathTrace,
+    ReplayTrace,
     ServoTrace,
     ShaftTrace,
     joint_tracking,
+    replay_windows,
+    robot_paths,
     servo_electrics,
     shaft_torques,
 )
-from servotwin.plotting.tool_paths import JointUse, ToolTrace, joint_use, tool_paths
-from servotwin.plotting.tornado import metric_shown, tornado
 
 __all__ = [
     "COLOURS",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -9,13 +10,140 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from servotwin.errors import InputError
-from servotwin.look import COLOURS, LINES, axes_grid, context, finished, plain_decades
+from servotwin.look import COLOURS, LINES, axes_grid, context, finished, new_figure, on_page, plain_decades
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from servotwin.datasheet import Loop
     from servotwin.linear import SampledServo
+
+
+
+# --- The torque of a digital servo over the error that stands ---------------------------------------------------------
+
+LOOPS_A_PAGE = len(LINES) - 2
+"""How many loops a picture shows at once: of the first one three curves, of the others one each, none alike."""
+_BEYOND = 1.2  # times the error of the cap
+_POINTS = 1201
+_MOST = 1e3  # N m: what friction holds beyond is not drawn
+
+
+def loop_curve(loops: Sequence[Loop], *, width: float = 8.4, height: float = 3.9, page: int = 1) -> Figure:
+    """Return the torque of one servo over its error, both ways: the whole, and large around no error.
+
+    Between what it lifts and what it holds friction keeps the shaft wherever it is.
+
+    Parameters
+    ----------
+    loops : sequence of Loop
+        Of one servo, at one voltage or several: the first one of a page is drawn in full, of the others what the motor
+        gives.
+    width, height : float
+        [inch]
+    page : int
+        One of ``pages(len(loops), LOOPS_A_PAGE)``.
+
+    Raises
+    ------
+    InputError
+        If there are no loops, or no such page.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> sheet = st.curves(st.DigitalServo(st.load_servo("feetech-sts3215-12v")), bandwidth=False)
+    >>> len(loop_curve([sheet.voltages[0].loop]).axes)
+    2
+    """
+    loops, which = on_page("loops", loops, LOOPS_A_PAGE, page)
+    first = loops[0]
+    far = _BEYOND * max(each.cap_error for each in loops if not math.isnan(each.cap_error))
+    near = min(far, 2.2 * (first.dead_zone + first.friction_error) + 3.0 * first.count)
+    with context():
+        figure = new_figure(width, height)
+        axes = list(figure.subplots(1, 2))
+        _torques(axes[0], loops, far)
+        _torques(axes[1], loops, near)
+        _cap(axes[0], first)
+        _middle(axes[1], first, near)
+        handles, labels = axes[0].get_legend_handles_labels()
+        columns = len(labels) if len(labels) < 6 else 3  # six are wider than the figure
+        figure.legend(handles, labels, loc="outside lower center", ncols=columns, handlelength=3.2)
+        axes[0].set_ylabel("torque (N m)")
+        title = first.model.servo.title or first.model.servo.name
+        figure.suptitle(f"{title}: {first.stiffness:.3g} N m/rad" + (f", {which}" if which else ""), fontsize=9)
+    return finished(figure)
+
+
+def _torques(ax: Axes, loops: Sequence[Loop], reach: float) -> None:
+    errors = np.linspace(-reach, reach, _POINTS)
+    over = loops[0].over(np.abs(errors))
+    motor = np.copysign(over[0], errors)
+    up, down = np.where(errors < 0.0, -over[2], over[1]), np.where(errors < 0.0, -over[1], over[2])
+    down, up = np.minimum(down, _MOST), np.maximum(up, -_MOST)
+    ax.fill_between(np.degrees(errors), up, down, color=COLOURS["grey"], alpha=0.18, linewidth=0.0,
+                    label="friction holds")
+    drawn = (motor, _volts("motor", loops[0])), (up, "load below: turns to +"), (down, "load above: turns to −")
+    for k, (values, label) in enumerate(drawn):
+        ax.plot(np.degrees(errors), values, color=LINES[k][0], linestyle=LINES[k][1],
+                linewidth=1.8 if k == 0 else 1.2, label=label)
+    for k, loop in enumerate(loops[1:], start=3):
+        values = np.copysign(loop.over(np.abs(errors))[0], errors)
+        ax.plot(np.degrees(errors), values, color=LINES[k][0], linestyle=LINES[k][1], label=_volts("motor", loop))
+    ax.axhline(0.0, color=COLOURS["grey"], linewidth=0.6)
+    ax.axvline(0.0, color=COLOURS["grey"], linewidth=0.6)
+    ax.set_xlabel("error, goal minus angle (°)")
+    ax.set_xlim(-math.degrees(reach), math.degrees(reach))
+    most = 1.25 * float(np.max(np.abs(motor))) + 1.5 * loops[0].friction_torque
+    ax.set_ylim(-most, most)
+
+
+def _volts(words: str, loop: Loop) -> str:
+    return f"{words}, {loop.model.value('supply.open_circuit_voltage'):g} V"
+
+
+def _cap(ax: Axes, loop: Loop) -> None:
+    """Tell the cap, and mark where the overload starts and what it leaves."""
+    said = [f"cap: {loop.cap_torque:.3g} N m from {math.degrees(loop.cap_error):.3g}° on"]
+    overload = next((each for each in loop.protections if each.kind == "overload"), None)
+    if overload is not None and not math.isnan(overload.error):
+        for sign in (-1.0, 1.0):
+            ax.plot([sign * math.degrees(overload.error)], [sign * overload.torque], marker="D", markersize=5.5,
+                    markerfacecolor="white", markeredgecolor=COLOURS["black"], linestyle="none", zorder=5)
+            ax.axhline(sign * overload.left_torque, color=COLOURS["black"], linewidth=0.9, linestyle=(0, (1, 1.6)))
+        said += [f"◇ overload: trips after {overload.time:g} s",
+                 f"⋯ left of it once tripped: {overload.left_torque:.3g} N m"]
+    _tell(ax, said)
+
+
+def _middle(ax: Axes, loop: Loop, reach: float) -> None:
+    """Tell dead zone and startup force, and mark them around no error."""
+    top = 1.9 * max(loop.friction_torque, loop.at(0.6 * reach).motor)
+    ax.set_ylim(-top, top)
+    said = []
+    if not math.isnan(loop.start_error):
+        start = math.degrees(loop.start_error)
+        ax.plot([start], [0.0], marker="o", markersize=4.5, markerfacecolor="white",
+                markeredgecolor=COLOURS["black"], zorder=5)
+        said += ["○ free shaft moves", f"from {start:.2g}° on"]  # beside the dead zone
+    if loop.minimum_duty > 0.0:
+        said.append(f"startup force: {loop.motor_torque(loop.minimum_duty):.2g} N m")
+    if loop.dead_zone > 0.0:
+        zone = math.degrees(loop.dead_zone)
+        ax.axvspan(-zone, zone, facecolor="none", edgecolor=COLOURS["black"], hatch="////", linewidth=0.6)
+        said.append(f"hatched: dead zone ±{zone:.2g}°")
+    _tell(ax, said)
+
+
+def _tell(ax: Axes, said: Sequence[str]) -> None:
+    """Write lines where no curve passes: at positive errors and negative torques."""
+    ax.annotate("\n".join(said), (0.985, 0.03), xycoords="axes fraction", ha="right", va="bottom", fontsize=7.5,
+                linespacing=1.5, bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5})
+
+
+# --- Gain and phase over frequency, and where the poles of a loop go as its gain grows --------------------------------
 
 _MARKERS = ("o", "s", "^", "D", "v")
 _FLOOR = 1e-3  # a smaller gain is not drawn

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from servotwin import units
 from servotwin.look import COLOURS, LINES, context, finished, new_figure, on_page
@@ -15,11 +16,93 @@ from servotwin.text import shortened
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike
 
     from servotwin.datasheet import SpeedCurve
 
-    Array = NDArray[np.float64]
+
+
+# --- Where a robot on wheels has driven, and where it believed that it did --------------------------------------------
+
+PATHS_A_PAGE = 4
+"""How many drives a picture shows at once; assumed: two rows of two panels."""
+_MAP_WIDTH, _LOWEST, _HIGHEST = 3.6, 2.2, 6.0  # of a panel [inch]
+
+
+class PathTrace(NamedTuple):
+    """A drive over the floor: places x, y [m] in the first two columns.
+
+    Parameters
+    ----------
+    label : str
+    path, believed : ndarray, shape (n, 2 or more)
+        Where the robot was, and where it believed to be.
+    """
+
+    label: str
+    path: Array
+    believed: Array
+
+
+def robot_paths(runs: Sequence[PathTrace], waypoints: ArrayLike, *, page: int = 1) -> Figure:
+    """Return where robots have driven between waypoints, and where they believed to be; a panel each, equally scaled.
+
+    All pages have the same axes.
+
+    Parameters
+    ----------
+    runs : sequence of PathTrace
+    waypoints : array_like, shape (m, 2)
+        [m]
+    page : int
+        One of ``pages(len(runs), PATHS_A_PAGE)``.
+
+    Raises
+    ------
+    InputError
+        If there are no runs, or no such page.
+
+    Examples
+    --------
+    >>> drive = np.array([[0.0, 0.0], [0.5, 0.02], [1.0, 0.1]])
+    >>> len(robot_paths([PathTrace("equal", drive, drive), PathTrace("unequal", drive, -drive)], drive).axes)
+    2
+    """
+    shown, foot = on_page("paths", runs, PATHS_A_PAGE, page)
+    points = np.asarray(waypoints, np.float64)
+    every = np.concatenate([points, *(side[:, :2] for run in runs for side in (run.path, run.believed))])
+    low, high = every.min(axis=0), every.max(axis=0)
+    margin = 0.06 * max(*(high - low), 0.1)
+    wide, tall = high - low + 2.0 * margin
+    panel = 1.6 * _MAP_WIDTH if len(shown) == 1 else _MAP_WIDTH
+    with context():
+        height = min(max(panel * tall / wide, _LOWEST), _HIGHEST)
+        rows = math.ceil(len(shown) / 2)
+        figure = new_figure(panel * min(len(shown), 2) + 0.6, 0.9 + height * rows)
+        grid = figure.subplots(rows, min(len(shown), 2), sharex=True, sharey=True, squeeze=False)
+        panels = grid.ravel().tolist()
+        for ax, run in zip(panels, shown, strict=False):
+            ax.plot(*points.T, color=COLOURS["grey"], linewidth=0.9, linestyle=(0, (2, 2)), marker="o", markersize=4.0,
+                    label="waypoints")
+            for side, line, word in zip((run.path, run.believed), LINES, ("driven", "believed"), strict=False):
+                colour, dash = line
+                ax.plot(side[:, 0], side[:, 1], color=colour, linestyle=dash, label=word)
+                ax.plot(*side[-1, :2], color=colour, marker="s", markersize=4.5)
+            ax.set_title(run.label)
+            ax.set_aspect("equal")
+            ax.set_xlim(low[0] - margin, high[0] + margin)
+            ax.set_ylim(low[1] - margin, high[1] + margin)
+        for ax in panels[len(shown):]:
+            ax.set_axis_off()
+        for ax in grid[-1]:
+            ax.set_xlabel("x (m)")
+        for row in grid:
+            row[0].set_ylabel("y (m)")
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=3, handlelength=3.2)
+    return finished(figure, foot)
+
+
+# --- What the servos of a robot have done -----------------------------------------------------------------------------
 
 JOINTS_A_PAGE = 12
 """How many joints or servos a picture of a robot shows at once; assumed: whole rows of two and of three panels."""
@@ -327,3 +410,69 @@ def _torques(ax: Axes, joint: ShaftTrace) -> None:
 
 def _degrees(speed: Array) -> Array:
     return np.asarray(units.from_si(speed, "deg/s", "speed"))
+
+
+# --- Pictures of robots whose recorded goals were replayed: measured beside simulated ---------------------------------
+
+Array = NDArray[np.float64]
+_REPLAY_WIDTH, _COLUMNS = 8.6, 2
+
+
+class ReplayTrace(NamedTuple):
+    """A stretch of an episode of one joint.
+
+    Parameters
+    ----------
+    title : str
+    time, goal, measured : ndarray, shape (n,)
+        [s], [rad]
+    simulated : mapping of str to ndarray
+        By what simulated it, the servos first [rad]
+    """
+
+    title: str
+    time: Array
+    goal: Array
+    measured: Array
+    simulated: Mapping[str, Array]
+
+
+def replay_windows(traces: Sequence[ReplayTrace], *, page: int = 1) -> Figure:
+    """Return goal, measured and simulated angle over time, a panel for each stretch.
+
+    Pages are those of `joint_tracking`.
+
+    Raises
+    ------
+    InputError
+        If there are no stretches, or no such page.
+
+    Examples
+    --------
+    >>> time = np.linspace(0.0, 1.0, 11)
+    >>> len(replay_windows([ReplayTrace("elbow", time, time, 0.9 * time, {"servos": 0.8 * time})]).axes)
+    1
+    """
+    traces, foot = on_page("stretches", traces, JOINTS_A_PAGE, page)
+    columns = min(len(traces), _COLUMNS)
+    rows = -(-len(traces) // columns)
+    with context():
+        figure = new_figure(_REPLAY_WIDTH if columns > 1 else 5.6, 0.6 + 2.3 * rows)
+        grid = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
+        for ax, one in zip(grid, traces, strict=False):
+            ax.plot(one.time, np.degrees(one.measured), color=COLOURS["black"], linewidth=2.6, alpha=0.45,
+                    label="measured")
+            ax.plot(one.time, np.degrees(one.goal), color=COLOURS["black"], linestyle=(0, (1, 1.6)), linewidth=1.1,
+                    label="goal", drawstyle="steps-post")
+            for k, (label, angle) in enumerate(one.simulated.items()):
+                colour, dash = LINES[(k + 1) % len(LINES)]
+                ax.plot(one.time, np.degrees(angle), color=COLOURS["blue"] if k == 0 else colour,
+                        linestyle="-" if k == 0 else dash, linewidth=1.6 if k == 0 else 1.0, label=label)
+            ax.set_title(one.title, fontweight="bold")
+            ax.set_ylabel("angle (°)")
+            ax.set_xlabel("time (s)")
+        for ax in grid[len(traces):]:
+            ax.set_axis_off()
+        handles, labels = grid[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", ncols=4, handlelength=2.8)
+    return finished(figure, foot)

@@ -24,7 +24,6 @@ from servotwin.control import (
     DisturbanceObserver,
     Encoder,
     Feedforward,
-    Measured,
     Pid,
     PlainCommand,
     PlayCompensation,
@@ -35,8 +34,8 @@ from servotwin.control import (
     joined,
     tuning,
 )
-from servotwin.control.sensors import Readings
-from servotwin.control.wires import wire_of
+from servotwin.control.controller import Measured, Readings
+from servotwin.control.ports import wire_of
 from servotwin.errors import InputError
 from servotwin.robots.arm import Arm
 from servotwin.robots.command_map import told

@@ -14,9 +14,8 @@ from servotwin.studies.distributions import (
     stated,
 )
 from servotwin.studies.metrics import METRICS
-from servotwin.studies.names import dimension_of
-from servotwin.studies.study import LaneFailure, Study
-from servotwin.studies.tornado import Bar, Tornado, variance_share
+from servotwin.studies.plan import dimension_of
+from servotwin.studies.study import Bar, LaneFailure, Study, Tornado, variance_share
 
 __all__ = ["METRICS", "Bar", "Choice", "Distribution", "LaneFailure", "LogNormal", "Normal", "Offset", "Relative",
            "Study", "Tornado", "Triangular", "Uniform", "dimension_of", "distributions", "stated",

@@ -1,5 +1,6 @@
 """Distributions that parameters are drawn from, and those that a servo file states."""
 
+from servotwin.studies.joint import stated
 from servotwin.studies.kinds import (
     Affine,
     Choice,
@@ -12,7 +13,6 @@ from servotwin.studies.kinds import (
     Truncated,
     Uniform,
 )
-from servotwin.studies.stated import stated
 
 __all__ = ["Affine", "Choice", "Distribution", "LogNormal", "Normal", "Offset", "Relative", "Triangular", "Truncated",
            "Uniform", "stated"]

@@ -7,36 +7,261 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.errors import InputError
+from servotwin import parameters
+from servotwin.errors import InputError, ParameterError, UnknownNameError
 from servotwin.loads import Load, as_load
-from servotwin.simulation.lanes.inputs import lanes_of
+from servotwin.parameters.group import AT_LEAST_ONE, FRACTION, NOT_NEGATIVE, POSITIVE
+from servotwin.simulation.lanes.inputs import _PARTS, LOAD_NAMES, check_name, lanes_of
 from servotwin.simulation.lanes.packing import Chunk, Commands, groups
 from servotwin.simulation.progress import memory_limit
-from servotwin.studies.draws import (
-    SAMPLINGS,
-    check_ranges,
-    checked_table,
-    distributions_of,
-    drawn,
-    noise_seeds,
-)
-from servotwin.studies.jobs import Job
-from servotwin.studies.kinds import ENDS, Distribution
-from servotwin.studies.metrics import checked_metrics, decision_times, output_times, step_time
-from servotwin.studies.names import parameter
-from servotwin.studies.stated import Together
-from servotwin.units import is_finite
+from servotwin.studies.joint import DIMENSIONS, TINY, Together
+from servotwin.studies.kinds import ENDS, Distribution, Truncated, distribution_of
+from servotwin.studies.metrics import Job, checked_metrics, decision_times, output_times, step_time
+from servotwin.units import is_finite, si_unit
 
 if TYPE_CHECKING:
     from servotwin.models import Model
     from servotwin.signals import Signal
 
+
+
+# --- What can be varied: of a dotted name, the dimension, the physical range and the nominal value --------------------
+
+_RANGES = {POSITIVE: (TINY, math.inf), NOT_NEGATIVE: (0.0, math.inf), AT_LEAST_ONE: (1.0, math.inf),
+           FRACTION: (0.0, 1.0)}
+_PLACES_OF_JOINTS = ("sheet.", "calibration.", "output_")
+_OF_LOAD = {
+    "load.inertia": "inertia", "load.viscous_friction": "torque per speed", "load.torque": "torque",
+    "load.coulomb_torque": "torque", "load.pendulum.mass": "mass", "load.pendulum.length": "length",
+    "load.pendulum.inertia": "inertia", "load.pendulum.hanging_angle": "angle",
+    "load.pendulum.gravity": "acceleration", "load.spring.stiffness": "torque per angle",
+    "load.spring.rest_angle": "angle", "load.flexible.stiffness": "torque per angle",
+    "load.flexible.inertia": "inertia", "load.flexible.damping": "torque per speed",
+    "load.flexible.viscous_friction": "torque per speed", "load.flexible.mass": "mass",
+    "load.flexible.length": "length", "load.flexible.hanging_angle": "angle", "load.flexible.gravity": "acceleration",
+}
+
+
+class Parameter(NamedTuple):
+    """A number or word of servo or load that may differ from lane to lane.
+
+    Parameters
+    ----------
+    name : str
+        Dotted.
+    dimension : str
+        Of `servotwin.units`; "word" for words.
+    lower, upper : float
+        Least and largest possible value (SI).
+    allowed : str
+        The range in words.
+    nominal : float, str or None
+        What the servo or the load says (SI); None where it says nothing.
+    """
+
+    name: str
+    dimension: str
+    lower: float
+    upper: float
+    allowed: str
+    nominal: float | str | None
+
+
+def dimension_of(name: str) -> str:
+    """Return the dimension (of `servotwin.units`) of a dotted name; "word" for words.
+
+    Examples
+    --------
+    >>> dimension_of("motor.armature_resistance"), dimension_of("load.pendulum.mass")
+    ('resistance', 'mass')
+    >>> dimension_of("sheet.stall_torque")
+    'torque'
+    """
+    if name in DIMENSIONS:
+        return DIMENSIONS[name]
+    if name in _OF_LOAD:
+        return _OF_LOAD[name]
+    return parameters.dimension_of(name)
+
+
+def parameter(name: str, model: Model, load: Load) -> Parameter:
+    """Return what is known of a dotted name, or of a number that others follow from.
+
+    Raises
+    ------
+    UnknownNameError, ParameterError, LoadError
+        If there is no such number, the model does not read it, or it is a table.
+    """
+    if name in LOAD_NAMES:
+        return _of_load(name, load)
+    if name not in (*model.requires, *model.optional):
+        together = Together(model)
+        if name.startswith(_PLACES_OF_JOINTS):
+            return _of_joint(name, together, model)
+        if name not in together.unread:
+            check_name(model, name)
+    group, _, key = name.partition(".")
+    metadata = parameters.GROUPS[group].__dataclass_fields__[key].metadata
+    rule, dimension, nominal = metadata["rule"], dimension_of(name), model.servo.get(name)
+    if rule == "table" or isinstance(nominal, tuple):
+        raise ParameterError(f"vary {name}", got="a table", allowed="a number or a word")
+    if isinstance(rule, tuple):
+        return Parameter(name, dimension, -math.inf, math.inf, " or ".join(rule), nominal)
+    lower, upper = _RANGES.get(rule, (-math.inf, math.inf))
+    return Parameter(name, dimension, lower, upper, f"{rule} [{si_unit(dimension)}]", nominal)
+
+
+def _of_joint(name: str, together: Together, model: Model) -> Parameter:
+    if name not in DIMENSIONS:
+        raise UnknownNameError("number to draw", name, DIMENSIONS)
+    if name not in together.coordinates:
+        raise ParameterError(f"vary {name}", got=f"a number from which nothing of {model.servo.name!r} follows",
+                             allowed=", ".join(together.coordinates) or "parameters of servo and load")
+    one = together.coordinates[name]
+    rule = POSITIVE if one.lower > 0.0 else NOT_NEGATIVE
+    allowed = f"{rule}{'' if math.isinf(one.upper) else f', at most {one.upper:g}'} [{si_unit(one.dimension)}]"
+    return Parameter(name, one.dimension, one.lower, one.upper, allowed, one.nominal)
+
+
+def _of_load(name: str, load: Load) -> Parameter:
+    _, *part, key = name.split(".")
+    owner: Any = getattr(load, part[0]) if part else load
+    kind = _PARTS[part[0]] if part else type(load)
+    lower = TINY if key in getattr(kind, "positive", ()) else 0.0 if key in kind.not_negative else -math.inf
+    allowed = "a finite positive number" if lower > 0.0 else "a finite number" + " of at least 0" * (lower == 0.0)
+    nominal = owner.moment_of_inertia if part and key == "inertia" else getattr(owner, key)
+    return Parameter(name, _OF_LOAD[name], lower, math.inf, f"{allowed} [{si_unit(_OF_LOAD[name])}]", nominal)
+
+
+# --- The parameters of all lanes: drawn from distributions, or taken from a table of draws ----------------------------
+
 Column = NDArray[Any]
+
+SAMPLINGS = ("latin-hypercube", "sobol", "random")
+_INSIDE = 2.0**-53  # a probability is never 0 or 1, where quantiles are infinite
+
+
+def distributions_of(vary: Mapping[str, Distribution | str], model: Model, load: Load, *,
+                     truncate: bool) -> dict[str, Distribution]:
+    """Return the distribution of each parameter, about its nominal value, sorted by name.
+
+    Raises
+    ------
+    InputError
+        Or one of its kinds, if a name or a distribution is not possible.
+    """
+    found = {}
+    for name in sorted(vary):
+        known = parameter(name, model, load)
+        try:
+            found[name] = _absolute(vary[name], known, truncate=truncate)
+        except InputError as error:
+            raise ParameterError(f"vary {name}: {error.what}", got=error.got, allowed=error.allowed) from None
+    return found
+
+
+def _absolute(given: Distribution | str, known: Parameter, *, truncate: bool) -> Distribution:
+    found = distribution_of(given, known.dimension) if isinstance(given, str) else given
+    if not isinstance(found, Distribution):
+        raise InputError("distribution", got=given, allowed='one of st.distributions, or words such as "normal:10%"')
+    if known.dimension == "word":
+        wrong = [option for option in found.ends if option not in known.allowed.split(" or ")]
+        if wrong:
+            raise InputError("choice", got=wrong[0], allowed=known.allowed)
+        return found
+    if any(isinstance(end, str) for end in found.ends):
+        raise InputError("choice", got=found.ends[0], allowed=known.allowed)
+    if found.needs_nominal:
+        if not isinstance(known.nominal, float):
+            raise InputError("a spread about the nominal value", got="no nominal value",
+                             allowed="an absolute distribution, such as normal:3ohm±0.3ohm")
+        found = found.about(known.nominal)
+    below = found.cdf(math.nextafter(known.lower, -math.inf)) if math.isfinite(known.lower) else 0.0
+    if truncate and (below > 0.0 or found.cdf(known.upper) < 1.0):
+        return Truncated(found, known.lower, known.upper)
+    return found
+
+
+def drawn(distributions: Mapping[str, Distribution], lanes: int, seed: int, sampling: str) -> dict[str, Column]:
+    """Return the values of all lanes by name, each of shape (lanes,).
+
+    Each name has random numbers of its own, found from the seed and the name; so what is drawn for one parameter does
+    not depend on the others, except with "sobol", whose points fill the space of all parameters together.
+    """
+    points = _probabilities(tuple(distributions), lanes, seed, sampling)
+    return {name: distribution.quantile(np.clip(points[name], _INSIDE, 1.0 - _INSIDE))
+            for name, distribution in distributions.items()}
+
+
+def noise_seeds(lanes: int, seed: int) -> NDArray[np.int64]:
+    """Return the seed of each lane's noise; lane k has the same whatever the number of lanes."""
+    return _stream(seed, "noise").integers(2**63, size=lanes, dtype=np.int64)
+
+
+def _probabilities(names: tuple[str, ...], lanes: int, seed: int, sampling: str) -> dict[str, NDArray[np.float64]]:
+    from scipy.stats import qmc
+
+    if not names:
+        return {}
+    if sampling == "sobol":
+        engine = qmc.Sobol(len(names), rng=_stream(seed, "sobol"))
+        points = engine.random_base2(math.ceil(math.log2(lanes)))[:lanes]
+        return {name: points[:, k] for k, name in enumerate(names)}
+    if sampling == "random":
+        return {name: _stream(seed, name).random(lanes) for name in names}
+    return {name: qmc.LatinHypercube(1, rng=_stream(seed, name)).random(lanes)[:, 0] for name in names}
+
+
+def _stream(seed: int, name: str) -> np.random.Generator:
+    """Return random numbers of their own for each seed and name; the first of them do not depend on how many follow."""
+    digest = hashlib.sha256(f"{seed} {name}".encode()).digest()
+    return np.random.Generator(np.random.Philox(np.random.SeedSequence(int.from_bytes(digest, "little"))))
+
+
+def checked_table(draws: Mapping[str, Any], model: Model, load: Load) -> dict[str, Column]:
+    """Return the columns of a table of draws, sorted by name.
+
+    Raises
+    ------
+    InputError
+        Or one of its kinds, if a name is not known, or the columns are no lists of numbers or words of one length.
+    """
+    if not isinstance(draws, Mapping):
+        raise InputError("draws", got=type(draws).__name__, allowed="a mapping of dotted names to lists of values")
+    found = {}
+    for name in sorted(draws):
+        known = parameter(name, model, load)
+        column = np.asarray(draws[name])
+        kinds = "U" if known.dimension == "word" else "iuf"
+        if column.ndim != 1 or column.size == 0 or column.dtype.kind not in kinds:
+            raise ParameterError(f"draws of {name}", got=draws[name], allowed=f"a list, each of it {known.allowed}")
+        found[name] = column if kinds == "U" else column.astype(np.float64)
+    lengths = {name: len(column) for name, column in found.items()}
+    if len(set(lengths.values())) > 1:
+        raise InputError("draws", got=", ".join(f"{name}: {n}" for name, n in lengths.items()),
+                         allowed="columns of one length")
+    return found
+
+
+def check_ranges(columns: Mapping[str, Column], model: Model, load: Load, *, advice: str) -> None:
+    """Raise ParameterError that names parameter and lane where a value leaves the physical range."""
+    for name, column in columns.items():
+        known = parameter(name, model, load)
+        if column.dtype.kind != "f":
+            continue
+        good = np.isfinite(column) & (column >= known.lower) & (column <= known.upper)
+        if not good.all():
+            lane = int(np.argmin(good))
+            raise ParameterError(f"{name} of lane {lane}", got=float(column[lane]), allowed=known.allowed + advice)
+
+
+# --- A study before it runs -------------------------------------------------------------------------------------------
+
 
 _USUAL_LANES = 1000
 _CHUNK_NUMBERS = 2**20  # of one signal in a chunk
@@ -262,4 +487,3 @@ def _digest(columns: Mapping[str, Column]) -> str:
         found.update(name.encode())
         found.update(np.ascontiguousarray(column).tobytes())
     return found.hexdigest()
-
