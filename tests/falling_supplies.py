@@ -1,7 +1,7 @@
 """Supplies that fall, and servos on them."""
 
 import servotwin as st
-from servotwin.datasheet.conditions import on_supply
+from servotwin.datasheet.holding import on_supply
 
 SG90, BIG, STS, XL = "towerpro-sg90", "hitec-hs-755hb", "feetech-sts3215-12v", "dynamixel-xl330-m288"
 SITUATIONS = [  # servo, supply, torque against the shaft [N m]

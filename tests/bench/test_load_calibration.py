@@ -10,9 +10,8 @@ import servotwin as st
 from reference import kitchen_tables
 from servotwin.bench import calibrate_loads, calibrate_table, load_table
 from servotwin.bench.load_names import name_of
-from servotwin.datasheet.conditions import changed
 from servotwin.datasheet.full_drive import FullDrive
-from servotwin.datasheet.holding import hold
+from servotwin.datasheet.holding import changed, hold
 from servotwin.errors import InputError
 
 MASSES, CURRENTS = [100, 200, 320, 400, 450], [230, 300, 370, 405, 450]

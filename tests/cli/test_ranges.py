@@ -5,7 +5,7 @@ import math
 import pytest
 
 import servotwin as st
-from servotwin.datasheet.guesses import guesses
+from servotwin.datasheet.holding import guesses
 
 pytestmark = pytest.mark.long
 

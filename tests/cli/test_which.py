@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import servotwin as st
-from servotwin.datasheet.conditions import on_supply
+from servotwin.datasheet.holding import on_supply
 from servotwin.models import mid_travel
 
 FOUR = ("gobilda-2000-135", "hitec-hs-422", "towerpro-sg90", "futaba-s3003")

@@ -5,7 +5,7 @@ import math
 import pytest
 
 import servotwin as st
-from servotwin.datasheet.beside import beside_flags, motion_of, printed_beside
+from servotwin.datasheet.sheet import beside_flags, motion_of, printed_beside
 from servotwin.identification import Sheet, SheetPoint, servo_from_sheet
 
 ONE = SheetPoint(supply_voltage=6.0, stall_torque=0.2354, no_load_speed=math.pi / 3 / 0.11, no_load_current=0.1,

@@ -5,8 +5,7 @@ import math
 import pytest
 
 import servotwin as st
-from servotwin.datasheet.guesses import guesses, spans, variants
-from servotwin.datasheet.holding import hold
+from servotwin.datasheet.holding import guesses, hold, spans, variants
 
 
 def ends(servo, name):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import servotwin as st
-from servotwin.datasheet.conditions import at_temperatures, at_voltage
+from servotwin.datasheet.holding import at_temperatures, at_voltage
 from servotwin.datasheet.sheet import bandwidths
 from servotwin.errors import InputError
 from servotwin.physics.thermal import Temperatures, winding_resistance

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import servotwin as st
-from servotwin.datasheet.conditions import on_supply
+from servotwin.datasheet.holding import on_supply
 from servotwin.diagnosis.api import BOARDS, MAY_RESET, RESETS, RUNS_ON, brown_out
 from servotwin.errors import InputError, UnknownNameError
 

@@ -7,7 +7,7 @@ import pytest
 
 import servotwin as st
 from servotwin.datasheet.full_drive import FullDrive
-from servotwin.datasheet.rotor import slow_rotor, time_constant_of
+from servotwin.datasheet.turning import slow_rotor, time_constant_of
 from servotwin.identification import Sheet, SheetPoint, servo_from_sheet, sheet_contradictions
 from servotwin.identification.sheets.motor_range import usual_torque
 from servotwin.identification.sheets.servo_of_sheet import time_constant

@@ -159,7 +159,7 @@ def test_what_was_least_is_remembered():
 
 def said(name, supply, load=0.0):
     servo = st.load_servo(name)
-    from servotwin.datasheet.conditions import on_supply
+    from servotwin.datasheet.holding import on_supply
 
     model = (st.DigitalServo if servo.kind == "bus" else st.PulseServo)(on_supply(servo, st.Supply.of(supply)))
     result = st.simulate(model, st.signals.step(-40.0, 40.0, at=0.04, unit="deg"), load=st.loads.Constant(load),

@@ -6,7 +6,7 @@ from wire_talk import Client, feetech, word
 
 pytest.importorskip("mujoco", reason="MuJoCo is not installed")
 from servotwin.wire.arms import Asked, arm_bus
-from servotwin.wire.body import LinkCrew
+from servotwin.wire.twins import LinkCrew
 
 
 @pytest.fixture

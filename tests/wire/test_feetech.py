@@ -3,8 +3,8 @@
 import pytest
 
 import servotwin as st
-from servotwin.wire import keeping
-from servotwin.wire.keeping import Keep, read_kept
+from servotwin.wire import service
+from servotwin.wire.service import Keep, read_kept
 from wire_talk import COUNT, STS, Client, feetech, word
 
 
@@ -168,7 +168,7 @@ def test_a_file_that_cannot_be_written_is_said_once_and_tried_again(client, bus,
     folder, said = tmp_path / "gone", []
     folder.mkdir()
     keep = Keep(folder / "kept.json", bus, said.append)
-    monkeypatch.setattr(keeping, "_AGAIN", 0.0)
+    monkeypatch.setattr(service, "_AGAIN", 0.0)
     client.write(1, 55, 0)
     folder.rmdir()
     for offset in (-100, -200):  # the bus answers all the while

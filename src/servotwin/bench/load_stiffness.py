@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from servotwin.bench.table_parameters import Estimate
-from servotwin.datasheet.conditions import changed
-from servotwin.datasheet.holding import hold
+from servotwin.datasheet.holding import changed, hold
 from servotwin.models import DigitalServo, PulseServo, default_model
 
 if TYPE_CHECKING:

@@ -607,7 +607,7 @@ def sheet_facts(sheet: Sheet, servo: Servo, *, steady: bool = False) -> dict[str
     from dataclasses import asdict
 
     from servotwin.cli.summary import headline, parameters
-    from servotwin.datasheet.beside import beside_flags, motion_of, printed_beside
+    from servotwin.datasheet.sheet import beside_flags, motion_of, printed_beside
     from servotwin.identification import motor_range, sheet_contradictions
     from servotwin.identification.sheets.motor_range import no_load_current_is_known, stall_current_is_known
 
@@ -729,7 +729,7 @@ def check(
 ) -> None:
     """Check a servo file."""
     from servotwin.cli.summary import readiness
-    from servotwin.datasheet.rotor import slow_rotor
+    from servotwin.datasheet.turning import slow_rotor
     from servotwin.parameters import load_servo
 
     with warnings.catch_warnings(record=True) as caught:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from servotwin import plotting, units
 from servotwin.cli.summary import buzz_facts, remedy_words, rest_words
 from servotwin.cli.terminal import with_span
-from servotwin.datasheet.guesses import Span
+from servotwin.datasheet.holding import Span
 from servotwin.look import document, escape, picture, table, to_bytes
 from servotwin.parameters import printed_points
 
@@ -353,9 +353,8 @@ def _while(seconds: float) -> str:
 
 def notes(sheet: DataSheet) -> list[str]:
     """Return what one has to know to read a sheet: flags of what the maker prints, and what the model is."""
-    from servotwin.datasheet.conditions import highest_voltage, is_below_sheet, lowest_voltage
-    from servotwin.datasheet.guesses import guesses
-    from servotwin.datasheet.rotor import slow_rotor
+    from servotwin.datasheet.holding import guesses, highest_voltage, is_below_sheet, lowest_voltage
+    from servotwin.datasheet.turning import slow_rotor
     from servotwin.models import BoundedServo, DigitalServo
     from servotwin.parameters import printed_flags
 

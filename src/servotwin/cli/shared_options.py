@@ -148,7 +148,7 @@ def servo_of(servo: str, change: Sequence[str], register: Sequence[str] = (), su
         plain = set_registers(register_family_of(plain), name, plain, assumed=True)
     known = found = with_registers(plain, register)
     if supply is not None:
-        from servotwin.datasheet.conditions import on_supply
+        from servotwin.datasheet.holding import on_supply
         from servotwin.parameters import Supply
 
         found = on_supply(found, Supply.of(supply, what="--supply"), source="set by --supply")
@@ -161,7 +161,7 @@ def servo_of(servo: str, change: Sequence[str], register: Sequence[str] = (), su
 
 def _check_sheet(servo: Servo, volts: float) -> None:
     """Warn of a supply far from the maker's sheet; of twice as much simulations themselves do."""
-    from servotwin.datasheet.conditions import highest_voltage, is_above_sheet, is_below_sheet, lowest_voltage
+    from servotwin.datasheet.holding import highest_voltage, is_above_sheet, is_below_sheet, lowest_voltage
 
     most = highest_voltage(servo)
     if is_below_sheet(servo, volts):

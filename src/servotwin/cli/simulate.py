@@ -164,7 +164,7 @@ def _ranges(result: Result, signal: Signal, found: dict[str, Any], load: list[st
     """Return the ranges of what rests on guesses, and these."""
     from servotwin.cli.option_values import load_from
     from servotwin.cli.summary import facts, figures
-    from servotwin.datasheet.guesses import guesses, spans, variants
+    from servotwin.datasheet.holding import guesses, spans, variants
     from servotwin.simulation import simulate as run
 
     others = []

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from servotwin import plotting, units
 from servotwin.cli.terminal import pairs, table, with_span
-from servotwin.datasheet.rotor import slow_rotor
+from servotwin.datasheet.turning import slow_rotor
 from servotwin.errors import InputError, MissingParameterError, ServotwinError
 from servotwin.loads import as_load
 from servotwin.models import MODELS, DigitalServo, default_model

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import typer
     from rich.console import Console, ConsoleOptions, RenderableType
 
-    from servotwin.datasheet.guesses import Span
+    from servotwin.datasheet.holding import Span
 
 
 
@@ -218,7 +218,7 @@ def with_span(value: float, span: Span | None, form: str, unit: str, *, scale: f
 
     Examples
     --------
-    >>> from servotwin.datasheet.guesses import Span
+    >>> from servotwin.datasheet.holding import Span
     >>> with_span(3.99, Span(0.04, 0.12), ".1f", "deg", scale=57.3), with_span(3.99, None, ".1f", "deg")
     ('4.0 deg (2.3 to 6.9)', '4.0 deg')
     >>> with_span(0.1, Span(0.1, math.inf), ".1f", "s", note="within 1 deg")

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from servotwin.datasheet.choice import AtRest, Candidate
-    from servotwin.datasheet.guesses import Span
-    from servotwin.datasheet.lift import Lift
+    from servotwin.datasheet.holding import Span
+    from servotwin.datasheet.warming import Lift
     from servotwin.physics._typing import Real
     from servotwin.robots.choice import Tried
 
@@ -244,7 +244,7 @@ def why(each: Candidate) -> str:
 
 def candidate_facts(each: Judged) -> dict[str, Any]:
     """Return a candidate in SI, ready for JSON."""
-    from servotwin.datasheet.conditions import highest_voltage, lowest_voltage
+    from servotwin.datasheet.holding import highest_voltage, lowest_voltage
     from servotwin.parameters import operating_voltages
 
     made, rest, tried = each.candidate, each.rest, each.tried

@@ -55,9 +55,8 @@ def wire(
     as_json: shared.JsonOption = False,
 ) -> None:
     """Serve the port until Ctrl-C."""
-    from servotwin.wire.arms import Asked, arm_bus
-    from servotwin.wire.faults import read_faults
-    from servotwin.wire.hands import hand_of
+    from servotwin.wire.arms import Asked, arm_bus, hand_of
+    from servotwin.wire.bus import read_faults
 
     _check(duration)
     asked = Asked(arm=arm, servos=_servos(servo or []), supply=supply, registers=tuple(register or ()), lock=lock,

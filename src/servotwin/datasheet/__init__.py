@@ -4,20 +4,34 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from servotwin.datasheet.beside import Figure, Motion, beside_flags, motion_of, printed_beside
-    from servotwin.datasheet.buzzing import Buzz, Remedy, buzz
-    from servotwin.datasheet.choice import Candidate, Limits, Reason, candidate, standing_of, travel_of
-    from servotwin.datasheet.curve import OperatingPoint, SpeedCurve
-    from servotwin.datasheet.full_drive import FullDrive, Swing
-    from servotwin.datasheet.guesses import Span
-    from servotwin.datasheet.holding import Held
-    from servotwin.datasheet.lift import Lift, lift_of
+    from servotwin.datasheet.choice import (
+        Candidate,
+        Lifter,
+        Lifters,
+        Limits,
+        Reason,
+        Refused,
+        candidate,
+        servos_that_lift,
+        standing_of,
+        travel_of,
+    )
+    from servotwin.datasheet.full_drive import FullDrive, OperatingPoint, SpeedCurve, Swing
+    from servotwin.datasheet.holding import Buzz, Held, Remedy, Span, buzz
     from servotwin.datasheet.loop import Loop, Protection, Standing
-    from servotwin.datasheet.rotor import slow_rotor, time_constant_of
-    from servotwin.datasheet.sheet import Bandwidth, DataSheet, VoltageSheet, curves
-    from servotwin.datasheet.turning import SpeedMap, wheel_speed_of
-    from servotwin.datasheet.warming import Masses, Warming, thermal_masses
-    from servotwin.datasheet.which import Lifter, Lifters, Refused, servos_that_lift
+    from servotwin.datasheet.sheet import (
+        Bandwidth,
+        DataSheet,
+        Figure,
+        Motion,
+        VoltageSheet,
+        beside_flags,
+        curves,
+        motion_of,
+        printed_beside,
+    )
+    from servotwin.datasheet.turning import SpeedMap, slow_rotor, time_constant_of, wheel_speed_of
+    from servotwin.datasheet.warming import Lift, Masses, Warming, lift_of, thermal_masses
 
 __all__ = [
     "Bandwidth", "Buzz", "Candidate", "DataSheet", "Figure", "FullDrive", "Held", "Lift", "Lifter", "Lifters", "Limits",
@@ -29,16 +43,15 @@ __all__ = [
 
 # public name -> file that defines it: `simulate` asks for ranges, and must not wait for what `curves` loads
 _FILES = {
-    **dict.fromkeys(("Figure", "Motion", "beside_flags", "motion_of", "printed_beside"), "beside"),
-    **dict.fromkeys(("Buzz", "Remedy", "buzz"), "buzzing"),
-    **dict.fromkeys(("Candidate", "Limits", "Reason", "candidate", "standing_of", "travel_of"), "choice"),
-    **dict.fromkeys(("OperatingPoint", "SpeedCurve"), "curve"), **dict.fromkeys(("FullDrive", "Swing"), "full_drive"),
-    **dict.fromkeys(("Lift", "lift_of"), "lift"), **dict.fromkeys(("Loop", "Protection", "Standing"), "loop"),
-    **dict.fromkeys(("slow_rotor", "time_constant_of"), "rotor"), "Held": "holding", "Span": "guesses",
-    **dict.fromkeys(("Bandwidth", "DataSheet", "VoltageSheet", "curves"), "sheet"),
-    **dict.fromkeys(("SpeedMap", "wheel_speed_of"), "turning"),
-    **dict.fromkeys(("Masses", "Warming", "thermal_masses"), "warming"),
-    **dict.fromkeys(("Lifter", "Lifters", "Refused", "servos_that_lift"), "which"),
+    **dict.fromkeys(("Candidate", "Lifter", "Lifters", "Limits", "Reason", "Refused", "candidate", "servos_that_lift",
+                     "standing_of", "travel_of"), "choice"),
+    **dict.fromkeys(("FullDrive", "OperatingPoint", "SpeedCurve", "Swing"), "full_drive"),
+    **dict.fromkeys(("Buzz", "Held", "Remedy", "Span", "buzz"), "holding"),
+    **dict.fromkeys(("Loop", "Protection", "Standing"), "loop"),
+    **dict.fromkeys(("Bandwidth", "DataSheet", "Figure", "Motion", "VoltageSheet", "beside_flags", "curves", "motion_of",
+                     "printed_beside"), "sheet"),
+    **dict.fromkeys(("SpeedMap", "slow_rotor", "time_constant_of", "wheel_speed_of"), "turning"),
+    **dict.fromkeys(("Lift", "Masses", "Warming", "lift_of", "thermal_masses"), "warming"),
 }
 
 

@@ -4,27 +4,31 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from servotwin.datasheet.buzzing import buzz
-from servotwin.datasheet.conditions import (
+from servotwin.datasheet.full_drive import FullDrive
+from servotwin.datasheet.holding import (
+    Span,
     at_voltage,
+    buzz,
     changed,
     highest_voltage,
     is_above_sheet,
     is_below_sheet,
     lowest_voltage,
+    smallest_move,
+    spans,
     supply_values,
+    variants,
 )
-from servotwin.datasheet.full_drive import FullDrive
-from servotwin.datasheet.guesses import Span, spans, variants
-from servotwin.datasheet.holding import smallest_move
-from servotwin.datasheet.lift import Lift, check_lift, swing_up
 from servotwin.datasheet.sheet import spanned_lift
+from servotwin.datasheet.warming import Lift, check_lift, swing_up
 from servotwin.errors import InputError
 from servotwin.models import DigitalServo, default_model
-from servotwin.parameters import printed_fact, printed_flags
+from servotwin.parameters import catalog_names, load_servo, printed_fact, printed_flags
+from servotwin.units import is_finite
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -33,6 +37,9 @@ if TYPE_CHECKING:
     from servotwin.parameters import Servo, Supply
     from servotwin.simulation import Rest
 
+
+
+# --- Which servo: what each of some does with a task and within limits, and every reason why one does not -------------
 
 class Reason(NamedTuple):
     """Why a servo does not suit: what it is about, such as "torque" or "mass", and one phrase."""
@@ -274,3 +281,102 @@ def standing_of(model: Model, lift: tuple[float, float] | None = None, *, ranges
         moves = spans({"": step}, ({"": smallest_move(other)} for other in others))
         return AtRest(smallest_move=step, move_span=moves.get(""), rest=buzz(model).rest,
                         lift=None if lift is None else spanned_lift(model, *lift, others))
+
+
+# --- Which servos lift a mass: those of the catalog that do, lightest first, and why the others do not ----------------
+
+@dataclass(frozen=True, kw_only=True)
+class Lifter:
+    """A servo that lifts the mass.
+
+    Parameters
+    ----------
+    servo : Servo
+    mass : float
+        Of the servo, as its sheet prints it; nan where it does not [kg].
+    most_torque : float
+        The most that it lifts [N m].
+    margin : float
+        That torque over the one that is asked for.
+    time : float
+        From 30° below the horizontal to 30° above, from rest [s].
+    notes : tuple of str
+        What to know of it before buying.
+    """
+
+    servo: Servo
+    mass: float
+    most_torque: float
+    margin: float
+    time: float
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Refused:
+    """A servo that does not lift the mass, or not in time; `kind` is "voltage", "torque" or "time"."""
+
+    servo: Servo
+    kind: str
+    reason: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lifters:
+    """Which servos lift a mass: those that do, lightest first and unknown masses last, and those that do not."""
+
+    torque: float
+    voltage: float
+    found: tuple[Lifter, ...]
+    refused: tuple[Refused, ...]
+
+
+def servos_that_lift(mass: float, arm: float, *, voltage: float, time: float | None = None,
+                     servos: Iterable[Servo] | None = None) -> Lifters:
+    """Return the servos that lift a mass on an arm at all angles, lightest first.
+
+    Parameters
+    ----------
+    mass, arm : float
+        Of the point mass [kg], and its distance from the shaft [m].
+    voltage : float
+        Of the supply [V].
+    time : float, optional
+        The longest that 60° may take, from 30° below the horizontal to 30° above, from rest [s].
+    servos : iterable of Servo, optional
+        Those of the catalog unless given.
+
+    Returns
+    -------
+    Lifters
+
+    Raises
+    ------
+    InputError
+        If a number is not positive.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> found = st.servos_that_lift(0.02, 0.05, voltage=5.0).found
+    >>> found[0].servo.name, round(found[0].margin)
+    ('hitec-hs-55', 11)
+    """
+    torque = check_lift(mass, arm)
+    for name, value, unit in (("voltage", voltage, "V"), ("time", time, "s")):
+        if value is not None and not (is_finite(value) and value > 0.0):
+            raise InputError(name, got=value, allowed=f"a positive number [{unit}]")
+    among = [load_servo(name) for name in catalog_names()] if servos is None else list(servos)
+    judged = [_lifted(servo, mass, arm, voltage, time) for servo in among]
+    found = [each for each in judged if isinstance(each, Lifter)]
+    order = sorted(found, key=lambda each: (math.isnan(each.mass), each.mass, -each.margin, each.servo.name))
+    return Lifters(torque=torque, voltage=voltage, found=tuple(order),
+                   refused=tuple(each for each in judged if isinstance(each, Refused)))
+
+
+def _lifted(servo: Servo, mass: float, arm: float, voltage: float, time: float | None) -> Lifter | Refused:
+    found = candidate(servo, voltage, lift=(mass, arm), limits=Limits(time=time))
+    if found.reasons:
+        return Refused(servo=servo, kind=found.reasons[0].kind, reason=found.reasons[0].text)
+    return Lifter(servo=servo, mass=found.mass, most_torque=found.most_torque, margin=found.margin, time=found.time,
+                  notes=found.notes)

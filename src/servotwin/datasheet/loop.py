@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from servotwin.datasheet.guesses import Span, spanned
+from servotwin.datasheet.holding import Span, spanned
 from servotwin.errors import InputError
 from servotwin.loads import as_load
 from servotwin.models import DigitalServo

@@ -406,7 +406,7 @@ def brown_out(model: Model, command: Signal | None, board: str, *, load: Load, d
     Examples
     --------
     >>> import servotwin as st
-    >>> from servotwin.datasheet.conditions import on_supply
+    >>> from servotwin.datasheet.holding import on_supply
     >>> weak = st.PulseServo(on_supply(st.load_servo("towerpro-sg90"), st.Supply.of("5V:0.2A")))
     >>> found = brown_out(weak, st.signals.step(-60.0, 60.0, at=0.1, unit="deg"), "uno", load=st.loads.Load(),
     ...                   duration=0.5)

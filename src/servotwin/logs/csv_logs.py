@@ -45,9 +45,7 @@ from servotwin.logs.register_columns import RawRegisters, named_after_any, raw_r
 from servotwin.logs.sidecar import FOLDER_FILE, Sidecar, json_bytes, sidecar_of, sidecar_path, sidecar_words
 from servotwin.parameters import Servo, write_file
 from servotwin.tables import TextTable, csv_text, read_table
-from servotwin.tables.dialect import MISSING
-from servotwin.tables.serial import ARRIVAL
-from servotwin.tables.text import NUL
+from servotwin.tables.reading import ARRIVAL, MISSING, NUL
 from servotwin.units.words import COUNTS, unit_shown, units_written
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from servotwin.errors import InputError
 from servotwin.loads import Load, Recorded, as_load
 from servotwin.logs import log_checks as check
 from servotwin.signals.shapes import sampled
-from servotwin.signals.silence import filled
+from servotwin.signals.signal import filled
 
 if TYPE_CHECKING:
     from servotwin.logs.reading import Reading

@@ -18,8 +18,7 @@ from servotwin.logs.columns import COMMANDS, TIME, Column
 from servotwin.logs.log_checks import defined_times, impossible, is_defined, refuse
 from servotwin.logs.mend_names import CLOCK16, DROP, MENDS, RESET, SPREAD, THOUSANDS, TORN
 from servotwin.tables import TextTable, said_lines
-from servotwin.tables.dialect import MISSING
-from servotwin.tables.thousands import grouped_in, without_groups
+from servotwin.tables.reading import MISSING, grouped_in, without_groups
 
 if TYPE_CHECKING:
     from servotwin.logs.csv_logs import Layout

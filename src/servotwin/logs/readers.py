@@ -12,7 +12,7 @@ from servotwin.logs.log import Log
 from servotwin.logs.mends import checked_mends
 from servotwin.logs.sidecar import FOLDER_FILE, FORMAT, patterns_of, read_json, values_in
 from servotwin.parameters import Servo
-from servotwin.signals.time_base import warn_of_time_base
+from servotwin.signals.signal import warn_of_time_base
 
 _CSV_ENDINGS = (".csv", ".tsv")
 

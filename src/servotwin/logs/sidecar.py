@@ -16,7 +16,7 @@ from servotwin.loads import Flexible, Load, Pendulum, Recorded, Spring
 from servotwin.loads.parts import STANDARD_GRAVITY
 from servotwin.logs.columns import COMMANDS, NAMES, SWITCH, TIME, Column, check_unit, si_unit_of
 from servotwin.parameters import write_file
-from servotwin.tables.text import read_bytes
+from servotwin.tables.reading import read_bytes
 from servotwin.units import is_finite
 from servotwin.units.words import unit_word
 

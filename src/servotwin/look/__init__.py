@@ -3,22 +3,36 @@
 What plotting, reports and the command line share. matplotlib is loaded when a picture is made.
 """
 
-from servotwin.look.files import FORMATS, to_bytes
-from servotwin.look.numbers import figure_in, label_of, readable, unit_for
-from servotwin.look.page import document
-from servotwin.look.pages import on_page, pages
+from servotwin.look.page import (
+    MINUS,
+    TIMES,
+    document,
+    figure_in,
+    fixed,
+    label_of,
+    number,
+    picture,
+    plain,
+    readable,
+    table,
+    unit_for,
+    with_error,
+)
 from servotwin.look.style import (
     COLOURS,
     CURVES_A_PAGE,
+    FORMATS,
     LINES,
     WIDTH,
     axes_grid,
     context,
     finished,
     new_figure,
+    on_page,
+    pages,
     plain_decades,
+    to_bytes,
 )
-from servotwin.look.words import MINUS, TIMES, fixed, number, picture, plain, table, with_error
 from servotwin.text import escape
 
 __all__ = [

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import io
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
+
+from servotwin.errors import HIDDEN, InputError, OutputError
+from servotwin.text import shown
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -12,6 +17,71 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
+
+
+
+# --- Pictures of more than one of them can show: pages, as even as possible -------------------------------------------
+
+Item = TypeVar("Item")
+
+
+def pages(count: int, most: int) -> range:
+    """Return the numbers, from 1 on, of the pages on which a picture shows `count` things, at most `most` on each.
+
+    Of nothing there is one page.
+
+    Examples
+    --------
+    >>> [len(pages(count, 12)) for count in (0, 1, 12, 13, 47)], pages(47, 12)[-1]
+    ([1, 1, 1, 2, 4], 4)
+    """
+    return range(1, max(-(-count // most), 1) + 1)
+
+
+def on_page(what: str, items: Sequence[Item], most: int, page: int) -> tuple[Sequence[Item], str]:
+    """Return what a page shows of some things, and the words that say which of several pages it is.
+
+    Parameters
+    ----------
+    what : str
+        For messages.
+    items : sequence
+        All of them; pages take them in their order, and none has two more than another.
+    most : int
+        That a page shows.
+    page : int
+        One of the `pages` of all of them.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to show, or no such page.
+
+    Examples
+    --------
+    >>> on_page("letters", "abcde", 2, 2), on_page("letters", "abcde", 5, 1)
+    (('bc', 'page 2 of 3'), ('abcde', ''))
+    """
+    if not items:
+        raise InputError(f"{what} in a picture", got="none", allowed="at least one")
+    last = pages(len(items), most)[-1]
+    if not (isinstance(page, int) and 1 <= page <= last):
+        raise InputError(f"page of {len(items)} {what}", got=page, allowed=f"1 to {last}")
+    return part(items, page, last), f"page {page} of {last}" if last > 1 else ""
+
+
+def part(items: Sequence[Item], page: int, last: int) -> Sequence[Item]:
+    """Return what a page shows where `last` is the last one.
+
+    Examples
+    --------
+    >>> [part("abcde", page, 3) for page in (1, 2, 3)]
+    ['a', 'bc', 'de']
+    """
+    return items[len(items) * (page - 1) // last:len(items) * page // last]
+
+
+# --- One look for all pictures: readable at column width, for the colour-blind and in grey print ----------------------
 
 COLOURS: Mapping[str, str] = MappingProxyType({
     "black": "#000000", "orange": "#E69F00", "sky": "#56B4E9", "green": "#009E73", "yellow": "#F0E442",
@@ -118,3 +188,47 @@ def finished(figure: Figure, foot: str = "") -> Figure:
         figure.draw_without_rendering()
         figure.set_layout_engine("none")
     return figure
+
+
+# --- From figures to bytes: PNG, SVG or PDF; the same figure gives the same bytes -------------------------------------
+
+FORMATS = ("png", "svg", "pdf")
+# No date and no program version in a file: two runs are comparable byte by byte.
+_METADATA: dict[str, dict[str, Any]] = {
+    "png": {"Software": None}, "svg": {"Date": None, "Creator": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
+_DPI = 160
+
+
+def to_bytes(figure: Figure, file_format: str, dpi: float = _DPI) -> bytes:
+    """Return a figure as the contents of a file.
+
+    Parameters
+    ----------
+    figure : Figure
+    file_format : {"png", "svg", "pdf"}
+    dpi : float
+        Pixels an inch of a PNG.
+
+    Raises
+    ------
+    OutputError
+        If the format is none of these.
+
+    Examples
+    --------
+    >>> from servotwin.look import axes_grid
+    >>> to_bytes(axes_grid()[0], "png")[1:4]
+    b'PNG'
+    """
+    if file_format not in FORMATS:
+        raise OutputError("format of a picture", got=file_format, allowed=", ".join(FORMATS))
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):
+        if HIDDEN.search(text.get_text()):
+            text.set_text(shown(text.get_text()))
+    with context(), io.BytesIO() as stream:
+        figure.savefig(stream, format=file_format, dpi=dpi, metadata=_METADATA[file_format])
+        return stream.getvalue()

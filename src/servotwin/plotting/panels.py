@@ -22,7 +22,7 @@ from servotwin.look import (
     on_page,
     plain_decades,
 )
-from servotwin.look.pages import pages, part
+from servotwin.look.style import pages, part
 from servotwin.text import shortened
 
 if TYPE_CHECKING:

@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin import loads, physics, signals
-from servotwin.datasheet.conditions import changed
 from servotwin.datasheet.full_drive import FullDrive
-from servotwin.datasheet.lift import GRAVITY
+from servotwin.datasheet.holding import changed
+from servotwin.datasheet.warming import GRAVITY
 from servotwin.errors import InputError
 from servotwin.loads import Load
 from servotwin.models import AveragedServo, BoundedServo, DigitalServo, Model, mid_travel

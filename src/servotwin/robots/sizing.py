@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.datasheet.conditions import at_temperatures, at_voltage, changed, supply_values
-from servotwin.datasheet.curve import SpeedCurve, speed_curve
-from servotwin.datasheet.full_drive import FullDrive
+from servotwin.datasheet.full_drive import FullDrive, SpeedCurve, speed_curve
+from servotwin.datasheet.holding import at_temperatures, at_voltage, changed, supply_values
 from servotwin.datasheet.warming import WIRE_LIMIT, Masses, thermal_masses
 from servotwin.errors import InputError
 from servotwin.models import AveragedServo, BoundedServo

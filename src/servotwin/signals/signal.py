@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -18,6 +19,82 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from servotwin.physics.pieces import Pieces
+
+
+
+# --- Samples without a value: no pulses are sent there ----------------------------------------------------------------
+
+def filled(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return values with each nan replaced by the number before it, or where there is none by the first number.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        At least one is a number.
+
+    Examples
+    --------
+    >>> filled(np.array([np.nan, 1.0, np.nan, 2.0])).tolist()
+    [1.0, 1.0, 1.0, 2.0]
+    """
+    there = ~np.isnan(values)
+    latest = np.maximum.accumulate(np.where(there, np.arange(values.size), -1))
+    return np.asarray(values[np.where(latest < 0, np.argmax(there), latest)])
+
+
+def spans(time: NDArray[np.float64], silent: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
+    """Return from when to when samples are silent [s]; before the first sample it is as there, after the last too.
+
+    Examples
+    --------
+    >>> spans(np.array([0.0, 1.0, 2.0, 3.0]), np.array([True, False, True, True]))
+    ((-inf, 1.0), (2.0, inf))
+    """
+    turns = np.flatnonzero(np.diff(np.concatenate(([False], silent, [False]))))
+    times = np.append(time, math.inf)[turns]
+    if turns.size and turns[0] == 0:
+        times[0] = -math.inf
+    return tuple(zip(times[::2].tolist(), times[1::2].tolist(), strict=True))
+
+
+# --- Times that are probably a thousand times too long or too short ---------------------------------------------------
+
+_FEWEST = 3  # samples, to tell a rhythm
+_SLOW = 10.0  # s between samples: 20 ms would be 20 s
+_WIDEST = 0.02  # s
+_FAST = {"angle": 1000.0, "pulse_width": 0.6}  # rad/s, s/s: a hundred times what servos follow
+
+
+def warn_of_time_base(time: NDArray[np.float64], value: NDArray[np.float64], kind: str, what: str, *,
+                      stacklevel: int = 3) -> None:
+    """Warn if samples come too far apart, or move too fast, for their times to be what they say.
+
+    Parameters
+    ----------
+    time, value : ndarray, shape (n,)
+        In SI, times increasing.
+    kind : {"angle", "pulse_width", "voltage"}
+    what : str
+        Whose samples these are.
+    stacklevel : int
+        As in `warnings.warn`, counted from here; 3 is the caller of the caller.
+    """
+    if time.size < _FEWEST:
+        return
+    apart = float(np.median(np.diff(time)))
+    if apart >= _SLOW:
+        warnings.warn(f"{what}: its samples come {apart:g} s apart; were the times given in milliseconds?",
+                      stacklevel=stacklevel)
+    steps = np.abs(np.diff(value))
+    span = float(time[-1] - time[0])
+    if kind == "pulse_width" and value.max() > _WIDEST:
+        return  # its unit is another one
+    if kind in _FAST and np.count_nonzero(steps) > 1 and steps.sum() > _FAST[kind] * span:
+        warnings.warn(f"{what}: its {time.size} samples go to and fro within {1e3 * span:g} ms, faster than any servo; "
+                      "were the times given in seconds and read as milliseconds?", stacklevel=stacklevel)
+
+
+# --- A commanded signal: a kind, a table of pieces, and what it was just before the start -----------------------------
 
 # unit of the caller -> (kind of command, dimension)
 KINDS: dict[str, tuple[str, str]] = {

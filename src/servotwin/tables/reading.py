@@ -2,33 +2,412 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, UnknownNameError
-from servotwin.tables.dialect import (
-    COMMENTS,
-    MISSING,
-    SEPARATORS,
-    Row,
-    has_decimal_commas,
-    is_comment,
-    is_data,
-    rows,
-    separator_of,
-)
-from servotwin.tables.serial import ARRIVAL, labelled_rows, without_times
-from servotwin.tables.text import Text, read_text
-from servotwin.tables.thousands import BLANKS, check_thousands, without_blanks
 from servotwin.text import checked_name
 from servotwin.units.words import is_unit
+
+# --- How a table separates its cells and writes its decimals, found out from its lines --------------------------------
+
+COMMENTS = ("#", "%", "//", ";")
+MISSING = frozenset(("", "-", "--", "nan", "na", "n/a", "#n/a", "#na", "none", "null", "nil", "?"))  # in small letters
+SEPARATORS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", " ": "blanks"}
+_SAMPLE = 60  # lines from each of begin, middle and end
+_NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
+WHOLE_OR_POINT = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
+_STAMP = re.compile(r"\d{4}-\d\d-\d\d|(\d{1,2}[./-]\d{1,2}[./-]\d{2,4},?[ T])?\d{1,2}:\d\d:\d\d")
+_DECIMAL_COMMA = re.compile(r"(?<![\d.,])[+-]?\d*,\d+(?![\d.,])")
+
+
+class Row(NamedTuple):
+    """The cells of a line, without the blanks about them."""
+
+    line: int
+    cells: list[str]
+
+
+def separator_of(lines: Sequence[str]) -> str:
+    r"""Return the character between the cells: the one that makes rows of equal length with numbers in them.
+
+    Examples
+    --------
+    >>> separator_of(["t;u", "0,0;1500", "0,02;1600"]), separator_of(["0 1500", "0.02   1600"])
+    (';', ' ')
+    """
+    n = len(lines)
+    sample = [*lines[:_SAMPLE], *lines[max(_SAMPLE, n // 2):][:_SAMPLE], *lines[max(2 * _SAMPLE, n - _SAMPLE):]]
+    found = max(SEPARATORS, key=lambda s: _merit(sample, s))
+    if _merit(sample, found) > 0.0:
+        return found
+    return next((s for s in SEPARATORS if lines and s in lines[0].strip()), ",")
+
+
+def _merit(sample: Sequence[str], separator: str) -> float:
+    """Return the share of lines that are rows of numbers, all equally long, under a separator."""
+    number = WHOLE_OR_POINT if separator == "," else _NUMBER
+    lengths: Counter[int] = Counter()
+    for line in sample:
+        if not line.lstrip().startswith(COMMENTS[:3]):
+            cells = cut(line, separator)
+            numbers = sum(bool(number.fullmatch(cell)) or bool(_STAMP.match(cell)) for cell in cells)
+            if numbers >= 2 and 2 * (numbers + sum(cell.lower() in MISSING for cell in cells)) >= len(cells):
+                lengths[len(cells)] += 1
+    return max(lengths.values(), default=0) / max(len(sample), 1)
+
+
+def cut(line: str, separator: str) -> list[str]:
+    r"""Return the cells of one line.
+
+    Examples
+    --------
+    >>> cut('0.02, "a, b" ,', ","), cut("  0.02   1500", " ")
+    (['0.02', 'a, b', ''], ['0.02', '1500'])
+    """
+    if '"' in line:
+        try:
+            return next(rows([line], separator), Row(1, [""])).cells
+        except csv.Error:  # an endless cell; whoever reads the rows says so
+            return [line]
+    return line.split() if separator == " " else [cell.strip() for cell in line.split(separator)]
+
+
+def rows(lines: Sequence[str], separator: str) -> Iterator[Row]:
+    """Return the cells of all lines that are not empty; a quoted cell may hold separators and line ends.
+
+    Raises
+    ------
+    csv.Error
+        If a quoted cell does not end.
+    """
+    if any('"' in line for line in lines):
+        blank = separator == " "
+        reader = csv.reader((f"{line.strip() if blank else line}\n" for line in lines), delimiter=separator,
+                            skipinitialspace=True)
+        for found in reader:
+            stripped = [cell.strip() for cell in found]
+            if any(stripped):
+                yield Row(reader.line_num, stripped)
+        return
+    for k, line in enumerate(lines, 1):
+        cells = line.split() if separator == " " else line.split(separator)
+        if separator != " " and (" " in line or "\t" in line or "\xa0" in line):
+            cells = [cell.strip() for cell in cells]
+        if any(cells):
+            yield Row(k, cells)
+
+
+def is_comment(cells: Sequence[str], separator: str) -> bool:
+    """Return whether a line is a remark; one that begins with a semicolon is none where these are the separator."""
+    return cells[0].startswith(COMMENTS[:3] if separator == ";" else COMMENTS) and cells[0].lower() not in MISSING
+
+
+def is_data(cells: Sequence[str]) -> bool:
+    """Return whether a line looks like data: two numbers or stamps, or more than half of its cells.
+
+    Examples
+    --------
+    >>> is_data(["0.02", "1500", "nan"]), is_data(["time", "pulse 1", "2"])
+    (True, False)
+    """
+    numbers = sum(bool(_NUMBER.fullmatch(cell)) or bool(_STAMP.match(cell)) for cell in cells)
+    return numbers >= 2 or (numbers == 1 and 2 * (1 + sum(cell.lower() in MISSING for cell in cells)) > len(cells))
+
+
+def has_decimal_commas(rows: Iterable[Row], separator: str) -> bool:
+    """Return whether any cell is a number with a comma in place of its point; among commas it was quoted."""
+    form = _DECIMAL_COMMA.fullmatch if separator == "," else _DECIMAL_COMMA.match
+    return any("," in cell and form(cell) is not None for row in rows for cell in row.cells)
+
+
+# --- The text of a file, whichever of the usual encodings it is in ----------------------------------------------------
+
+_HEAD = 4096  # bytes that tell what a file is
+_MOST_CONTROL = 0.1  # share of control characters in a text
+_ZEROS = re.compile("\0{3,}")
+_NOT_TEXT = {b"PK\x03\x04": "a zip archive or an Excel workbook", b"PAR1": "a Parquet file", b"\x1f\x8b": "a gzip file",
+             b"\x89PNG": "a picture", b"\xd0\xcf\x11\xe0": "an Excel workbook", b"\x89HDF": "an HDF5 file",
+             b"MATLAB": "a MATLAB file", b"%PDF": "a PDF"}
+NUL = "a NUL"
+_UTF16 = {codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
+
+
+class Text(NamedTuple):
+    """The lines of a file.
+
+    Parameters
+    ----------
+    lines : list of str
+        Those that end in a line end.
+    rest : str
+        What stands behind the last line end.
+    encoding : str
+    unwritten : int
+        Zeros behind the text, which a card holds where its last block was not written.
+    """
+
+    lines: list[str]
+    rest: str
+    encoding: str
+    unwritten: int = 0
+
+
+def read_bytes(path: str | Path) -> bytes:
+    """Return the contents of a file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    try:
+        return Path(path).read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    except ValueError as error:  # a NUL in the path
+        raise InputError(f"{path}: cannot be read ({error})") from None
+
+
+def read_text(path: Path, *, damaged: bool = False) -> Text:
+    r"""Return the lines of a text file: UTF-8 with or without a mark, UTF-16, else Windows-1252 or Latin-1.
+
+    Parameters
+    ----------
+    path : Path
+    damaged : bool
+        Whether there may be zeros within the text too.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is no text.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> file = Path(tempfile.mkdtemp()) / "run.csv"
+    >>> _ = file.write_bytes("t;Winkel (\xb0)\r\n0;9\r\n0.02;1".encode("latin-1"))
+    >>> read_text(file)
+    Text(lines=['t;Winkel (°)', '0;9'], rest='0.02;1', encoding='cp1252', unwritten=0)
+    """
+    data = read_bytes(path)
+    for start, what in _NOT_TEXT.items():
+        if data.startswith(start):
+            raise InputError(str(path), got=what, allowed="a text, such as CSV")
+    whole, encoding = _decoded(data)
+    text = whole.rstrip("\0")
+    unwritten = len(whole) - len(text)
+    _check(path, text, whole, damaged=damaged)
+    # "−" is the minus sign of typesetters; \x1a ended files of old
+    text = text.rstrip("\x1a").replace("\u2212", "-").replace("\r\n", "\n").replace("\r", "\n")
+    *lines, rest = text.split("\n")
+    return Text(lines, rest, encoding, unwritten)
+
+
+def _decoded(data: bytes) -> tuple[str, str]:
+    encoding = next((name for mark, name in _UTF16.items() if data.startswith(mark)), "")
+    if encoding:
+        data = data[2:]
+    elif b"\0" in data[:_HEAD]:
+        head = data[:_HEAD]
+        # letters and digits of UTF-16 without a mark have a NUL in every second place
+        places = head[1::2].count(0), head[::2].count(0)
+        if max(places) > 0.7 * (len(head) // 2) and min(places) < 0.1 * len(head):
+            encoding = "utf-16-le" if places[0] > places[1] else "utf-16-be"
+    if encoding:
+        return data[:len(data) // 2 * 2].decode(encoding, errors="replace"), encoding
+    whole = max(data.rfind(b"\n"), data.rfind(b"\r")) + 1  # a line that was torn may end within a character
+    for name in ("utf-8-sig", "cp1252"):
+        try:
+            return data[:whole].decode(name) + data[whole:].decode(name, errors="replace"), name
+        except UnicodeDecodeError:
+            continue
+    return data.decode("latin-1"), "latin-1"
+
+
+def _check(path: Path, text: str, whole: str, *, damaged: bool) -> None:
+    head = text[:_HEAD] if text.strip() else whole[:_HEAD]
+    once = _ZEROS.sub("\0", head)  # a block that was never written counts as one
+    control = sum(c < " " and c not in "\t\r\n\f\x1a" for c in once)
+    if control > _MOST_CONTROL * len(once):
+        raise InputError(str(path), got="binary data", allowed="a text, such as CSV")
+    if "\0" in text and not damaged:
+        before = text[:text.index("\0")]
+        line = 1 + before.replace("\r\n", "\n").replace("\r", "\n").count("\n")
+        raise InputError(f"{path}: line {line}", got=NUL, allowed="a text; the file was damaged")
+
+
+# --- What the Arduino IDE makes of lines ------------------------------------------------------------------------------
+
+ARRIVAL = "Serial Monitor"
+"""Name of the column with the times that the Serial Monitor puts before lines."""
+_PREFIX = re.compile(r"\s*(\d{1,2}:\d\d:\d\d\.\d{1,6})\s*->\s?(.*)")
+_LABEL = r"[^\W\d_][\w ./()%°-]*?"
+_LABELLED = re.compile(rf"\s*({_LABEL})\s*:\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|inf)\s*", re.IGNORECASE)
+_BEGUN = re.compile(rf"\s*({_LABEL})\s*:\s*(.*)")
+_SHARE = 0.6  # of the lines: text of a start-up and rows that were torn are the rest
+_SAMPLE_SERIAL = 400  # lines
+
+
+def without_times(lines: Sequence[str]) -> tuple[list[str], dict[int, str]]:
+    """Return lines without the Serial Monitor's times, and these by the number of their line; none if few have them.
+
+    Examples
+    --------
+    >>> without_times(["12:03:11.123 -> 20,1500", "12:03:11.143 -> 40,1500"])
+    (['20,1500', '40,1500'], {1: '12:03:11.123', 2: '12:03:11.143'})
+    """
+    some = [line for line in lines[:_SAMPLE_SERIAL] if line.strip()]
+    if not some or sum(_PREFIX.fullmatch(line) is not None for line in some) < _SHARE * len(some):
+        return list(lines), {}
+    matches = [_PREFIX.fullmatch(line) for line in lines]
+    return ([line if match is None else match[2] for line, match in zip(lines, matches, strict=True)],
+            {k: match[1] for k, match in enumerate(matches, 1) if match is not None})
+
+
+def labelled_rows(lines: Sequence[str]) -> list[Row] | None:
+    r"""Return the rows of lines such as ``pwm:1500,adc:512``, their labels as a header first; None where they are none.
+
+    Examples
+    --------
+    >>> labelled_rows(["pwm:1500,adc:512", "pwm:1600,adc:5"])
+    [Row(line=1, cells=['pwm', 'adc']), Row(line=1, cells=['1500', '512']), Row(line=2, cells=['1600', '5'])]
+    """
+    some = [line for line in lines[:_SAMPLE_SERIAL] if line.strip()]
+    if not some or ":" not in some[len(some) // 2]:
+        return None
+    shapes = Counter(labels for line in some if (labels := _labels(line)))
+    if not shapes:
+        return None
+    names, count = shapes.most_common(1)[0]
+    if count < _SHARE * len(some) or len(set(names)) < len(names):
+        return None
+    begin = next(k for k, line in enumerate(lines, 1) if line.strip())
+    return [Row(begin, list(names)), *(Row(k, _values(line, names)) for k, line in enumerate(lines, 1) if line.strip())]
+
+
+def _parts(line: str) -> list[str]:
+    for separator in ("\t", ","):
+        if separator in line:
+            return [part for part in line.split(separator) if part.strip()]
+    return re.sub(r":\s+", ":", line).split()
+
+
+def _labels(line: str) -> tuple[str, ...]:
+    """Return the labels of a line all of whose parts are a label and a number; else none."""
+    matches = [_LABELLED.fullmatch(part) for part in _parts(line)]
+    return tuple(match[1] for match in matches if match is not None) if all(matches) else ()
+
+
+def _values(line: str, names: Sequence[str]) -> list[str]:
+    """Return the cells of a line; what is not labelled as it should be stays as it is, so that it is seen."""
+    cells = []
+    for part in _parts(line):
+        match = _BEGUN.fullmatch(part)
+        cells.append(match[2].strip() if match is not None and match[1] in names else part.strip())
+    return cells
+
+
+# --- Points and commas that separate thousands: `1.020` beside `980`, or among decimal commas -------------------------
+
+_HUNDREDS = 100  # in the same column: 2.500 beside 1 and 3 was written by hand
+_FAR = 10.0  # times: whole numbers that are larger than all others, were the mark one of decimals
+BLANKS = "\u00a0\u202f\u2009'\u2019"  # that do not end a line, and marks of Switzerland
+_BLANK = re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:[{BLANKS}]\d{{3}})+(?:[.,]\d*)?")
+WHOLE = re.compile(r"[+-]?\d{1,3}")
+BY_POINTS = r"[+-]?[1-9]\d{0,2}(?:\.\d{3})+"
+
+
+class Grouped(NamedTuple):
+    """A mark that separates thousands, a cell that has it, and how its column is written else."""
+
+    mark: str
+    line: int
+    column: str
+    cell: str
+    other: str
+
+
+def grouped_in(table: TextTable, *, asked: bool = False) -> Grouped | None:
+    """Return how thousands are separated in a table, None where nothing says that they are.
+
+    The other mark is that of decimals, or whole numbers without a mark stand in one column with numbers of three
+    places: 500, 980, 1.020. Who `asked` knows it.
+    """
+    cells = [cell for row in table.rows for cell in row.cells if "." in cell or "," in cell]
+    found = {mark: [cell for cell in cells if mark in cell] for mark in ".,"}
+    marks = [mark for mark in ".," if found[mark] and all(_form(mark).fullmatch(cell) for cell in found[mark])]
+    if len(marks) != 1:
+        return None
+    mark = marks[0]
+    mixed = next(_mixed(table, mark), None)
+    if not (asked or mixed or all(found.values())):
+        return None
+    other = f"such as {mixed}" if mixed else f"with a decimal {'point' if mark == ',' else 'comma'}"
+    return next(Grouped(mark, row.line, name, cell, other) for row in table.rows
+                for name, cell in zip(table.header, row.cells, strict=False) if _form(mark).fullmatch(cell))
+
+
+def without_blanks(rows: list[Row]) -> list[Row]:
+    """Return rows without blanks and apostrophes within numbers (1'020), which separate nothing but thousands."""
+    return [row if not any(mark in cell for cell in row.cells for mark in BLANKS) else Row(row.line, [
+        re.sub(f"[{BLANKS}]", "", cell) if _BLANK.fullmatch(cell) else cell for cell in row.cells]) for row in rows]
+
+
+def check_thousands(table: TextTable) -> None:
+    """Raise InputError where thousands are separated: such a table is small, and soon written without."""
+    found = grouped_in(table)
+    if found is not None:
+        plain = found.cell.replace(found.mark, "")
+        raise InputError(f"{table.path}: line {found.line}, {found.column}", got=found.cell,
+                         allowed=f"a number {found.other}, as other cells have it: {plain}, if the "
+                         f"{'point' if found.mark == '.' else 'comma'} separates thousands")
+
+
+def without_groups(table: TextTable, mark: str) -> TextTable:
+    """Return the table without a mark between thousands."""
+    form = _form(mark)
+    rows = [Row(row.line, [cell.replace(mark, "") if form.fullmatch(cell) else cell for cell in row.cells])
+            for row in table.rows]
+    said = f"{'points' if mark == '.' else 'commas'} within whole numbers are taken for thousands separators"
+    return replace(table, rows=rows, decimal="," if has_decimal_commas(rows, table.separator) else ".",
+                   remarks=(*table.remarks, said))
+
+
+def _form(mark: str) -> re.Pattern[str]:
+    other = "," if mark == "." else r"\."
+    return re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:{re.escape(mark)}\d{{3}})+(?:{other}\d*)?")
+
+
+def _mixed(table: TextTable, mark: str) -> Iterator[str]:
+    """Give a whole number of each column in which others have three places: nothing that prints decimals does so."""
+    for k in range(len(table.header)):
+        cells = [row.cells[k] for row in table.rows if k < len(row.cells)]
+        marked = [cell for cell in cells if mark in cell]
+        whole = [cell for cell in cells if WHOLE.fullmatch(cell) and int(cell) != 0]
+        if not marked or not whole:
+            continue
+        largest = max(abs(float(cell.replace(mark, ".", 1).replace(mark, ""))) for cell in marked)
+        numbers = [abs(int(cell)) for cell in whole]
+        printed = max(numbers) >= _HUNDREDS and any(cell.endswith("0") for cell in marked)
+        if printed or min(numbers) > _FAR * largest:
+            yield whole[0]
+
+
+# --- The reader of tables ---------------------------------------------------------------------------------------------
 
 _MARKS = frozenset(comment[0] for comment in COMMENTS)
 _SEARCHED = 200  # lines in which the header stands

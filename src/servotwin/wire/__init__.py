@@ -1,7 +1,6 @@
 """Servos on a wire: twins that answer where programs look for Feetech's and Dynamixel's servos."""
 
-from servotwin.wire.bus import Bus, Counts
-from servotwin.wire.crew import Seen
-from servotwin.wire.faults import KINDS, Fault, Faults, read_faults
+from servotwin.wire.bus import KINDS, Bus, Counts, Fault, Faults, read_faults
+from servotwin.wire.twins import Seen
 
 __all__ = ["KINDS", "Bus", "Counts", "Fault", "Faults", "Seen", "read_faults"]

@@ -2,17 +2,78 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.parameters import Servo, load_servo
 from servotwin.parameters.groups import Supply
+from servotwin.tables.reading import read_text
 from servotwin.text import checked_name, load_toml
-from servotwin.wire.bus import Bus
-from servotwin.wire.faults import Faults
+from servotwin.wire.bus import Bus, Faults
+
+# --- A hand that moves limp servos, by a file of angles over time -----------------------------------------------------
+
+def hand_of(path: str | Path, bus: Bus, names: Mapping[int, str]) -> Callable[[Bus], None]:
+    """Return what moves the servos of a bus as a file says: columns time_s, and degrees by joint or ID.
+
+    Between rows angles are straight lines; at the end it begins anew. A servo whose torque is on does not feel it.
+
+    Raises
+    ------
+    InputError
+        If the file has no times, or columns of joints that there are not.
+    """
+    rows = _table(Path(path))
+    time, ids = rows.pop("time_s"), {name: id for id, name in names.items() if name}
+    of: dict[int, np.ndarray] = {}
+    for column, values in rows.items():
+        word = column.removesuffix("_deg")
+        id = ids.get(word, int(word) if word.isdecimal() else None)
+        if not column.endswith("_deg") or id not in bus.ids:
+            raise InputError(f"{path}: column", got=column, allowed=", ".join(
+                f"{names.get(one) or one}_deg" for one in bus.ids))
+        of[id] = np.radians(values)
+    span = float(time[-1] - time[0])
+
+    def move(moved: Bus) -> None:
+        now = float(time[0]) + (math.fmod(moved.time, span) if span > 0.0 else 0.0)
+        for id, angles in of.items():
+            moved.hand(id, float(np.interp(now, time, angles)))
+
+    return move
+
+
+def _table(path: Path) -> dict[str, np.ndarray]:
+    text = read_text(path)
+    lines = [line.strip() for line in (*text.lines, text.rest) if line.strip() and line[:1] != "#"]
+    head = [word.strip() for word in lines[0].split(",")] if lines else []
+    if "time_s" not in head or len(head) < 2 or len(set(head)) < len(head):
+        raise InputError(f"{path}", got=", ".join(head) or "nothing",
+                         allowed="columns time_s and angles, each once, such as time_s,shoulder_pan_deg")
+    rows = []
+    for number, line in enumerate(lines[1:], start=2):
+        try:
+            row = [float(word) for word in line.split(",")]
+        except ValueError:
+            row = []
+        if len(row) != len(head) or not all(map(math.isfinite, row)):
+            raise InputError(f"{path}, row {number}", got=line, allowed=f"{len(head)} numbers")
+        rows.append(row)
+    columns = np.array(rows, dtype=np.float64).reshape(-1, len(head)).T
+    found = dict(zip(head, columns, strict=True))
+    if not rows or np.any(np.diff(found["time_s"]) < 0.0):
+        raise InputError(f"{path}", got="no rows" if not rows else "times that go back",
+                         allowed="rows in order of time")
+    return found
+
+
+# --- Arms that are on a wire: which servo has which ID, and at which joint --------------------------------------------
 
 JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
 ARMS: Mapping[str, Mapping[int, tuple[str, str]]] = {
@@ -91,7 +152,7 @@ def arm_bus(asked: Asked, *, registers: Callable[[Servo, tuple[str, ...]], Servo
     words = asked.supply or arm.supply
     more: dict[str, Any] = {}
     if asked.body and arm.body is not None and not asked.servos:
-        from servotwin.wire.body import body_of
+        from servotwin.wire.twins import body_of
 
         made = body_of(arm.body, [arm.joints[id] for id in named])
         if made is not None:

@@ -9,8 +9,8 @@ from servotwin.models import DigitalServo
 from servotwin.parameters.registers.feetech import REGISTERS, sts_family
 from servotwin.parameters.registers.feetech_models import STS_MODELS
 from servotwin.parameters.registers.model import model_for
-from servotwin.wire.crew import finite
 from servotwin.wire.device import COUNT, LANDED, MIDDLE, TURN, Device
+from servotwin.wire.twins import finite
 
 VOLTAGE, HEAT, CURRENT, OVERLOAD = 1, 4, 8, 32  # bits of the status
 _TRIPS = {1: OVERLOAD, 2: CURRENT, 3: HEAT, 4: VOLTAGE}

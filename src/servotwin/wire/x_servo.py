@@ -9,8 +9,8 @@ from servotwin.models import DigitalServo
 from servotwin.parameters.registers.dynamixel_x import FULL, REGISTERS, SPEED, x_family
 from servotwin.parameters.registers.dynamixel_x_models import X_MODELS
 from servotwin.parameters.registers.model import model_for
-from servotwin.wire.crew import finite
 from servotwin.wire.device import COUNT, LANDED, MIDDLE, Device
+from servotwin.wire.twins import finite
 
 RANGE, LENGTH, LIMIT, ACCESS = 4, 5, 6, 7  # errors
 ALERT = 128

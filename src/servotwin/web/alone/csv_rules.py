@@ -9,8 +9,7 @@ import numpy as np
 from servotwin.identification.report.pictures import sensor_shown
 from servotwin.logs.columns import COMMANDS, SWITCH, TIME, own_columns
 from servotwin.logs.log_checks import FEWEST, LIMITS, PULSES
-from servotwin.tables.dialect import MISSING, WHOLE_OR_POINT
-from servotwin.tables.thousands import BY_POINTS, WHOLE
+from servotwin.tables.reading import BY_POINTS, MISSING, WHOLE, WHOLE_OR_POINT
 from servotwin.web.live.overlay import STRETCHES
 from servotwin.web.server.own.reading import DIGITS, MOST_PLAYED, UNITS
 

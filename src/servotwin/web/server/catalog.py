@@ -7,7 +7,7 @@ import warnings
 from functools import cache, lru_cache
 from typing import Any
 
-from servotwin.datasheet.curve import speed_curve
+from servotwin.datasheet.full_drive import speed_curve
 from servotwin.errors import UnknownNameError
 from servotwin.models import BoundedServo, Model, default_model
 from servotwin.parameters import catalog_names, load_servo
