@@ -6,7 +6,7 @@ import numpy as np
 
 from bench_scenes import by_python, drawn
 from servotwin.web.live import LiveBench, read_scene
-from servotwin.web.live.rest_watch import NOT_AT_REST
+from servotwin.web.live.live_bench import NOT_AT_REST
 
 ANGLE = 1e-9  # rad
 BETWEEN = 1e-8  # s: where a drive ends as the next begins, rounding decides whether the bridge is off in between

@@ -7,18 +7,18 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from servotwin.web.alone import kernel
+from servotwin.web.alone import page
 from servotwin.web.alone.pack import world
 from servotwin.web.alone.page import modules
-from servotwin.web.server.first import first_scene
+from servotwin.web.server.serve import first_scene
 
 HARNESS = Path(__file__).parent / "web" / "alone" / "harness"
 
 
 @cache
 def known() -> dict:
-    """Return what the page knows, with the layout of its kernel."""
-    return {**world(first_scene()), "layout": kernel.layout()}
+    """Return what the page knows, with the layout of its page."""
+    return {**world(first_scene()), "layout": page.layout()}
 
 
 def unpacked(folder: Path) -> Path:
@@ -26,7 +26,7 @@ def unpacked(folder: Path) -> Path:
     (folder / "package.json").write_text('{"type": "module"}')
     for name, text in modules().items():
         (folder / name.removeprefix("bench/")).write_text(text.replace('"bench/', '"./'), encoding="utf-8")
-    (folder / "bench.wasm").write_bytes(kernel.module())
+    (folder / "bench.wasm").write_bytes(page.module())
     return folder
 
 

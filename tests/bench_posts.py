@@ -15,7 +15,7 @@ from servotwin.models.switched import SwitchedServo
 from servotwin.models.terms.frame import NO_CHIP
 from servotwin.signals.signal import KINDS as KINDS_OF_UNITS
 from servotwin.units import factor
-from servotwin.web.live.lines import lines_of
+from servotwin.web.live.station import lines_of
 
 if TYPE_CHECKING:
     from servotwin.loads import Load

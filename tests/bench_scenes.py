@@ -7,8 +7,8 @@ from servotwin.errors import ServotwinError
 from servotwin.parameters import catalog_names
 from servotwin.web.live import LiveBench, Scene, SceneServo
 from servotwin.web.live.actions import Action
-from servotwin.web.live.beginning import models_of
-from servotwin.web.live.scene_servo import SERVO_MODELS
+from servotwin.web.live.live_bench import models_of
+from servotwin.web.live.scene import SERVO_MODELS
 
 LOADS = {"inertia": (0.0, 2e-3), "viscous_friction": (0.0, 1e-2), "torque": (-0.2, 0.2), "coulomb_torque": (0.0, 0.05),
          "mass": (0.0, 0.2), "arm": (0.01, 0.3), "hanging_angle": (-3.0, 3.0)}

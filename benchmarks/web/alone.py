@@ -13,7 +13,7 @@ from browser import ARGUMENTS, TO_TRACE, WATCH
 
 from servotwin.web.alone.page import page as one_file
 from servotwin.web.alone.page import sizes
-from servotwin.web.server.first import first_scene
+from servotwin.web.server.serve import first_scene
 
 BYTES, SCRIPT, SECOND, VISITS, MOVES = 450e3, 0.025, 0.5, 5, 20
 SIX = {

@@ -13,9 +13,9 @@ from talk import Client, come, server, watched
 
 import servotwin as st
 from servotwin.web.live import read_scene
-from servotwin.web.live.beginning import load_of
-from servotwin.web.live.commands import checked_command, command_signal
-from servotwin.web.server.first import first_scene
+from servotwin.web.live.actions import checked_command, command_signal
+from servotwin.web.live.live_bench import load_of
+from servotwin.web.server.serve import first_scene
 
 SECONDS = 10.0
 BAR = 0.10  # of a core for one visitor

@@ -16,8 +16,8 @@ from servotwin.logs import BAM_ACTUATORS, LOG_FORMATS
 from servotwin.models import MODELS
 from servotwin.models.outputs import SIGNALS
 from servotwin.parameters import GROUPS, catalog_names, load_servo
-from servotwin.parameters.plausible import AT_OUTPUT, plausible_range
 from servotwin.parameters.registers.listing import listed_model, listed_models, rows_of, wire_rows
+from servotwin.parameters.servo import AT_OUTPUT, plausible_range
 from servotwin.units import DIMENSIONS, si_unit
 
 _GREEK = ("alpha", "beta", "tau")

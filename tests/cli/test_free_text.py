@@ -98,11 +98,11 @@ WRITERS = {
     "cli/robot.py", "cli/robot_report.py", "cli/robot_task_report.py", "cli/robot_tasks.py", "cli/web.py",
     "export/c_writing.py", "export/fmu.py", "identification/report/page.py",
     "identification/report/parts.py", "identification/report/validation.py", "identification/sheets/sheet.py",
-    "logs/csv_logs.py", "logs/sidecar.py", "look/files.py", "paper/report.py", "parameters/output_file.py",
+    "logs/csv_logs.py", "logs/sidecar.py", "look/style.py", "paper/report.py", "parameters/output_file.py",
     "parameters/servo_file.py", "plotting/files.py", "plotting/block_diagrams.py", "simulation/compile/building.py",
     "simulation/compile/storage.py", "simulation/lanes/c_entry.py", "simulation/result.py", "studies/study.py",
-    "tables/columns.py", "web/alone/kernel.py", "web/server/own/reading.py", "web/server/own/work.py",
-    "wire/keeping.py", "wire/traffic.py",
+    "tables/columns.py", "web/alone/page.py", "web/server/own/reading.py", "web/server/own/work.py",
+    "wire/service.py", "wire/traffic.py",
 }
 
 
@@ -407,7 +407,7 @@ def test_the_page_puts_texts_in_as_text():
 @pytest.mark.parametrize("kind", ["csv", "script", "servo", "scene"])
 def test_files_of_the_page(kind, tmp_path):
     from servotwin.web.live import SceneServo
-    from servotwin.web.live.export import exported
+    from servotwin.web.live.replay import exported
 
     servo_file(tmp_path / "pulse.toml", "hitec-hs-755hb", LEGAL)
     scene = st.web.Scene(servos=(SceneServo(file=(tmp_path / "pulse.toml").read_text()),), name=LEGAL, end=0.05)

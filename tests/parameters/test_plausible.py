@@ -9,8 +9,8 @@ import pytest
 import servotwin as st
 from servotwin.errors import PlausibilityWarning
 from servotwin.parameters import GROUPS
-from servotwin.parameters.group import RULES
-from servotwin.parameters.plausible import AT_OUTPUT, oddity, plausible_range
+from servotwin.parameters.groups import RULES
+from servotwin.parameters.servo import AT_OUTPUT, oddity, plausible_range
 
 SERVO = st.load_servo("hitec-hs-755hb")
 NUMBERS = [(f"{group}.{f.name}", f.metadata) for group, kind in GROUPS.items() for f in fields(kind)

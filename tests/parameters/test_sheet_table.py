@@ -6,7 +6,7 @@ import pytest
 
 from servotwin import units
 from servotwin.errors import InputError
-from servotwin.parameters.sheet_table import POINT, WHOLE, figure, printed
+from servotwin.parameters.servo_file import POINT, WHOLE, figure, printed
 
 
 def test_a_speed_is_read_from_its_time_and_its_spread_turns_round():

@@ -25,7 +25,7 @@ from servotwin.bench.table_columns import LineFit, curvature_test, fit_line, wid
 from servotwin.bench.table_parameters import Estimate, with_measured
 from servotwin.bench.table_words import plus_minus, residual_pattern
 from servotwin.parameters import Quantity, Servo, printed_points
-from servotwin.parameters.output_side import output_value
+from servotwin.parameters.servo import output_value
 from servotwin.physics import load_share
 from servotwin.physics.sheet import LEAST_EFFICIENCY
 

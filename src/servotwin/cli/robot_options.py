@@ -72,7 +72,7 @@ def chosen_servos(robot: str, words: Sequence[str], joints: Mapping[str, str], *
     {'elbow': 'mg996r', 'wrist': 'sg90'}
     """
     if not words and robot == "so101":
-        from servotwin.parameters.registers.robots import set_of_robot
+        from servotwin.parameters.registers.held import set_of_robot
 
         return {joint: Chosen(_ARM_SERVO, [set_of_robot(robot, joint)]) for joint in joints}
     if not words:

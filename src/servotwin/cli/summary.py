@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from servotwin.datasheet import Buzz, Remedy
     from servotwin.models import Model
     from servotwin.parameters import Servo
-    from servotwin.parameters.quantity import Quantity
+    from servotwin.parameters.servo import Quantity
     from servotwin.simulation import Result
     from servotwin.simulation.remarks import Sag
     from servotwin.studies import Study

@@ -105,7 +105,7 @@ def _first(servo: str | None, scene: Path | None, lesson: str | None) -> Scene:
         except UnicodeDecodeError:
             raise InputError(f"{scene}", got="no UTF-8 text", allowed="a bench that was saved on the page") from None
     if servo is None:
-        from servotwin.web.server.first import first_scene
+        from servotwin.web.server.serve import first_scene
 
         return first_scene()
     if servo in catalog_names():

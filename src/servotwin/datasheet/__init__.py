@@ -48,8 +48,8 @@ _FILES = {
     **dict.fromkeys(("FullDrive", "OperatingPoint", "SpeedCurve", "Swing"), "full_drive"),
     **dict.fromkeys(("Buzz", "Held", "Remedy", "Span", "buzz"), "holding"),
     **dict.fromkeys(("Loop", "Protection", "Standing"), "loop"),
-    **dict.fromkeys(("Bandwidth", "DataSheet", "Figure", "Motion", "VoltageSheet", "beside_flags", "curves", "motion_of",
-                     "printed_beside"), "sheet"),
+    **dict.fromkeys(("Bandwidth", "DataSheet", "Figure", "Motion", "VoltageSheet", "beside_flags", "curves",
+                     "motion_of", "printed_beside"), "sheet"),
     **dict.fromkeys(("SpeedMap", "slow_rotor", "time_constant_of", "wheel_speed_of"), "turning"),
     **dict.fromkeys(("Lift", "Masses", "Warming", "lift_of", "thermal_masses"), "warming"),
 }

@@ -17,7 +17,7 @@ from servotwin.loads import Coulomb, as_load
 from servotwin.models import BoundedServo, DigitalServo, PulseServo, PulseServoInductive, mid_travel
 from servotwin.models.outputs import warm_plant
 from servotwin.parameters import operating_voltages, sheet_voltages
-from servotwin.parameters.quantity import SET_BY_USER
+from servotwin.parameters.servo import SET_BY_USER
 from servotwin.physics import Temperatures, magnet_factor, winding_resistance
 from servotwin.physics.gear import output_torque
 from servotwin.simulation.metrics import resolution

@@ -36,7 +36,7 @@ from servotwin.linear import frequency_response
 from servotwin.look import escape, number, table
 from servotwin.models import Model, default_model, mid_travel
 from servotwin.parameters import PrintedPoint, printed_fact, printed_points
-from servotwin.parameters.sheet_table import ELSE, POINT
+from servotwin.parameters.servo_file import ELSE, POINT
 from servotwin.physics.thermal import REFERENCE_TEMPERATURE, Temperatures
 from servotwin.simulation.simulator import simulate
 from servotwin.units import is_finite

@@ -15,7 +15,7 @@ from servotwin.loads import Load, Part
 from servotwin.models import DigitalServo, Model
 from servotwin.models.switched import SwitchedServo
 from servotwin.parameters import printed_points
-from servotwin.parameters.output_side import output_value
+from servotwin.parameters.servo import output_value
 from servotwin.simulation.simulator import simulate
 
 if TYPE_CHECKING:

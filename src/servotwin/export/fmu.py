@@ -27,8 +27,7 @@ from servotwin.export.c_writing import features_of_model, signals_of_model, wiri
 from servotwin.loads import as_load
 from servotwin.models.engine.memory import ACCURACY
 from servotwin.models.terms.given import field_of
-from servotwin.parameters.group import AT_LEAST_ONE, FRACTION, NOT_NEGATIVE, POSITIVE
-from servotwin.parameters.groups import GROUPS
+from servotwin.parameters.groups import AT_LEAST_ONE, FRACTION, GROUPS, NOT_NEGATIVE, POSITIVE
 from servotwin.parameters.output_file import write_file
 from servotwin.simulation.compile.finding import compilers
 from servotwin.text import shown

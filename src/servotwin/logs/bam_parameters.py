@@ -10,7 +10,7 @@ from servotwin.errors import InputError, ParameterError, UnknownNameError
 from servotwin.logs.bam_convention import BAM_ACTUATORS, BamConvention, bam_actuator, bam_name_of
 from servotwin.logs.sidecar import read_json, write_json
 from servotwin.parameters import GROUPS, Quantity, Servo, unit_of
-from servotwin.parameters.firmware import MOST_WAITING
+from servotwin.parameters.groups import MOST_WAITING
 from servotwin.units import is_finite
 
 _MOTOR = {"kt": "motor.torque_constant", "R": "motor.armature_resistance", "armature": "motor.rotor_inertia",

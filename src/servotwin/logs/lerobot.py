@@ -14,7 +14,7 @@ from servotwin.logs.joint_tables import is_joint_table
 from servotwin.logs.lerobot_data import ACTION, STATE, Joint, Rows, dataset_of, open_dataset
 from servotwin.logs.log import Log
 from servotwin.logs.reading import ReadColumn, Reading
-from servotwin.parameters.registers.robots import left_by_lerobot
+from servotwin.parameters.registers.held import left_by_lerobot
 from servotwin.units.words import scaled_unit, unit_shown, units_written
 
 ALL = "*"

@@ -15,7 +15,7 @@ from servotwin.errors import InputError, UnitError, UnknownNameError
 from servotwin.logs.column_words import SAID
 from servotwin.logs.columns import COMMANDS, TIME, UNITS, Column, dimension_of_signal, si_unit_of
 from servotwin.parameters import GROUPS
-from servotwin.parameters.group import AT_LEAST_ONE, FRACTION, NOT_NEGATIVE, POSITIVE
+from servotwin.parameters.groups import AT_LEAST_ONE, FRACTION, NOT_NEGATIVE, POSITIVE
 from servotwin.parameters.servo import check_name, unit_of
 from servotwin.text import LONGEST_FILE_NAME, checked_name
 from servotwin.units import from_si, is_finite, is_masked

@@ -17,8 +17,7 @@ from servotwin.logs.columns import Column
 from servotwin.parameters import Servo
 from servotwin.parameters.registers.held import register_family_of
 from servotwin.parameters.registers.listing import register_family, register_words
-from servotwin.parameters.registers.register import Register
-from servotwin.parameters.registers.table import Family, family_label
+from servotwin.parameters.registers.table import Family, Register, family_label
 from servotwin.tables import TextTable
 from servotwin.units.words import unit_word
 

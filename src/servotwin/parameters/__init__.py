@@ -1,14 +1,13 @@
 """What a servo is made of: parameters with units, origin and spread, the catalog, and published data."""
 
-from servotwin.parameters.catalog import catalog_names, load_servo
-from servotwin.parameters.datasets import Dataset, dataset_names, load_dataset
-from servotwin.parameters.firmware import Firmware
-from servotwin.parameters.group import Group
+from servotwin.parameters.catalog import Dataset, catalog_names, dataset_names, load_dataset, load_servo
 from servotwin.parameters.groups import (
     GROUPS,
     Electronics,
+    Firmware,
     Friction,
     Gear,
+    Group,
     Motor,
     Potentiometer,
     Stops,
@@ -16,15 +15,6 @@ from servotwin.parameters.groups import (
     Thermal,
 )
 from servotwin.parameters.output_file import write_file
-from servotwin.parameters.printed import (
-    PrintedPoint,
-    operating_voltages,
-    printed_fact,
-    printed_flags,
-    printed_points,
-    sheet_voltages,
-)
-from servotwin.parameters.quantity import ORIGINS, Quantity
 from servotwin.parameters.registers import (
     REGISTER_FAMILIES,
     dynamixel_ax,
@@ -33,7 +23,15 @@ from servotwin.parameters.registers import (
     dynamixel_xl320,
     feetech_sts,
 )
-from servotwin.parameters.servo import KINDS, Servo, dimension_of, servo_from_values, unit_of
+from servotwin.parameters.servo import KINDS, ORIGINS, Quantity, Servo, dimension_of, servo_from_values, unit_of
+from servotwin.parameters.servo_file import (
+    PrintedPoint,
+    operating_voltages,
+    printed_fact,
+    printed_flags,
+    printed_points,
+    sheet_voltages,
+)
 
 __all__ = [
     "GROUPS", "KINDS", "ORIGINS", "REGISTER_FAMILIES", "Dataset", "Electronics", "Firmware", "Friction", "Gear",

@@ -3,15 +3,122 @@
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
 
-from servotwin.errors import UnknownNameError
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import InputError, UnknownNameError
 from servotwin.parameters.servo import Servo
 from servotwin.parameters.servo_file import read_servo_file
+from servotwin.tables import read_columns
+from servotwin.units.quantities import number_and_unit, quantity
+
+# --- Published data that come with the package, each column with its unit ---------------------------------------------
+
+_UNITS = ("deg", "V", "us", "Hz")  # a column's name ends in its unit; a count has none
+
+
+@dataclass(frozen=True, eq=False)
+class Dataset:
+    """A table of published data.
+
+    Parameters
+    ----------
+    name : str
+    columns : dict of str to ndarray, shape (n,)
+        In the unit that the name of the column ends in.
+    units : dict of str to str
+        "1" for counts.
+    source : str
+        What it is and where it was published.
+    """
+
+    name: str
+    columns: dict[str, NDArray[np.float64]] = field(repr=False)
+    units: dict[str, str] = field(repr=False)
+    source: str = field(repr=False)
 
 
 def _folder() -> Path:
+    return Path(str(resources.files("servotwin.parameters"))) / "datasets"
+
+
+def dataset_names() -> tuple[str, ...]:
+    """Return the names of all data sets, sorted.
+
+    Examples
+    --------
+    >>> dataset_names()
+    ('urrea-kern-table-1', 'urrea-kern-table-2')
+    """
+    return tuple(sorted(path.stem for path in _folder().glob("*.csv")))
+
+
+def load_dataset(name: str) -> Dataset:
+    """Return a data set by its name.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is none of this name.
+
+    Examples
+    --------
+    >>> load_dataset("urrea-kern-table-2").columns["t_a_us"].tolist()
+    [646.0, 1078.0, 1526.0, 1974.0, 2438.0]
+    """
+    if name not in dataset_names():
+        raise UnknownNameError("data set", name, dataset_names())
+    columns = read_columns(_folder() / f"{name}.csv")
+    units = {key: next((u for u in _UNITS if key.endswith(f"_{u}")), "1") for key in columns}
+    return Dataset(name, columns, units, (_folder() / "SOURCE.md").read_text(encoding="utf-8"))
+
+
+# --- Supplies in words: a voltage with resistance and limit of current, or a name -------------------------------------
+
+_NAMED = {"usb": {"open_circuit_voltage": 5.0, "current_limit": 0.5}}  # what USB 2.0 gives a device that asked for it
+_FORM = f"{', '.join(_NAMED)}, or VOLTS[:OHMS][:AMPERES], such as 12V:0.1ohm or 5V:0.5A"
+_LETTERS = ("A", "mA")
+_CAPACITORS = {"pF": 1e-12, "nF": 1e-9, "uF": 1e-6, "µF": 1e-6, "μF": 1e-6, "mF": 1e-3, "F": 1.0}
+_START_CHARGE = 4e-3  # C, an excess of 0.2 A while a small motor starts, 20 ms
+
+
+def supply_numbers(text: str, what: str) -> dict[str, float]:
+    """Return the numbers of a supply by name (SI).
+
+    Examples
+    --------
+    >>> supply_numbers("6V:100mohm:2A", "--supply")
+    {'open_circuit_voltage': 6.0, 'internal_resistance': 0.1, 'current_limit': 2.0}
+    """
+    if text.strip().lower() in _NAMED:
+        return dict(_NAMED[text.strip().lower()])
+    volts, *rest = (part.strip() for part in text.split(":"))
+    if number_and_unit(volts) is None:
+        raise InputError(what, got=text, allowed=_FORM)
+    found = {"open_circuit_voltage": quantity(what, volts, "voltage", bare=True, positive=True)}
+    for part in rest:
+        number, unit = number_and_unit(part) or (0.0, "")
+        if unit in _CAPACITORS and number > 0.0:
+            fall = _START_CHARGE / (number * _CAPACITORS[unit])
+            raise InputError(what, got=text, allowed="a supply without a capacitor: the start of a motor takes some 4 "
+                             f"mC (0.2 A for 20 ms), for which {part} falls by {fall:.2g} V; it cures spikes under a "
+                             "millisecond, and no model here knows it")
+        limits = unit in _LETTERS
+        name = "current_limit" if limits else "internal_resistance"
+        if not part or name in found or (limits and not number > 0.0):
+            raise InputError(what, got=text, allowed=_FORM)
+        found[name] = (quantity(what, part, "current", positive=True) if limits
+                       else quantity(f"{what}: resistance", part, "resistance", bare=True))
+    return found
+
+
+# --- The catalog: servo files that come with the package, and how a servo is found ------------------------------------
+
+def _servo_files() -> Path:
     return Path(str(resources.files("servotwin.parameters"))) / "catalog"
 
 
@@ -23,7 +130,7 @@ def catalog_names() -> tuple[str, ...]:
     >>> "hitec-hs-755hb" in catalog_names()
     True
     """
-    return tuple(sorted(path.stem for path in _folder().glob("*.toml")))
+    return tuple(sorted(path.stem for path in _servo_files().glob("*.toml")))
 
 
 def load_servo(name: str | Path) -> Servo:
@@ -60,4 +167,4 @@ def load_servo(name: str | Path) -> Servo:
             return read_servo_file(Path(text))
         raise UnknownNameError("servo", text, catalog_names(),
                                allowed="an id that `servotwin catalog list` shows, or a servo file")
-    return read_servo_file(_folder() / f"{text}.toml", name=f"catalog/{text}.toml")
+    return read_servo_file(_servo_files() / f"{text}.toml", name=f"catalog/{text}.toml")

@@ -2,31 +2,301 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+import warnings
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.errors import ParameterError, UnknownNameError
+import numpy as np
+
+from servotwin.errors import ParameterError, PlausibilityWarning, UnknownNameError
 from servotwin.look import escape, number, table
-from servotwin.parameters.firmware import Firmware
-from servotwin.parameters.group import Group
 from servotwin.parameters.groups import (
     GROUPS,
     Electronics,
+    Firmware,
     Friction,
     Gear,
+    Group,
     Motor,
     Potentiometer,
     Stops,
     Supply,
     Thermal,
 )
-from servotwin.parameters.plausible import warn_of
-from servotwin.parameters.quantity import SET_BY_USER, Quantity
 from servotwin.text import fault_of
-from servotwin.units import si_unit
+from servotwin.units import DIMENSIONS, factor, si_unit
+
+if TYPE_CHECKING:
+    from servotwin.parameters.groups import Plausible
+
+
+
+# --- A parameter with what is known about it: where it comes from, and how sure it is ---------------------------------
+
+SET_BY_USER = "set by the user"
+_SET = "set by "
+ORIGINS = ("measured", "identified", "datasheet", "literature", "assumed")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantity:
+    """A value in SI with unit, origin, source and spread.
+
+    Parameters
+    ----------
+    value : float, tuple of float or str
+    unit : str
+        SI unit; empty for words.
+    origin : str
+        One of measured, identified, datasheet, literature, assumed.
+    source : str, optional
+        Where it was read; only what is assumed may lack it.
+    std : float, optional
+        Standard error, in `unit`.
+    lower, upper : float, optional
+        Range, in `unit`.
+
+    Raises
+    ------
+    ParameterError
+        If the origin is unknown, a source is missing, or the spread does not fit the value.
+
+    Examples
+    --------
+    >>> Quantity(value=3.04, unit="ohm", origin="assumed", lower=2.75, upper=3.7).spread
+    '2.75 to 3.7'
+    """
+
+    value: float | tuple[float, ...] | str
+    unit: str
+    origin: str
+    source: str | None = None
+    std: float | None = None
+    lower: float | None = None
+    upper: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.origin not in ORIGINS:
+            raise ParameterError("origin", got=self.origin, allowed=", ".join(ORIGINS))
+        if not self.source and self.origin != "assumed":
+            raise ParameterError(f"source of a value that is {self.origin}", got="none",
+                                 allowed="a source; only what is assumed may lack it")
+        for name in ("std", "lower", "upper"):
+            bound = getattr(self, name)
+            if bound is not None and not math.isfinite(bound):
+                raise ParameterError(name, got=bound, allowed="a finite number")
+        if self.std is not None and (self.std < 0.0 or self.lower is not None or self.upper is not None):
+            raise ParameterError("std", got=self.std, allowed="at least 0, and either std or lower and upper")
+        if isinstance(self.value, float):
+            slack = 1e-12 * abs(self.value)
+            if self.lower is not None and self.lower > self.value + slack:
+                raise ParameterError("lower", got=self.lower, allowed=f"at most the value {self.value!r}")
+            if self.upper is not None and self.upper < self.value - slack:
+                raise ParameterError("upper", got=self.upper, allowed=f"at least the value {self.value!r}")
+
+    @property
+    def was_set(self) -> bool:
+        """Whether a person set it, by `Servo.replace` or `--set`, rather than a file assumed it."""
+        return self.origin == "assumed" and self.source is not None and self.source.startswith(_SET)
+
+    @property
+    def spread(self) -> str:
+        """The spread in words; empty where none is given."""
+        if self.std is not None:
+            return f"± {self.std:.4g}"
+        if self.lower is not None and self.upper is not None:
+            return f"{self.lower:z.4g} to {self.upper:z.4g}"
+        if self.lower is not None or self.upper is not None:
+            return f"from {self.lower:z.4g}" if self.lower is not None else f"up to {self.upper:z.4g}"
+        return ""
+
+
+# --- Numbers of motor and gear as the output shaft sees them, where only they matter ----------------------------------
+
+N = "gear.gear_reduction"
+
+
+class OutputSide(NamedTuple):
+    """A number at the output shaft.
+
+    Parameters
+    ----------
+    members : tuple of str
+        Dotted names of what stands for it at the motor shaft.
+    power : int
+        Of N that leads from there to the output.
+    dimension : str
+        Of `servotwin.units`.
+    meaning : str
+    """
+
+    members: tuple[str, ...]
+    power: int
+    dimension: str
+    meaning: str
+
+
+OUTPUT_SIDE: dict[str, OutputSide] = {
+    "output_torque_constant": OutputSide(
+        ("motor.torque_constant", "motor.back_emf_constant"), 1, "torque per current", "K_out = N k_a, k_b equal"),
+    "output_inertia": OutputSide(("motor.rotor_inertia",), 2, "inertia", "N² J_m"),
+    "output_viscous_friction": OutputSide(("motor.motor_viscous_friction",), 2, "torque per speed", "N² B_m"),
+    "output_coulomb_torque": OutputSide(
+        ("friction.coulomb_torque_forward", "friction.coulomb_torque_backward"), 1, "torque", "N F_c, both ways"),
+    "output_coulomb_torque_forward": OutputSide(("friction.coulomb_torque_forward",), 1, "torque", "N F_ec1"),
+    "output_coulomb_torque_backward": OutputSide(("friction.coulomb_torque_backward",), 1, "torque", "N F_ec2"),
+    "output_stribeck_speed": OutputSide(("friction.stribeck_speed",), -1, "output speed", "v_s/N"),
+}
+"""By name. What moves at the output stays the same when N changes and these do not."""
+
+
+def output_value(servo: Servo, name: str) -> float | None:
+    """Return a number at the output shaft (SI), the mean where it has several members; None where one is missing.
+
+    Examples
+    --------
+    >>> from servotwin.parameters import load_servo
+    >>> round(output_value(load_servo("hitec-hs-755hb"), "output_torque_constant"), 4)
+    1.0396
+    """
+    side = OUTPUT_SIDE[name]
+    found = [servo.get(member) for member in side.members]
+    reduction = servo.get(N)
+    if any(not isinstance(value, int | float) for value in (*found, reduction)):
+        return None
+    return float(np.mean(np.array(found, dtype=np.float64))) * float(reduction) ** side.power  # type: ignore[arg-type]
+
+
+def motor_side(values: Mapping[str, Any], reduction: Any) -> dict[str, Any]:
+    """Return the members (SI, dotted names) of numbers at the output shaft; numbers or arrays.
+
+    Parameters
+    ----------
+    values : mapping
+        By name in `OUTPUT_SIDE` (SI).
+    reduction : float or array
+        N [1].
+
+    Examples
+    --------
+    >>> motor_side({"output_inertia": 8.0}, 2.0)
+    {'motor.rotor_inertia': 2.0}
+    """
+    return {member: value / reduction**OUTPUT_SIDE[name].power
+            for name, value in values.items() for member in OUTPUT_SIDE[name].members}
+
+
+# --- Whether the numbers of a servo lie where those of servos do ------------------------------------------------------
+
+AT_OUTPUT = {member: side.power for side in OUTPUT_SIDE.values() for member in side.members}
+"""Parameters whose range holds at the output shaft, and the power of the reduction N that leads there.
+
+Behind a reduction of 1 a servo file may give its motor as the output shaft sees it.
+"""
+
+_SMALLEST = 1e-5  # of the high end: what is smaller in another unit is hardly meant
+_CELSIUS = 273.15
+
+
+def plausible_range(name: str, reduction: float | None = None) -> Plausible | None:
+    """Return between which numbers (SI) a parameter is plausible; None of a word.
+
+    Parameters
+    ----------
+    name : str
+        Dotted.
+    reduction : float, optional
+        Of the servo's gear; unless given, the range of a parameter of `AT_OUTPUT` is that at the output shaft [1].
+
+    Examples
+    --------
+    >>> plausible_range("electronics.deadband")[:2], plausible_range("motor.torque_constant", 300.0)[1]
+    ((1e-07, 0.0005), 0.1)
+    """
+    group, _, key = name.partition(".")
+    found: Plausible | None = GROUPS[group].__dataclass_fields__[key].metadata["plausible"]
+    if found is None or reduction is None or name not in AT_OUTPUT:
+        return found
+    by = reduction ** AT_OUTPUT[name]
+    return found._replace(low=found.low / by, high=found.high / by)
+
+
+def oddity(servo: Servo, name: str, unit: str | None = None) -> str | None:
+    """Return in one line what is odd about a value of a servo, and which unit was probably meant; None of another.
+
+    0 is never odd: it says that an effect is off.
+
+    Parameters
+    ----------
+    servo : Servo
+    name : str
+        Dotted; of a parameter that the servo gives.
+    unit : str, optional
+        In which it was given; the SI unit unless given.
+
+    Examples
+    --------
+    >>> from servotwin.parameters.servo import servo_from_values
+    >>> import warnings
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("ignore")
+    ...     servo = servo_from_values("mine", {"electronics": {"deadband": 8.0}})
+    >>> oddity(servo, "electronics.deadband")
+    'mine: electronics.deadband of 8 s is not plausible (1e-07 to 0.0005 s): 8 us?'
+    """
+    reduction = servo.gear.gear_reduction
+    found, value = plausible_range(name, reduction), servo.get(name)
+    if found is None or value is None or isinstance(value, str):
+        return None
+    values = value if isinstance(value, tuple) else (value,)
+    odd = next((one for one in values if one != 0.0 and not found.low <= one <= found.high), None)
+    if odd is None:
+        return None
+    group, _, key = name.partition(".")
+    dimension = str(GROUPS[group].__dataclass_fields__[key].metadata["dimension"])
+    given = si_unit(dimension) if unit is None else unit
+    number, by = odd / factor(given, dimension), factor(given, dimension)
+    behind = f" behind a reduction of {reduction:g}" if name in AT_OUTPUT and reduction is not None else ""
+    meant = _meant(number, given, dimension, found)
+    shown = "" if given == "1" else f" {given}"
+    return (f"{servo.name}: {name} of {number:.6g}{shown} is not plausible ({found.low / by:.4g} to "
+            f"{found.high / by:.4g}{shown}{behind})" + (f": {number:.6g} {meant}?" if meant else ""))
+
+
+def warn_of(servo: Servo, names: Iterable[str], unit: Callable[[str], str | None] = lambda name: None, *,
+            stacklevel: int = 3) -> None:
+    """Warn of each value that is not plausible.
+
+    Parameters
+    ----------
+    servo : Servo
+    names : iterable of str
+        Dotted; those that the servo does not give are passed over.
+    unit : callable
+        Says in which unit one was given; None: in SI.
+    stacklevel : int
+        As in `warnings.warn`, counted from here; 3 is the caller of the caller.
+    """
+    for name in names:
+        text = oddity(servo, name, unit(name))
+        if text is not None:
+            warnings.warn(text, PlausibilityWarning, stacklevel=stacklevel)
+
+
+def _meant(number: float, given: str, dimension: str, within: Plausible) -> str:
+    """Return the first other unit in which a number is plausible; empty where there is none."""
+    if dimension == "temperature":
+        return "deg C" if within.low <= number + _CELSIUS <= within.high else ""
+    least = _SMALLEST * max(abs(within.low), within.high)
+    return next((unit for unit, by in DIMENSIONS[dimension].items() if unit not in (given, "%")
+                 and within.low <= number * by <= within.high and abs(number) * by >= least), "")
+
+
+# --- A servo: its parameter groups, and for every number where it comes from ------------------------------------------
 
 Value = float | tuple[float, ...] | str
 KINDS = ("analog", "digital", "bus")

@@ -4,23 +4,276 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from servotwin import units
-from servotwin.errors import InputError, ParameterError, ServoFileError, UnitError, UnknownNameError
-from servotwin.parameters.group import Group
-from servotwin.parameters.groups import GROUPS
+from servotwin.errors import InputError, ParameterError, ServoFileError, ServotwinError, UnitError, UnknownNameError
+from servotwin.parameters.groups import GROUPS, Group
 from servotwin.parameters.output_file import write_file
-from servotwin.parameters.plausible import warn_of
-from servotwin.parameters.quantity import ORIGINS, Quantity
-from servotwin.parameters.servo import KINDS, Servo, unit_of
-from servotwin.parameters.sheet_table import voltage_range
+from servotwin.parameters.servo import KINDS, ORIGINS, Quantity, Servo, unit_of, warn_of
 from servotwin.text import fault_of, load_toml
 
 if TYPE_CHECKING:
     import tomlkit
+
+
+
+# --- The table [sheet] of a servo file: the figures that a maker prints, each with unit and source --------------------
+
+ELSE = "also_at"
+"""Key of the rows with figures at other voltages and of other sources."""
+
+# key of the file -> name, dimension, unit; a speed is printed as the time for 60 degrees
+POINT = {"supply_voltage": ("supply_voltage", "voltage", "V"), "stall_torque": ("stall_torque", "torque", "N m"),
+         "speed_per_60deg": ("no_load_speed", "time", "s"), "no_load_current": ("no_load_current", "current", "A"),
+         "stall_current": ("stall_current", "current", "A"), "idle_current": ("idle_current", "current", "A")}
+WHOLE = {"voltage_min": ("voltage_min", "voltage", "V"), "voltage_max": ("voltage_max", "voltage", "V"),
+         "deadband": ("deadband", "time", "us"), "pulse_min": ("pulse_min", "time", "us"),
+         "pulse_max": ("pulse_max", "time", "us"), "neutral_pulse": ("neutral_pulse", "time", "us"),
+         "travel": ("travel", "angle", "deg"), "travel_per_400us": ("angle_per_pulse", "angle", "deg"),
+         "stop_travel": ("stop_travel", "angle", "deg"), "backlash": ("backlash", "angle", "deg"),
+         "gear_reduction": ("gear_reduction", "number", "1"), "mass": ("mass", "mass", "g")}
+_SPREADS = ("std", "lower", "upper")
+_TWO = "two positive voltages, the lower one first"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Figure:
+    """A printed figure in SI; a speed as such, and not as the time for 60 degrees.
+
+    Parameters
+    ----------
+    value : float
+    source : str
+    std, lower, upper : float, optional
+        How far servos of this kind scatter about it, where the file says so.
+    """
+
+    value: float
+    source: str
+    std: float | None = None
+    lower: float | None = None
+    upper: float | None = None
+
+
+def printed(key: str, value: float) -> float:
+    """Return a value (SI) as sheets print it, still in SI; for speeds it is its own inverse.
+
+    Examples
+    --------
+    >>> round(printed("speed_per_60deg", printed("speed_per_60deg", 4.0)), 12)
+    4.0
+    """
+    return math.pi / 3.0 / value if key == "speed_per_60deg" else value * 400e-6 if key == "travel_per_400us" else value
+
+
+def figure(servo: str, key: str, entry: Any) -> Figure | None:
+    """Return a figure of a table [sheet]; None where it is assumed, written by hand for what is not printed.
+
+    Parameters
+    ----------
+    servo : str
+        Name of the servo, for errors.
+    key : str
+        One of `POINT` and `WHOLE`.
+    entry : mapping
+        With value, unit and source; std, or lower and upper, are the spread of the figure.
+
+    Raises
+    ------
+    InputError
+        If it is no figure, or its spread does not fit it.
+
+    Examples
+    --------
+    >>> found = figure("mine", "speed_per_60deg", {"value": 0.23, "unit": "s", "source": "the box"})
+    >>> round(found.value, 3)
+    4.553
+    """
+    _, dimension, unit = {**POINT, **WHOLE}[key]
+    if isinstance(entry, Mapping) and str(entry.get("source", "")).startswith("assumed"):
+        return None
+    try:
+        value = units.to_si(float(entry["value"]), str(entry["unit"]), dimension)
+        spread = {name: units.to_si(float(entry[name]), str(entry["unit"]), dimension)
+                  for name in _SPREADS if name in entry}
+        if not math.isfinite(value):
+            raise ValueError
+    except (KeyError, TypeError, ValueError, ServotwinError):
+        raise InputError(f"[sheet] {key} of {servo!r}", got=entry,
+                         allowed=f'{{ value = ..., unit = "{unit}", source = "..." }}') from None
+    _check_spread(f"[sheet] {key} of {servo!r}", value, spread)
+    source = str(entry.get("source", ""))
+    if key == "speed_per_60deg" and value > 0.0:
+        speed = printed(key, value)
+        std = speed * spread["std"] / value if "std" in spread else None
+        ends = {new: printed(key, spread[old]) for new, old in (("lower", "upper"), ("upper", "lower"))
+                if old in spread}
+        return Figure(value=speed, source=source, std=std, **ends)
+    by = 400e-6 if key == "travel_per_400us" else 1.0
+    return Figure(value=value / by, source=source, **{name: x / by for name, x in spread.items()})
+
+
+def voltage_range(servo: str, table: Mapping[str, Any]) -> tuple[float, float] | None:
+    """Return the lowest and the highest supply voltage that a maker states for operation [V]; None where not stated.
+
+    Raises
+    ------
+    InputError
+        If the table has one end only, or one that is no voltage, or the low one is above the high one.
+
+    Examples
+    --------
+    >>> volts = {"voltage_min": {"value": 4.8, "unit": "V"}, "voltage_max": {"value": 7200, "unit": "mV"}}
+    >>> voltage_range("mine", volts)
+    (4.8, 7.2)
+    """
+    low, high = (figure(servo, key, table[key]) if key in table else None for key in ("voltage_min", "voltage_max"))
+    check_voltages(f"[sheet] voltage_min and voltage_max of {servo!r}", None if low is None else low.value,
+                   None if high is None else high.value)
+    return None if low is None or high is None else (low.value, high.value)
+
+
+def check_voltages(what: str, low: float | None, high: float | None) -> None:
+    """Raise an InputError if these are not the two ends of a range of voltages [V], or None both."""
+    if low is None or high is None:
+        if low is not high:
+            raise InputError(what, got="one end alone", allowed=_TWO)
+    elif not 0.0 < low <= high:
+        raise InputError(what, got=f"{low:g} to {high:g} V", allowed=_TWO)
+
+
+def _check_spread(what: str, value: float, spread: Mapping[str, float]) -> None:
+    std, lower, upper = (spread.get(name) for name in _SPREADS)
+    if std is not None and (not 0.0 <= std < math.inf or lower is not None or upper is not None):
+        raise InputError(f"{what}: std", got=std, allowed="at least 0, and either std or lower and upper")
+    if lower is not None and not 0.0 < lower <= value:
+        raise InputError(f"{what}: lower", got=lower, allowed=f"positive and at most the value {value!r} (SI)")
+    if upper is not None and not value <= upper < math.inf:
+        raise InputError(f"{what}: upper", got=upper, allowed=f"at least the value {value!r} (SI)")
+
+
+# --- What a maker prints of a servo: the [sheet] of its file as numbers -----------------------------------------------
+
+_FIGURES = {**POINT, **WHOLE}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PrintedPoint:
+    """What is printed for one supply voltage; None is not printed.
+
+    Parameters
+    ----------
+    supply_voltage : float, optional
+        [V].
+    stall_torque : float, optional
+        [N m].
+    time_60 : float, optional
+        Time for 60 degrees without load [s].
+    no_load_current, stall_current : float, optional
+        [A].
+    """
+
+    supply_voltage: float | None
+    stall_torque: float | None
+    time_60: float | None
+    no_load_current: float | None
+    stall_current: float | None
+
+
+def printed_fact(table: Mapping[str, Any], key: str) -> float | None:
+    """Return a figure of a table of a sheet (SI) by its key in the file, such as "mass"; None where it is not one.
+
+    Unlike `sheet_table.figure`, which computes with it, this shows what is there: a person's own [sheet] may hold
+    anything.
+
+    Examples
+    --------
+    >>> from servotwin.parameters import load_servo
+    >>> printed_fact(load_servo("towerpro-mg996r").sheet, "mass")
+    0.055
+    """
+    entry = table.get(key)
+    if not isinstance(entry, dict) or not isinstance(entry.get("value"), int | float):
+        return None
+    try:
+        value = units.to_si(entry["value"], str(entry.get("unit")), _FIGURES[key][1])
+    except ServotwinError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def printed_points(servo: Servo) -> tuple[PrintedPoint, ...]:
+    """Return what is printed at each voltage, the sheet's main one first; a voltage may come from several sources.
+
+    Examples
+    --------
+    >>> from servotwin.parameters import load_servo
+    >>> [point.stall_torque for point in printed_points(load_servo("emax-es08a"))]
+    [0.177, 0.147]
+    """
+    others = servo.sheet.get(ELSE)
+    tables = [servo.sheet, *(others if isinstance(others, list) else [])]
+    return tuple(_point(table) for table in tables if isinstance(table, Mapping))
+
+
+def operating_voltages(servo: Servo) -> tuple[float, float] | None:
+    """Return the lowest and the highest supply voltage that the maker states for operation; None where not stated [V].
+
+    Raises
+    ------
+    InputError
+        As of `sheet_table.voltage_range`; files are checked when they are read.
+
+    Examples
+    --------
+    >>> from servotwin.parameters import load_servo
+    >>> [operating_voltages(load_servo(name)) for name in ("towerpro-mg996r", "gobilda-2000-135")]
+    [(4.8, 7.2), None]
+    """
+    return voltage_range(servo.name, servo.sheet)
+
+
+def sheet_voltages(servo: Servo) -> tuple[float, float] | None:
+    """Return the lowest and the highest supply voltage of a sheet; None where it has none [V].
+
+    Those that the maker states for operation, else those that figures are printed for.
+
+    Examples
+    --------
+    >>> from servotwin.parameters import load_servo
+    >>> [sheet_voltages(load_servo(name)) for name in ("towerpro-mg996r", "gobilda-2000-135")]
+    [(4.8, 7.2), (4.8, 7.4)]
+    """
+    printed = [point.supply_voltage for point in printed_points(servo) if point.supply_voltage]
+    return operating_voltages(servo) or ((min(printed), max(printed)) if printed else None)
+
+
+def printed_flags(servo: Servo) -> tuple[str, ...]:
+    """Return what the [sheet] says of itself: what it lacks, and where it contradicts itself.
+
+    Examples
+    --------
+    >>> from servotwin.parameters import servo_from_values
+    >>> printed_flags(servo_from_values("mine", {}))
+    ()
+    """
+    found = servo.sheet.get("flags")
+    return tuple(flag for flag in found if isinstance(flag, str)) if isinstance(found, list) else ()
+
+
+def _point(table: Mapping[str, Any]) -> PrintedPoint:
+    return PrintedPoint(
+        supply_voltage=printed_fact(table, "supply_voltage"),
+        stall_torque=printed_fact(table, "stall_torque"),
+        time_60=printed_fact(table, "speed_per_60deg"),
+        no_load_current=printed_fact(table, "no_load_current"),
+        stall_current=printed_fact(table, "stall_current"))
+
+
+# --- Servo files: TOML with one table per group, each value with unit, origin, source and spread ----------------------
 
 _ENTRY_KEYS = ("value", "unit", "origin", "source", "std", "lower", "upper")
 _TOP_KEYS = ("name", "title", "kind", "notes", "sheet", "fit", *GROUPS)

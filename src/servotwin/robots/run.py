@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, SimulationError, UnknownNameError
 from servotwin.models import Model
 from servotwin.parameters.groups import Supply
-from servotwin.parameters.registers.robots import as_robot_has_it, said_of, set_of_robot
+from servotwin.parameters.registers.held import as_robot_has_it, said_of, set_of_robot
 from servotwin.robots.command_map import unused_ranges
 from servotwin.robots.contacts import fall_of, leave_out, links_of, overlap_words, overlaps, robot_bodies
 from servotwin.robots.coupling import couple, couplings_of, led

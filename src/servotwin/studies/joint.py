@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.parameters import Quantity, Servo
-from servotwin.parameters.output_side import OUTPUT_SIDE, N, motor_side, output_value
-from servotwin.parameters.sheet_table import ELSE, Figure, figure
+from servotwin.parameters.servo import OUTPUT_SIDE, N, motor_side, output_value
+from servotwin.parameters.servo_file import ELSE, Figure, figure
 from servotwin.physics import (
     averaged_bridge_gain,
     load_share,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from servotwin import parameters
 from servotwin.errors import InputError, ParameterError, UnknownNameError
 from servotwin.loads import Load, as_load
-from servotwin.parameters.group import AT_LEAST_ONE, FRACTION, NOT_NEGATIVE, POSITIVE
+from servotwin.parameters.groups import AT_LEAST_ONE, FRACTION, NOT_NEGATIVE, POSITIVE
 from servotwin.simulation.lanes.inputs import _PARTS, LOAD_NAMES, check_name, lanes_of
 from servotwin.simulation.lanes.packing import Chunk, Commands, groups
 from servotwin.simulation.progress import memory_limit

@@ -8,8 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import ClassVar
 
 from servotwin.models import DigitalServo
-from servotwin.parameters.registers.register import Register, is_read_only
-from servotwin.parameters.registers.table import Family, written
+from servotwin.parameters.registers.table import Family, Register, is_read_only, written
 from servotwin.wire.twins import Crew, Seen
 
 # --- The memory of a servo: bytes by address, and the registers that lie in them --------------------------------------

@@ -6,9 +6,8 @@ from collections.abc import Callable
 from typing import ClassVar
 
 from servotwin.models import DigitalServo
-from servotwin.parameters.registers.feetech import REGISTERS, sts_family
-from servotwin.parameters.registers.feetech_models import STS_MODELS
-from servotwin.parameters.registers.model import model_for
+from servotwin.parameters.registers.feetech import REGISTERS, STS_MODELS, sts_family
+from servotwin.parameters.registers.table import model_for
 from servotwin.wire.device import COUNT, LANDED, MIDDLE, TURN, Device
 from servotwin.wire.twins import finite
 

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, MissingExtraError, ServotwinError
 from servotwin.models import DigitalServo
-from servotwin.parameters.firmware import Firmware
-from servotwin.parameters.groups import Supply
+from servotwin.parameters.groups import Firmware, Supply
 from servotwin.robots.servo_groups import OF_THE_BUS, differing, of_one_form
 from servotwin.simulation import VectorSimulator
 

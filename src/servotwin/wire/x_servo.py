@@ -6,9 +6,8 @@ from collections.abc import Callable
 from typing import ClassVar
 
 from servotwin.models import DigitalServo
-from servotwin.parameters.registers.dynamixel_x import FULL, REGISTERS, SPEED, x_family
-from servotwin.parameters.registers.dynamixel_x_models import X_MODELS
-from servotwin.parameters.registers.model import model_for
+from servotwin.parameters.registers.dynamixel_x import FULL, REGISTERS, SPEED, X_MODELS, x_family
+from servotwin.parameters.registers.table import model_for
 from servotwin.wire.device import COUNT, LANDED, MIDDLE, Device
 from servotwin.wire.twins import finite
 

@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 from bench_made import unpacked
-from servotwin.web.alone import kernel
+from servotwin.web.alone import page
 
 
 @pytest.fixture(scope="session")
@@ -15,5 +15,5 @@ def folder(tmp_path_factory):
         pytest.skip("no node")
     try:
         return unpacked(tmp_path_factory.mktemp("page"))
-    except kernel.NoCompilerError as error:
+    except page.NoCompilerError as error:
         pytest.skip(str(error))

@@ -10,7 +10,7 @@ from bench_made import in_node
 from servotwin.errors import InputError
 from servotwin.logs import read_logs
 from servotwin.web.live import read_scene
-from servotwin.web.live.beginning import load_of, models_of
+from servotwin.web.live.live_bench import load_of, models_of
 from servotwin.web.live.overlay import compared, of_the_bench
 from servotwin.web.server.own import reading
 

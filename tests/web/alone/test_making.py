@@ -14,9 +14,9 @@ from servotwin.models.state.records import put_fields, record_of
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.parameters import catalog_names
 from servotwin.web.live import Scene, SceneServo
-from servotwin.web.live.beginning import load_of, models_of
-from servotwin.web.live.commands import checked_command, command_signal
-from servotwin.web.live.scene_servo import SERVO_MODELS
+from servotwin.web.live.actions import checked_command, command_signal
+from servotwin.web.live.live_bench import load_of, models_of
+from servotwin.web.live.scene import SERVO_MODELS
 
 LOAD = {"inertia": 1e-4, "viscous_friction": 1e-3, "torque": 0.1, "coulomb_torque": 0.02, "mass": 0.1, "arm": 0.2,
         "hanging_angle": 0.3}

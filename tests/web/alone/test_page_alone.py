@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 import servotwin.web
 from servotwin.cli.app import app
-from servotwin.web.alone import kernel
+from servotwin.web.alone import page
 from servotwin.web.alone.page import modules
 
 JS = Path(servotwin.web.__file__).parent / "alone" / "js"
@@ -47,8 +47,8 @@ def test_what_cannot_be_written_is_said_in_a_line(tmp_path, monkeypatch):
         assert done.exit_code != 0
         assert words in str(done.exception or done.output)
     assert there.read_text() == "mine"
-    kernel.module.cache_clear()
-    monkeypatch.setattr(kernel, "compilers", tuple)
+    page.module.cache_clear()
+    monkeypatch.setattr(page, "compilers", tuple)
     done = exported(tmp_path / "a.html")
     assert re.search(r"no compiler makes WebAssembly \(no C compiler\): install .* ziglang", str(done.exception))
     assert [path.name for path in tmp_path.iterdir()] == ["there.html"]
@@ -59,7 +59,7 @@ def test_a_bench_as_a_file_is_small_and_asks_for_nothing(tmp_path):
     name = "</script><script>document.title = 'planted'</script>"
     (tmp_path / "scene.toml").write_text(f'format = 1\nname = "{name}"\n[[servo]]\nid = "hitec-hs-755hb"\n')
     done = exported(tmp_path / "a.html", "--scene", tmp_path / "scene.toml")
-    if isinstance(done.exception, kernel.NoCompilerError):
+    if isinstance(done.exception, page.NoCompilerError):
         pytest.skip(str(done.exception))
     assert done.exit_code == 0, done.exception
     text = (tmp_path / "a.html").read_text()

@@ -8,8 +8,8 @@ import pytest
 import servotwin as st
 from servotwin.errors import ServotwinError
 from servotwin.parameters import catalog_names
-from servotwin.web.alone.register_tables import register_tables
-from servotwin.web.live.scene_servo import family_of, with_registers
+from servotwin.web.alone.pack import register_tables
+from servotwin.web.live.scene import family_of, with_registers
 
 SERVOS = [name for name in catalog_names() if family_of(st.load_servo(name)) is not None]
 

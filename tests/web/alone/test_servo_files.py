@@ -11,7 +11,7 @@ from servotwin.errors import ServotwinError
 from servotwin.parameters import catalog_names
 from servotwin.parameters.servo_file import read_servo_text, servo_text
 from servotwin.web.live import Scene, SceneServo
-from servotwin.web.live.beginning import models_of
+from servotwin.web.live.live_bench import models_of
 
 
 def scene_of(text):

@@ -4,7 +4,7 @@ import pytest
 
 from servotwin.errors import InputError
 from servotwin.web.live import LiveBench, Scene, SceneServo
-from servotwin.web.live.chosen import with_servos
+from servotwin.web.live.scene import with_servos
 
 SCENE = Scene(servos=(SceneServo(mystery=7, model="PulseServo"),), load={"inertia": 1e-3}, frame_rate=100.0)
 

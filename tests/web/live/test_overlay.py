@@ -8,10 +8,9 @@ from servotwin.errors import InputError
 from servotwin.parameters.servo_file import servo_text
 from servotwin.web.lessons import mystery
 from servotwin.web.live import LiveBench, Scene, SceneServo, read_scene
-from servotwin.web.live.export import exported
 from servotwin.web.live.overlay import compared, of_the_bench, shown
-from servotwin.web.live.scene import MOST_SERVOS
-from servotwin.web.live.taken_over import taken_over
+from servotwin.web.live.replay import exported
+from servotwin.web.live.scene import MOST_SERVOS, taken_over
 
 ID = "hitec-hs-755hb"
 STEP = {"shape": "step", "unit": "us", "low": 1300.0, "high": 1700.0, "period": 1.0}

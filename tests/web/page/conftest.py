@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from servotwin.web.alone.kernel import NoCompilerError
+from servotwin.web.alone.page import NoCompilerError
 from servotwin.web.alone.page import page as one_file
-from servotwin.web.server.first import first_scene
+from servotwin.web.server.serve import first_scene
 
 HERE = Path(__file__).parent
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")

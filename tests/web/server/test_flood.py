@@ -11,7 +11,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 
 from servotwin.web.live.actions import KINDS
-from servotwin.web.server.words import WORDS
+from servotwin.web.server.visitor import WORDS
 from web_talk import Deaf, Page, framed, running
 
 pytestmark = pytest.mark.slow

@@ -4,7 +4,7 @@ import pytest
 
 from servotwin.web.lessons import lessons as taught
 from servotwin.web.live import LiveBench
-from servotwin.web.server.stint import Stint
+from servotwin.web.server.session import Stint
 
 
 @pytest.mark.parametrize("name", ["deadband", "droop", "frames"])

@@ -12,15 +12,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from servotwin.errors import BenchError
-from servotwin.parameters.registers.dynamixel_one import AX_REGISTERS, MX_REGISTERS
-from servotwin.parameters.registers.dynamixel_one_models import AX_MODELS, MX_MODELS, OneModel
-from servotwin.parameters.registers.dynamixel_x import FULL, SPEED
+from servotwin.parameters.registers.dynamixel_one import AX_MODELS, AX_REGISTERS, MX_MODELS, MX_REGISTERS, OneModel
+from servotwin.parameters.registers.dynamixel_x import FULL, SPEED, X_MODELS, XModel
 from servotwin.parameters.registers.dynamixel_x import REGISTERS as X_REGISTERS
-from servotwin.parameters.registers.dynamixel_x_models import X_MODELS, XModel
 from servotwin.parameters.registers.feetech import REGISTERS as STS_REGISTERS
-from servotwin.parameters.registers.feetech_models import STS_MODELS
-from servotwin.parameters.registers.model import RegisterModel
-from servotwin.parameters.registers.register import Register, laid
+from servotwin.parameters.registers.feetech import STS_MODELS
+from servotwin.parameters.registers.table import Register, RegisterModel, laid
 
 # --- How the registers of bus servos lie in their memory: address, bytes, sign ----------------------------------------
 

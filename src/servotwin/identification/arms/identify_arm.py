@@ -58,9 +58,8 @@ from servotwin.identification.fitting.registers import searched as registers_sea
 from servotwin.identification.fitting.stopping import Stops, Within
 from servotwin.models import Model, default_model
 from servotwin.parameters import Servo, Supply, load_servo
-from servotwin.parameters.output_side import OUTPUT_SIDE
-from servotwin.parameters.quantity import Quantity
-from servotwin.parameters.registers.robots import as_robot_has_it, said_of, set_of_robot
+from servotwin.parameters.registers.held import as_robot_has_it, said_of, set_of_robot
+from servotwin.parameters.servo import OUTPUT_SIDE, Quantity
 from servotwin.robots import Motion, Mount, RobotValidation, joint_names, robot_model, validate_robot
 from servotwin.robots.contacts import leave_out_measured
 from servotwin.robots.coupling import couplings_of

@@ -23,8 +23,8 @@ from servotwin.logs.bam_convention import writes_gain
 from servotwin.logs.log import KINDS, Log
 from servotwin.models import BoundedServo, DigitalServo, Model
 from servotwin.parameters import Servo
-from servotwin.parameters.output_side import N
 from servotwin.parameters.registers import REGISTER_FAMILIES
+from servotwin.parameters.servo import N
 from servotwin.signals.shapes import held_pulses, sampled
 from servotwin.units import is_finite
 

@@ -40,7 +40,7 @@ from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.lanes import LogLanes
 from servotwin.logs.log import Log
 from servotwin.models import DigitalServo, Model
-from servotwin.parameters.output_side import output_value
+from servotwin.parameters.servo import output_value
 from servotwin.signals import Signal
 
 Array = NDArray[np.float64]

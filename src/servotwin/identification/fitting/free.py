@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, ParameterError, UnknownNameError
 from servotwin.models import Model
 from servotwin.parameters import GROUPS, Servo
-from servotwin.parameters.firmware import MOST_WAITING
-from servotwin.parameters.output_side import OUTPUT_SIDE, N, motor_side, output_value
-from servotwin.parameters.servo import check_name, unit_of
+from servotwin.parameters.groups import MOST_WAITING
+from servotwin.parameters.servo import OUTPUT_SIDE, N, check_name, motor_side, output_value, unit_of
 from servotwin.simulation.lanes.inputs import LOAD_NAMES
 from servotwin.units import is_finite, si_unit
 

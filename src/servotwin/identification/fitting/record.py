@@ -16,8 +16,7 @@ from servotwin.identification.fitting.fit import LEAST_SHARE
 from servotwin.identification.fitting.free import LUMPED, FreeParameter, Space
 from servotwin.logs.log import Log
 from servotwin.parameters import Servo
-from servotwin.parameters.output_side import N
-from servotwin.parameters.quantity import Quantity
+from servotwin.parameters.servo import N, Quantity
 from servotwin.simulation.lanes.inputs import LOAD_NAMES
 
 if TYPE_CHECKING:

@@ -26,10 +26,17 @@ from servotwin.logs.bam_convention import writes_gain
 from servotwin.logs.log import Log
 from servotwin.models import DigitalServo, Model
 from servotwin.parameters import Servo
-from servotwin.parameters.registers.held import register_family_of
-from servotwin.parameters.registers.robots import as_robot_has_it, said_of, set_of_robot
-from servotwin.parameters.registers.sets import SETS, VARIED, RegisterSet, Varied
-from servotwin.parameters.registers.table import family_label, known_registers, set_registers, written
+from servotwin.parameters.registers.held import as_robot_has_it, register_family_of, said_of, set_of_robot
+from servotwin.parameters.registers.table import (
+    SETS,
+    VARIED,
+    RegisterSet,
+    Varied,
+    family_label,
+    known_registers,
+    set_registers,
+    written,
+)
 
 Array = NDArray[np.float64]
 Lanes = Callable[[Sequence[int], Array], list[tuple[Array, Array]]]

@@ -14,7 +14,7 @@ from typing import Any
 from servotwin import units
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.parameters import GROUPS, KINDS, REGISTER_FAMILIES, Quantity, Servo, dimension_of, unit_of, write_file
-from servotwin.parameters.sheet_table import ELSE, POINT, WHOLE, check_voltages, figure, printed
+from servotwin.parameters.servo_file import ELSE, POINT, WHOLE, check_voltages, figure, printed
 from servotwin.tables import read_table
 from servotwin.text import checked_name
 

@@ -135,7 +135,7 @@ def _start(firm: Any, w: float) -> None:
 
 # --- One tick of a digital servo: measure, follow the profile, compute the law, limit, protect ------------------------
 
-WAITING = 16  # duties that may wait, see `parameters.firmware.MOST_WAITING`
+WAITING = 16  # duties that may wait, see `parameters.groups.MOST_WAITING`
 Duties = tuple[float, float, float, float, float, float, float, float, float, float, float, float, float, float, float,
                float]
 NOWHERE = math.inf  # where no goal has been given

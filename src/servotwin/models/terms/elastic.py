@@ -17,7 +17,7 @@ from servotwin.models.state.modes import PUSH_BACKWARD, PUSH_FORWARD, SPRUNG, Ve
 from servotwin.models.terms.dependence import ON_Q, SPRING, TWO_BODIES
 from servotwin.models.terms.given import Given, Hung, either, is_given
 from servotwin.models.terms.shaft import Shaft
-from servotwin.parameters.group import Relation
+from servotwin.parameters.groups import Relation
 from servotwin.physics.shaft import stretch_beyond_play, twist_torque
 
 READS = ("gear.backlash", "gear.stiffness", "gear.damping")

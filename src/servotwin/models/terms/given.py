@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from servotwin.parameters.group import Group
-from servotwin.parameters.groups import GROUPS
+from servotwin.parameters.groups import GROUPS, Group
 
 if TYPE_CHECKING:
     from servotwin.loads import Load

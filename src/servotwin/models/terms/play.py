@@ -10,7 +10,7 @@ from servotwin.models.state.modes import INSIDE, ON_BACKWARD, ON_FORWARD, Vector
 from servotwin.models.terms.dependence import PLAY, TWO_BODIES
 from servotwin.models.terms.given import Given, either, is_given
 from servotwin.models.terms.shaft import Shaft
-from servotwin.parameters.group import Relation
+from servotwin.parameters.groups import Relation
 from servotwin.physics.backlash import impact_speed
 from servotwin.physics.gear import output_torque
 from servotwin.physics.laws import array_form

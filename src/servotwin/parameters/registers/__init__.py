@@ -3,9 +3,8 @@
 from pathlib import Path
 from typing import Protocol
 
-from servotwin.parameters.registers.dynamixel_one import dynamixel_ax, dynamixel_mx
+from servotwin.parameters.registers.dynamixel_one import dynamixel_ax, dynamixel_mx, dynamixel_xl320
 from servotwin.parameters.registers.dynamixel_x import dynamixel_x
-from servotwin.parameters.registers.dynamixel_xl320 import dynamixel_xl320
 from servotwin.parameters.registers.feetech import feetech_sts
 from servotwin.parameters.registers.table import Given
 from servotwin.parameters.servo import Servo

@@ -8,13 +8,16 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from servotwin.errors import UnknownNameError
-from servotwin.parameters.registers.dynamixel_one import ax_family, mx_family
-from servotwin.parameters.registers.dynamixel_one_models import AX_MODELS, MX_MODELS
-from servotwin.parameters.registers.dynamixel_x import x_family
-from servotwin.parameters.registers.dynamixel_x_models import X_MODELS
-from servotwin.parameters.registers.dynamixel_xl320 import XL320_MODELS, xl320_family
-from servotwin.parameters.registers.feetech import sts_family
-from servotwin.parameters.registers.feetech_models import STS_MODELS
+from servotwin.parameters.registers.dynamixel_one import (
+    AX_MODELS,
+    MX_MODELS,
+    XL320_MODELS,
+    ax_family,
+    mx_family,
+    xl320_family,
+)
+from servotwin.parameters.registers.dynamixel_x import X_MODELS, x_family
+from servotwin.parameters.registers.feetech import STS_MODELS, sts_family
 from servotwin.parameters.registers.table import Family
 
 _FAMILIES: dict[str, tuple[Callable[[Any], Family], tuple[Any, ...]]] = {

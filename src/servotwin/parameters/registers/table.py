@@ -4,20 +4,341 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from numbers import Real
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from servotwin.errors import ParameterError, UnknownNameError
 from servotwin.parameters.catalog import load_servo
-from servotwin.parameters.firmware import Firmware
-from servotwin.parameters.group import FRACTION
-from servotwin.parameters.quantity import Quantity
-from servotwin.parameters.registers.register import Register, is_read_only
-from servotwin.parameters.servo import Servo, unit_of
+from servotwin.parameters.groups import FRACTION, Firmware
+from servotwin.parameters.servo import Quantity, Servo, unit_of
 from servotwin.units import is_finite
+
+# --- A register: where its bytes lie, and what may be written into it -------------------------------------------------
+
+@dataclass(frozen=True)
+class Register:
+    """A register: where it stands, and what may be written into it.
+
+    Parameters
+    ----------
+    address : int
+    lower, upper : int
+        Range of the raw value.
+    factory : int
+        What it holds when the servo is new, or after power-up.
+    only : tuple of int
+        The values that are computed, where they are not all of the range; empty: all.
+    why : str
+        What to say of the others.
+    reading : bool
+        Whether the servo writes it, as what it measured or was told last: a new one holds nothing to speak of.
+    size : int
+        Bytes, the low one first: 1, 2 or 4.
+    sign_bit : int, optional
+        Bit that says minus, the other bits the magnitude.
+    signed : bool
+        Whether it is a two's complement.
+    stored : bool
+        Whether it outlives power-off (EEPROM), and is not set anew at power-up (RAM).
+    unit : str
+        Of a raw step.
+    """
+
+    address: int
+    lower: int
+    upper: int
+    factory: int
+    only: tuple[int, ...] = ()
+    why: str = ""
+    reading: bool = False
+    size: int = 1
+    sign_bit: int | None = None
+    signed: bool = False
+    stored: bool = False
+    unit: str = ""
+
+    def decode(self, data: Sequence[int]) -> int:
+        """Return the number that the register's bytes mean.
+
+        Examples
+        --------
+        >>> Register(60, -1000, 1000, 0, size=2, sign_bit=10).decode([0x64, 0x04])
+        -100
+        """
+        raw = int.from_bytes(bytes(data[:self.size]), "little", signed=self.signed)
+        if self.sign_bit is not None and raw >> self.sign_bit & 1:
+            return -(raw & ((1 << self.sign_bit) - 1))
+        return raw
+
+    def encode(self, value: int) -> bytes:
+        """Return a number as the register's bytes.
+
+        Examples
+        --------
+        >>> Register(42, -32767, 32767, 0, size=2, sign_bit=15).encode(-5).hex()
+        '0580'
+        """
+        if self.sign_bit is not None and value < 0:
+            value = -value | 1 << self.sign_bit
+        return value.to_bytes(self.size, "little", signed=self.signed)
+
+    def allows(self, value: int) -> bool:
+        """Return whether a raw value is in its range, and computed."""
+        return value in self.only if self.only else self.lower <= value <= self.upper
+
+    @property
+    def allowed(self) -> str:
+        """What may be written, in words."""
+        values = " or ".join(str(value) for value in self.only) or f"a whole number from {self.lower} to {self.upper}"
+        return f"{values}; {self.why}" if self.why else values
+
+
+def laid(registers: Mapping[str, Register], *, sizes: Mapping[int, str], signs: Mapping[str, int | None] | None = None,
+         stored: Sequence[range] = (), units: Mapping[str, str] | None = None) -> dict[str, Register]:
+    """Return registers with how their bytes lie.
+
+    Parameters
+    ----------
+    registers : mapping of str to Register
+    sizes : mapping of int to str
+        Names, with blanks between, of those of so many bytes; the others have one.
+    signs : mapping of str to int or None
+        Bit of the sign by name, None for two's complement.
+    stored : sequence of range
+        Addresses that outlive power-off.
+    units : mapping of str to str
+        Names, with blanks between, by unit.
+    """
+    size_of = {name: size for size, names in sizes.items() for name in names.split()}
+    unit_of = {name: unit for unit, names in (units or {}).items() for name in names.split()}
+    signs = signs or {}
+    return {name: replace(one, size=size_of.get(name, 1), sign_bit=signs.get(name),
+                          signed=name in signs and signs[name] is None,
+                          stored=any(one.address in some for some in stored), unit=unit_of.get(name, ""))
+            for name, one in registers.items()}
+
+
+def is_read_only(name: str, one: Register) -> bool:
+    """Return whether a register is the servo's own to write: goals are not, though the servo may change them too."""
+    told = name.startswith("Goal_") and name != "Goal_Position_2"
+    return (one.reading and not told) or name in ("Model_Number", "Registered_Instruction")
+
+
+# --- A model of servo within its family -------------------------------------------------------------------------------
+
+@dataclass(frozen=True, kw_only=True)
+class RegisterModel:
+    """What differs between models of a family.
+
+    Parameters
+    ----------
+    name : str
+        As its maker writes it, such as ``"XL330-M288"``.
+    number : int
+        That it answers with.
+    document : str
+        Where its registers are described: document and section. Empty where none was seen: all is assumed then.
+    page : str
+        Address of that page, for people.
+    values : mapping of str to int
+        What its registers hold when it is new, where that is not what most of the family hold.
+    ranges : mapping of str to tuple of int
+        Lowest and highest value of registers, where these are not the family's.
+    units : mapping of str to str
+        Of a raw step of registers, where these are not the family's.
+    lacks : frozenset of str
+        Registers of the family that it does not have.
+    elsewhere : mapping of str to str
+        Document and section of single registers whose value the page does not print.
+    assumed : frozenset of str
+        Registers whose value no page that was seen prints.
+    """
+
+    name: str
+    number: int
+    document: str = ""
+    page: str = ""
+    values: Mapping[str, int] = field(default_factory=dict)
+    ranges: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    lacks: frozenset[str] = frozenset()
+    elsewhere: Mapping[str, str] = field(default_factory=dict)
+    assumed: frozenset[str] = frozenset()
+
+    @property
+    def series(self) -> str:
+        """The first word of the name: XL330 of an XL330-M288."""
+        return self.name.partition("-")[0]
+
+    def registers(self, common: Mapping[str, Register]) -> dict[str, Register]:
+        """Return the registers of the model, out of those of its family."""
+        made = {}
+        for name, register in common.items():
+            if name in self.lacks:
+                continue
+            lower, upper = self.ranges.get(name, (register.lower, register.upper))
+            made[name] = replace(register, factory=self.values.get(name, register.factory), lower=lower, upper=upper,
+                                 unit=self.units.get(name, register.unit))
+        return made
+
+    def unseen(self, common: Mapping[str, Register]) -> frozenset[str]:
+        """Return the registers whose value is assumed."""
+        names = frozenset(self.registers(common))
+        return self.assumed & names if self.document else names
+
+
+M = TypeVar("M", bound=RegisterModel)
+
+
+def model_for(models: Sequence[M], servo: Servo, number: int, common: Mapping[str, Register]) -> M:
+    """Return the model that a servo is of, by its number, else by its name or title.
+
+    Of a servo that tells its series alone, such as ``"xl330"``, it is the first of the series, and what differs within
+    the series is assumed; of one that tells nothing the first of all, and everything is.
+
+    Parameters
+    ----------
+    models : sequence of RegisterModel
+    servo : Servo
+    number : int
+        Model_Number, 0 where it is not known.
+    common : mapping of str to Register
+        Registers of the family.
+    """
+    told = [model for model in models if number and model.number == number]
+    text = re.sub(r"[\s_]+", "-", f"{servo.name}|{servo.title}".lower())  # "XM430 W210" is an XM430-W210
+    named = [model for model in told or models if _told(model.name.partition("(")[0], text)]
+    if named:
+        return max(named, key=lambda model: len(model.name))
+    alike = told or [model for model in models if _told(model.series, text)]
+    return _any_of(alike, common) if alike else replace(models[0], document="", page="")
+
+
+def _told(word: str, text: str) -> bool:
+    return re.search(rf"(?<![a-z0-9]){re.escape(word.lower())}(?![0-9])", text) is not None
+
+
+def _any_of(models: Sequence[M], common: Mapping[str, Register]) -> M:
+    """Return the first of models, with what differs between them as assumed."""
+    first, *others = models
+    if not others:
+        return first
+    own = first.registers(common)
+    differ = {name for other in others for name, register in other.registers(common).items()
+              if name in own and register.factory != own[name].factory}
+    name = first.name if len({model.series for model in models}) > 1 else first.series
+    return replace(first, name=name, assumed=first.assumed | differ)
+
+
+# --- Values that programs write into registers: sets with a name, and the registers that people change ----------------
+
+LEROBOT, LEROBOT_GRIPPER, LEROBOT_ELBOW = "lerobot", "lerobot-gripper", "lerobot-elbow"
+_ARM = {"Return_Delay_Time": 0, "Operating_Mode": 0, "P_Coefficient": 16, "I_Coefficient": 0, "D_Coefficient": 32,
+        "Maximum_Acceleration": 254, "Acceleration": 254}
+LEROBOT_SETS: Mapping[str, Mapping[str, int]] = {
+    LEROBOT: _ARM,
+    LEROBOT_GRIPPER: {**_ARM, "Max_Torque_Limit": 500, "Protection_Current": 250, "Overload_Torque": 25}}
+"""What LeRobot writes into the servos of an SO-100 or SO-101 follower when it connects, the one of the gripper apart.
+
+Source: github.com/huggingface/lerobot, robots/so_follower/so_follower.py, configure; motors/feetech/feetech.py,
+configure_motors.
+"""
+LEROBOT_X_SETS: Mapping[str, Mapping[str, int]] = {
+    LEROBOT_ELBOW: {"Position_P_Gain": 1500, "Position_I_Gain": 0, "Position_D_Gain": 600}}
+"""What LeRobot writes into the elbow of a Koch or an OMX follower; the other joints keep the factory's gains.
+
+Source: github.com/huggingface/lerobot, robots/koch_follower/koch_follower.py and robots/omx_follower/omx_follower.py,
+configure.
+"""
+
+_NO_PROFILE: Mapping[str, float | None] = {"firmware.acceleration_limit": None, "firmware.speed_limit": None}
+
+
+class RegisterSet(NamedTuple):
+    """What may stand in registers of which nobody recorded anything.
+
+    Parameters
+    ----------
+    name : str
+        In words.
+    registers : mapping of str to int
+        Raw values; the others are as the servo has them.
+    numbers : mapping of str to float or None
+        Numbers of the servo that no value of a register makes (SI).
+    """
+
+    name: str
+    registers: Mapping[str, int] = {}
+    numbers: Mapping[str, float | None] = {}
+
+
+class Varied(NamedTuple):
+    """A register that people change, or several that get one value.
+
+    Parameters
+    ----------
+    name : str
+        In words.
+    registers : tuple of str
+    number : str
+        Which number of the servo follows from them.
+    values : tuple of int
+        Raw values that are tried, in order.
+    none : bool
+        Whether that number may be absent although no value of the registers says so.
+    """
+
+    name: str
+    registers: tuple[str, ...]
+    number: str
+    values: tuple[int, ...]
+    none: bool = False
+
+
+SETS: Mapping[str, tuple[RegisterSet, ...]] = {
+    "Feetech STS": (
+        RegisterSet("LeRobot's", _ARM), RegisterSet("LeRobot's with D 0", {**_ARM, "D_Coefficient": 0}),
+        RegisterSet("no profile", {}, _NO_PROFILE), RegisterSet("D 0", {"D_Coefficient": 0}),
+        RegisterSet("D 0 and no profile", {"D_Coefficient": 0}, _NO_PROFILE),
+        RegisterSet("a program that sets the duty (mode 2)", {
+            "D_Coefficient": 0, "Minimum_Startup_Force": 0, "CW_Dead_Zone": 0, "CCW_Dead_Zone": 0}, _NO_PROFILE)),
+    "Dynamixel X": (RegisterSet("LeRobot's elbow of a Koch or OMX", LEROBOT_X_SETS[LEROBOT_ELBOW]),)}
+"""By the label of the family."""
+
+_GAIN, _DAMPING = "firmware.proportional_gain", "firmware.derivative_gain"
+_ACCELERATION, _SPEED = "firmware.acceleration_limit", "firmware.speed_limit"
+_TORQUE = "firmware.torque_limit"
+_SMALL = (8, 12, 16, 24, 32, 48, 64)
+VARIED: Mapping[str, tuple[Varied, ...]] = {
+    "Feetech STS": (
+        Varied("acceleration", ("Acceleration", "Maximum_Acceleration"), _ACCELERATION,
+               (10, 20, 50, 100, 150, 254), none=True),
+        Varied("P", ("P_Coefficient",), _GAIN, _SMALL),
+        Varied("D", ("D_Coefficient",), _DAMPING, (0, 16, 32, 64)),
+        Varied("speed", ("Maximum_Velocity_Limit",), _SPEED, (10, 20, 40, 68, 100, 160, 254)),
+        Varied("torque", ("Max_Torque_Limit", "Torque_Limit"), _TORQUE, (150, 250, 400, 500, 700, 1000))),
+    "Dynamixel X": (
+        Varied("P", ("Position_P_Gain",), _GAIN, (100, 200, 400, 640, 800, 1500)),
+        Varied("D", ("Position_D_Gain",), _DAMPING, (0, 300, 600, 1200, 4000)),
+        Varied("acceleration", ("Profile_Acceleration",), _ACCELERATION, (0, 5, 10, 20, 50, 100, 200)),
+        Varied("speed", ("Profile_Velocity",), _SPEED, (0, 20, 50, 100, 200, 400))),
+    "Dynamixel MX": (
+        Varied("P", ("P_Gain",), _GAIN, _SMALL), Varied("D", ("D_Gain",), _DAMPING, (0, 8, 32, 100)),
+        Varied("acceleration", ("Goal_Acceleration",), _ACCELERATION, (0, 10, 20, 50, 100, 200)),
+        Varied("speed", ("Moving_Speed",), _SPEED, (0, 50, 100, 200, 400, 800))),
+    "Dynamixel AX": (
+        Varied("slope", ("CW_Compliance_Slope", "CCW_Compliance_Slope"), _GAIN, (4, 8, 16, 32, 64, 128)),
+        Varied("speed", ("Moving_Speed",), _SPEED, (0, 50, 100, 200, 400, 800))),
+    "Dynamixel XL320": (
+        Varied("P", ("P_Gain",), _GAIN, _SMALL), Varied("D", ("D_Gain",), _DAMPING, (0, 8, 32, 100)),
+        Varied("speed", ("Moving_Speed",), _SPEED, (0, 50, 100, 200, 400, 800)))}
+"""Registers that people and programs change, by the label of the family; the values are where a search begins."""
+
+
+# --- What a table of registers is, and the one reader that makes a firmware group of raw values -----------------------
 
 Raw = Mapping[str, int]
 Value = float | str | None

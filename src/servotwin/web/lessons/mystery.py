@@ -65,8 +65,7 @@ def mystery_scene(seed: object) -> Scene:
     InputError
         If it is no seed.
     """
-    from servotwin.web.live.scene import Scene
-    from servotwin.web.live.scene_servo import SceneServo
+    from servotwin.web.live.scene import Scene, SceneServo
 
     if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**31:
         raise InputError("seed of a mystery servo", got=seed, allowed=f"a whole number from 0 to {SEEDS}")

@@ -2,7 +2,6 @@
 
 from servotwin.web.live.live_bench import LiveBench, Push, ServoPush
 from servotwin.web.live.replay import Replayed, replay
-from servotwin.web.live.scene import Scene, read_fragment, read_scene
-from servotwin.web.live.scene_servo import SceneServo
+from servotwin.web.live.scene import Scene, SceneServo, read_fragment, read_scene
 
 __all__ = ["LiveBench", "Push", "Replayed", "Scene", "SceneServo", "ServoPush", "read_fragment", "read_scene", "replay"]

@@ -6,24 +6,105 @@ import math
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
+from servotwin.bench import FEEDBACK_CONVERTER, INPUT_CONVERTER
 from servotwin.datasheet.loop import loop_of
 from servotwin.errors import ServotwinError
 from servotwin.models import DigitalServo
 from servotwin.models.outputs import SIGNALS
 from servotwin.models.terms.wiring import PULSE_RANGE
 from servotwin.parameters import GROUPS
+from servotwin.parameters.registers.held import registers_of
+from servotwin.parameters.registers.table import family_label
 from servotwin.units import factor, si_unit
-from servotwin.web.live.beginning import load_of
-from servotwin.web.live.lines import names_of
-from servotwin.web.live.registers import register_facts
-from servotwin.web.live.scene_servo import SERVO_MODELS, model_named
+from servotwin.web.live.live_bench import load_of
+from servotwin.web.live.scene import SERVO_MODELS, model_named, with_registers
+from servotwin.web.live.station import names_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
+    from servotwin.bench import Converter
     from servotwin.models import Model
     from servotwin.parameters import Servo
     from servotwin.web.live.scene import Scene
+
+
+
+# --- The registers of a bus servo as the page shows them: the maker's names, what they hold, what may be --------------
+
+def register_facts(servo: Servo) -> list[dict[str, Any]] | None:
+    """Return the registers of a servo, each with what it holds, its range, and the numbers that follow from it.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> one, = (r for r in register_facts(st.load_servo("feetech-sts3215-12v")) if r["name"] == "P_Coefficient")
+    >>> one["address"], one["value"], one["numbers"]
+    (21, 32, ['firmware.proportional_gain'])
+    """
+    if family_label(servo) is None:
+        return None
+    return [{"name": name, "address": one.register.address, "low": one.register.lower, "high": one.register.upper,
+             "only": list(one.register.only), "value": one.value, "why": one.register.why,
+             "numbers": [f"firmware.{number}" for number in one.numbers]}
+            for name, one in registers_of(servo).items() if _settable(servo, name, one.value)]
+
+
+def _settable(servo: Servo, name: str, value: int) -> bool:
+    """Tell whether a register can be written with what it holds: some stand for what is not computed."""
+    try:
+        with_registers(servo, {name: value})
+    except ServotwinError:
+        return False
+    return True
+
+
+# --- The display of the bench: the paper's seven readings, of a servo as it stands ------------------------------------
+
+Reading = dict[str, float | None]
+
+
+def reading_of(columns: Sequence[str], row: Sequence[float], rate: float) -> Reading:
+    """Return the seven readings by name (SI); None of what a servo does not have.
+
+    Parameters
+    ----------
+    columns : sequence of str
+        Names of what the row holds.
+    row : sequence of float
+        (SI)
+    rate : float
+        Of the transmitter [Hz].
+
+    Examples
+    --------
+    >>> reading_of(("command_voltage", "pulse_width", "output_angle"), (1.425, 1.53e-3, 1.5), 50.0)["command_count"]
+    582
+    """
+    seen = dict(zip(columns, row, strict=True))
+    pulsed = "pulse_width" in seen
+    return {
+        "command_voltage": _shown(seen.get("command_voltage")),
+        "command_count": _count(INPUT_CONVERTER, seen.get("command_voltage")),
+        "feedback_voltage": _shown(seen.get("feedback_voltage")),
+        "feedback_count": _count(FEEDBACK_CONVERTER, seen.get("feedback_voltage")),
+        "pulse_rate": rate if pulsed else None,
+        "output_angle": _shown(seen.get("output_angle")),
+        "pulse_width": _shown(seen.get("pulse_width"))}
+
+
+def _shown(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None
+
+
+def _count(converter: Converter, voltage: float | None) -> int | None:
+    try:
+        return None if voltage is None else converter.count(voltage)
+    except ServotwinError:
+        return None
+
+
+# --- A servo as the page's controls know it: each parameter with unit, range, meaning and source; travel, -------------
 
 _SHOWN = {"time": "us", "angle": "deg", "inertia": "g cm2", "inductance": "mH", "torque": "mN m",
           "torque per current": "mN m/A"}

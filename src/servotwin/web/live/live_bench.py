@@ -4,28 +4,298 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
+from servotwin import loads
 from servotwin.errors import InputError
-from servotwin.simulation.bus import OF_BUS
+from servotwin.loads import Load
+from servotwin.models import mid_travel
+from servotwin.models.engine.live import posts
+from servotwin.models.engine.live.posts import Sender
+from servotwin.models.engine.live.screen import Looks, first_look
+from servotwin.models.switched import SwitchedServo
+from servotwin.parameters.groups import Supply
+from servotwin.simulation.bus import MODEL_NAMES, MODELS, OF_BUS, check_rigid, check_supply, on_supply, source_of
+from servotwin.simulation.bus_run import BusSteps
 from servotwin.simulation.lanes.inputs import LOAD_NAMES
+from servotwin.simulation.remarks import NOT_AT_REST, Remark
+from servotwin.simulation.rest import LEAST_REST, constant_since, look_period, looks_at, swing_of
 from servotwin.units import is_finite
 from servotwin.web.live.actions import Action, checked
-from servotwin.web.live.beginning import first_commands, first_of, load_of, models_of
-from servotwin.web.live.rest_watch import RestWatch
-from servotwin.web.live.said import LONGEST
-from servotwin.web.live.scene import MOST_ACTIONS, Scene
-from servotwin.web.live.scene_servo import family_of, with_registers
-from servotwin.web.live.shared_supply import SharedSupply
-from servotwin.web.live.station import Row, Seen, Station
-from servotwin.web.live.transmitter import Transmitter
+from servotwin.web.live.rules import LONGEST
+from servotwin.web.live.scene import MOST_ACTIONS, Scene, family_of, with_registers
+from servotwin.web.live.station import Endless, Row, Seen, Station
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from servotwin.models import Model
     from servotwin.parameters import Servo
+
+
+
+# --- Servos of a bench that hang on one supply: its voltage joins them ------------------------------------------------
+
+class SharedSupply:
+    """The supply that all stations of a bench hang on; what it is, the servo of each of them says alike.
+
+    Parameters
+    ----------
+    stations : sequence of Station
+        Of models that `hung` has returned.
+    """
+
+    def __init__(self, stations: Sequence[Station]) -> None:
+        self._stations, self._steps = stations, BusSteps([one.post for one in stations])
+
+    def advance(self, until: float, rate: float, *, switches: bool = True) -> list[Seen]:
+        """Let all go on to a time [s]; return what shows of each, as `Station.advance` does.
+
+        Raises
+        ------
+        SimulationError
+            If they cannot go on.
+        """
+        those = self._stations
+        rows, events = [Endless(one.tell) for one in those], [Endless() for _ in those]
+        looks = Looks(first_look(those[0].state.time, rate), rate, until, 1, int(switches))
+        states = self._steps.go_on(source_of(those[0].model.servo.supply), [one.plan for one in those],
+                                   [one.state for one in those], looks, rows, events)
+        for one, state in zip(those, states, strict=True):
+            one.state = state
+        return [one.seen(*shown) for one, *shown in zip(those, rows, events, strict=True)]
+
+
+def hung(models: Sequence[Model], load: Load, supply: Mapping[str, float]) -> tuple[Model, ...]:
+    """Return models as they are on a supply that they share.
+
+    Parameters
+    ----------
+    models : sequence of Model
+    load : Load
+        Of each of them.
+    supply : mapping
+        Numbers of the group `supply` (SI).
+
+    Raises
+    ------
+    InputError
+        If one of them cannot be, or the supply is none.
+    """
+    shared = Supply(**supply)
+    check_supply("supply of a scene", shared)
+    found = []
+    for k, model in enumerate(models):
+        if not isinstance(model, MODELS):
+            raise InputError(f"model of servo {k + 1} on a shared supply", got=type(model).__name__,
+                             allowed=MODEL_NAMES)
+        found.append(on_supply(model, shared))
+        check_rigid(f"servo {k + 1} on a shared supply", found[-1].plant(load).elastic)
+    return tuple(found)
+
+
+# --- What sends the pulses: a frame clock whose rate may change, and frames that get lost -----------------------------
+
+class FrameEdge(NamedTuple):
+    """The beginning of a frame: when [s], and whether its pulse is sent."""
+
+    time: float
+    sent: bool
+
+
+class Transmitter:
+    """A frame clock; a new rate takes effect after the frame that has begun.
+
+    Parameters
+    ----------
+    rate : float
+        Frames per second [Hz].
+    seed : int
+        Of which frames are lost.
+
+    Examples
+    --------
+    >>> sender = Transmitter(50.0, seed=0)
+    >>> [round(edge.time, 6) for edge in sender.until(0.05)], sender.until(0.05)
+    ([0.0, 0.02, 0.04], [])
+    """
+
+    def __init__(self, rate: float, seed: int) -> None:
+        self._clock: Any = SimpleNamespace(**Sender(rate, 0.0, seed, 0.0, 0, 0, 0.0)._asdict())
+
+    @property
+    def rate(self) -> float:
+        """Frames per second [Hz]."""
+        return float(self._clock.rate)
+
+    @property
+    def next_edge(self) -> float:
+        """When the next frame begins [s]."""
+        return posts.next_edge(self._clock)
+
+    def snapped(self, time: float) -> float:
+        """Return a time, or that of the edge right next to it: what is a billionth of a frame away is the edge [s]."""
+        return posts.snapped(self._clock, time)
+
+    def tune(self, rate: float) -> None:
+        """Take another rate [Hz] from the next edge on."""
+        posts.tune(self._clock, rate)
+
+    def lose(self, share: float) -> None:
+        """Let a share of the frames get lost from now on."""
+        self._clock.lost = share
+
+    def until(self, time: float) -> list[FrameEdge]:
+        """Return the frames that begin before a time [s] and were not returned yet."""
+        edges = []
+        while (edge := self.next_edge) < time:
+            edges.append(FrameEdge(edge, not posts.is_lost(self._clock)))
+            posts.pass_edge(self._clock)
+        return edges
+
+
+# --- Watches whether the shaft of a servo at the bench comes to rest once nothing is done to it any more --------------
+
+_MOST = 4000  # points: over ten seconds of them
+_AGAIN = 0.5  # s between two looks
+
+
+class RestWatch:
+    """Watches one servo; says once that it does not come to rest, until something is done again.
+
+    Parameters
+    ----------
+    station : Station
+    """
+
+    def __init__(self, station: Station) -> None:
+        self._station = station
+        self.begin(station.state.time)
+
+    def begin(self, time: float) -> None:
+        """Forget what was seen: something was done at this time [s]."""
+        self._since, self._next, self._said = time, time + LEAST_REST, False
+        self._seen: deque[tuple[float, float]] = deque(maxlen=_MOST)
+
+    def see(self, rows: Sequence[Row]) -> list[str]:
+        """Take what shows of the time that has passed; return what is to be said, as people read it."""
+        station = self._station
+        model, names = station.model, station.columns
+        if self._said or model.endless or not rows or "command_angle" not in model.available:
+            return []
+        at = names.index("output_angle")
+        self._seen.extend((row[0], row[at]) for row in rows)
+        now = rows[-1][0]
+        if now < self._next:
+            return []
+        self._next = now + _AGAIN
+        still = max(self._since, constant_since(station.told.shape.pieces.table, now), self._seen[0][0])
+        if not now - still >= LEAST_REST:
+            return []
+        time, angle = np.array(self._seen).T
+        looks = looks_at(still, now, look_period(model))
+        found = swing_of(looks, np.interp(looks, time, angle))
+        self._said = found.swing > 0.0
+        return [Remark(NOT_AT_REST, now, **found._asdict()).words] if self._said else []
+
+
+# --- What a bench begins with: its models, what hangs on their shafts, and the first command of each ------------------
+
+_ARM = 0.1  # m, of a scene that gives none
+_PLAY = "gear.backlash"
+NO_PLAY = "none, unless it is changed at the bench"
+"""Source of the play of a servo of which none is known."""
+
+
+def models_of(scene: Scene) -> tuple[Model, ...]:
+    """Return the models of a scene's servos, on the supply that they share, if there is one.
+
+    Raises
+    ------
+    InputError
+        Or one of its kinds, if one of them is not possible.
+
+    Examples
+    --------
+    >>> from servotwin.web.live import Scene, SceneServo
+    >>> models_of(Scene(servos=(SceneServo(id="hitec-hs-755hb"),)))
+    (PulseServo('hitec-hs-755hb'),)
+    """
+    models = [_with_play(servo.built()) for servo in scene.servos]
+    return hung(models, load_of(scene), scene.supply) if scene.supply else tuple(models)
+
+
+def _with_play(model: Model) -> Model:
+    """Return a model whose play is given, 0 if it is not known, so that there can be some while time goes on."""
+    if not isinstance(model, SwitchedServo) or model.servo.get(_PLAY) is not None:
+        return model
+    return type(model)(model.servo.replace({_PLAY: 0.0}, source=NO_PLAY))
+
+
+def load_of(scene: Scene) -> Load:
+    """Return what hangs on each shaft: always all of it, so that each number can change while time goes on.
+
+    Raises
+    ------
+    LoadError
+        If a number is out of its range.
+
+    Examples
+    --------
+    >>> from servotwin.web.live import Scene, SceneServo
+    >>> load_of(Scene(servos=(SceneServo(id="hitec-hs-755hb"),), load={"mass": 0.2})).pendulum.mass
+    0.2
+    """
+    own: dict[str, Any] = dict(scene.load)
+    arm = loads.Pendulum(mass=own.pop("mass", 0.0), length=own.pop("arm", _ARM),
+                         hanging_angle=own.pop("hanging_angle", 0.0))
+    return loads.Load(**own) + arm
+
+
+def first_commands(scene: Scene, models: Sequence[Model]) -> list[Action]:
+    """Return the commands at t = 0 that a scene says, and for servos without one the middle of their travel.
+
+    They begin with one for each servo, or with one for all.
+
+    Examples
+    --------
+    >>> from servotwin.web.live import Scene, SceneServo
+    >>> scene = Scene(servos=(SceneServo(id="hitec-hs-755hb"), SceneServo(id="towerpro-mg996r")))
+    >>> [(action.value["value"], action.servo) for action in first_commands(scene, models_of(scene))]
+    [(90.0, 0), (0.0, 1)]
+    """
+    said = [action for action in scene.actions if action.kind == "command" and action.time == 0.0]
+    if any(action.servo is None for action in said):
+        return []
+    told = {action.servo for action in said}
+    found = [(k, middle_of(model)) for k, model in enumerate(models) if k not in told]
+    if not told and len({value for _, value in found}) == 1:
+        return [Action(0.0, "command", _hold(found[0][1]))]
+    return [Action(0.0, "command", _hold(value), k) for k, value in found]
+
+
+def first_of(actions: Sequence[Action], servo: int) -> dict[str, Any]:
+    """Return the first command of a servo, which is there."""
+    return next(dict(action.value) for action in actions
+                if action.kind == "command" and action.servo in (None, servo))
+
+
+def middle_of(model: Model) -> float:
+    """Return the middle of a model's travel, as a first command has it [deg]."""
+    return round(math.degrees(mid_travel(model)), 3)
+
+
+def _hold(value: float) -> dict[str, Any]:
+    return {"shape": "hold", "unit": "deg", "value": value}
+
+
+# --- A bench that goes on in time: servos under one transmitter, what was done to them, and what shows of -------------
 
 _AT_FIRST = 200  # actions at t = 0 that are done at once: what scenes have
 WHOLE = ("command", "push", "torque")  # of these the last at an instant is all that counts

@@ -26,8 +26,13 @@ import re
 from collections.abc import Mapping
 from typing import Any, NoReturn
 
-from servotwin.errors import InputError, UnknownNameError
+from servotwin.errors import HIDDEN, InputError, UnknownNameError
+from servotwin.models.engine.live.posts import UNITS
+from servotwin.models.engine.live.screen import FIELDS
+from servotwin.text import LONGEST_NAME
 from servotwin.units import is_finite
+
+# --- Rules of what a page and a scene may say -------------------------------------------------------------------------
 
 Rule = Mapping[str, Any]
 
@@ -170,3 +175,115 @@ def _list(rule: Rule, value: Any, name: str, table: Mapping[str, Any]) -> list[A
 
 _KINDS = {"number": _number, "whole": _whole, "number or text": _number_or_text, "plain": _plain, "truth": _truth,
           "text": _text, "word": _word, "table": _table, "variant": _variant, "list": _list}
+
+
+# --- All that a page and a scene may say, as `rules`: commands, actions, what a scene holds ---------------------------
+
+RATES = (1.0, 2000.0)
+"""Lowest and highest frame rate of the transmitter [Hz]."""
+FRAME_RATE = 50.0  # Hz, unless a scene gives another
+MOST_SAMPLES = 200_000  # of a recorded command
+LONGEST = 1e6  # s
+LOAD_FIELDS = ("inertia", "viscous_friction", "torque", "coulomb_torque", "mass", "arm", "hanging_angle")
+"""What a load can have: [kg m²], [N m s/rad], [N m], [N m], [kg], [m], [rad]."""
+SUPPLY_FIELDS = ("open_circuit_voltage", "internal_resistance", "current_limit")
+"""What a supply that all share can have: [V], [ohm], [A]."""
+CONTROL_FIELDS = ("command_share", "reference_share", "sampling_delay")
+"""What a control circuit can be given: as `servotwin.bench.ControlSupply` [1], [1], [s]."""
+_MOST_PUSH = 1e3  # N m: beyond any servo
+_MOST_STEPS = 1000  # of a staircase, one way
+_SEEDS = 2**53 - 1
+_POSITIVE = ("dwell", "frequency", "start_frequency", "end_frequency", "duration")
+
+
+def _span(what: str, low: float, high: float, **more: Any) -> Rule:
+    return number(what, f"a number from {low:g} to {high:g}", low, high, **more)
+
+
+def _field(shape: str, name: str) -> Rule:
+    what: dict[str, Any] = {"what": f"{name} of a command of shape {shape}", "needed": True}
+    if name == "hold":
+        return {"is": "word", "of": ("previous", "linear"), "usual": "previous", "allowed": "previous, linear", **what}
+    if shape == "recorded":
+        more = {"as_many_as": "time"} if name == "value" else {}
+        return {"is": "list", "least": 2, "most": MOST_SAMPLES, "told": "length",
+                "allowed": f"a list of 2 to {MOST_SAMPLES} numbers", **what, **more,
+                "each": {"is": "number", "got": "something that is no finite number", "allowed": "finite numbers",
+                         "what": what["what"]}}
+    if name == "steps":
+        allowed = f"a whole number from 1 to {_MOST_STEPS}"
+        return {"is": "whole", "low": 1, "high": _MOST_STEPS, "allowed": allowed, **what}
+    if name in _POSITIVE:
+        return {**number("", "a positive number", 0.0, open=True), **what}
+    if name == "period":
+        return {**number("", "at least 0; 0: once", 0.0), **what}
+    return {**number("", "a finite number"), **what}
+
+
+_UNIT: Rule = {"is": "word", "of": UNITS, "what": "unit of a command", "allowed": ", ".join(UNITS), "needed": True}
+COMMAND: Rule = {
+    "is": "variant", "by": "shape", "what": "command",
+    "allowed": "a table with a shape, a unit and what the shape is given by",
+    "choice": {"what": "shape of a command", "allowed": ", ".join(FIELDS)},
+    "tables": {shape: {
+        "is": "table", "unknown": f"field of a command of shape {shape}", "known": ("unit", *names),
+        "fields": {"shape": {"is": "word", "of": (shape,), "what": "shape", "allowed": shape}, "unit": _UNIT,
+                   **{name: _field(shape, name) for name in names}}} for shape, names in FIELDS.items()}}
+_OF_CONTROL = "{name} of the control circuit"
+CONTROL: Rule = {"is": "table", "some": True, "what": "control circuit",
+                 "allowed": f"a table of {', '.join(CONTROL_FIELDS)}", "fields": {
+                     **{name: _span(_OF_CONTROL, 0.0, 1.0) for name in CONTROL_FIELDS[:2]},
+                     CONTROL_FIELDS[2]: number(_OF_CONTROL, "a number of seconds, 0 or more", 0.0)}}
+ACTIONS: dict[str, Rule] = {
+    "command": COMMAND,
+    "set": {"is": "table", "some": True, "what": "numbers to set",
+            "allowed": "a table of dotted names and values in SI",
+            "each": {"is": "number or text", "what": "{name}", "allowed": "a finite number in SI, or a word"}},
+    "push": number("push", f"a torque of at most {_MOST_PUSH:g} N m", -_MOST_PUSH, _MOST_PUSH),
+    "frames": {"is": "table", "some": True, "what": "frames", "allowed": "a table of rate [Hz] and lost [share]",
+               "fields": {"rate": _span("frames: rate", *RATES), "lost": _span("frames: lost", 0.0, 1.0)}},
+    "register": {"is": "table", "some": True, "what": "registers",
+                 "allowed": "a table of the maker's names and whole numbers",
+                 "each": {"is": "whole", "what": "register {name}", "allowed": "a whole number"}},
+    "torque": {"is": "truth", "what": "torque", "allowed": "true or false"},
+    "control": CONTROL}
+"""What is done at a bench, by the kinds of actions."""
+FOR_ALL = ("frames", "control")
+"""Kinds of actions that no single servo hears."""
+
+
+def _numbers(key: str, names: tuple[str, ...]) -> Rule:
+    return {"is": "table", "what": f"{key} of a scene", "allowed": f"a table [{key}]", "unknown": f"{key} of a scene",
+            "fields": {name: number(f"{key}.{name} of a scene", "a finite number in SI") for name in names}}
+
+
+VIEW: Rule = {"is": "table", "names": r"[\w.-]{1,60}", "what": "view", "told": "type",
+              "allowed": "a table of words, numbers, true and false",
+              "each": {"is": "plain", "what": "view", "allowed": "a table of words, numbers, true and false"}}
+_OF_SERVO = "{name} of a servo of a scene"
+_WORDS_OF_SERVO: dict[str, Any] = {
+    "is": "text", "most": 200_000, "what": _OF_SERVO, "told": "type", "allowed": "a text"}
+SOURCES = ("id", "file", "mystery")
+"""Where the numbers of a scene's servo come from: one of these."""
+SERVO: Rule = {
+    "is": "table", "what": "servo of a scene", "allowed": "a table [[servo]]", "unknown": "key of a servo of a scene",
+    "fields": {
+        "id": _WORDS_OF_SERVO, "file": _WORDS_OF_SERVO,
+        "mystery": {"is": "whole", "low": 0, "high": _SEEDS, "what": _OF_SERVO,
+                    "allowed": "a whole number of at least 0"},
+        "model": {**_WORDS_OF_SERVO, "usual": ""},
+        "parameters": {"is": "table", "what": _OF_SERVO, "allowed": "a table of names and values", "usual": {},
+                       "each": {"is": "number or text", "what": "parameters: {name}",
+                                "allowed": "a finite number in SI, or a word"}},
+        "registers": {"is": "table", "what": _OF_SERVO, "allowed": "a table of names and values", "usual": {},
+                      "each": {"is": "whole", "what": "registers: {name}", "allowed": "a whole number"}}}}
+SCENE: dict[str, Rule] = {
+    "name": {"is": "text", "most": LONGEST_NAME, "what": "name of a scene",
+             "without": HIDDEN.pattern, "usual": "",
+             "allowed": f"a text of at most {LONGEST_NAME} characters, none of them a control or bidirectional one"},
+    "seed": {"is": "whole", "low": 0, "high": _SEEDS, "what": "seed of a scene",
+             "allowed": "a whole number of at least 0", "usual": 0},
+    "frame_rate": _span("frame_rate of a scene", *RATES, usual=FRAME_RATE),
+    "end": _span("end of a scene", 0.0, LONGEST, usual=0.0),
+    "load": _numbers("load", LOAD_FIELDS), "supply": _numbers("supply", SUPPLY_FIELDS), "control": CONTROL}
+"""What a scene holds beside its servos, its actions, its view and its lesson."""

@@ -6,23 +6,286 @@ import asyncio
 import contextlib
 import secrets
 import time
+from collections import deque
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from starlette.websockets import WebSocketDisconnect
 
 from servotwin.errors import InputError, ServotwinError
+from servotwin.web.lessons import lessons as taught
+from servotwin.web.lessons import mystery
 from servotwin.web.lessons.lessons import lessons
-from servotwin.web.server.limits import Allowance
-from servotwin.web.server.outbox import Outbox
+from servotwin.web.live import read_fragment, read_scene
+from servotwin.web.live.replay import exported
+from servotwin.web.live.scene import checked_view, with_servos
 from servotwin.web.server.own.brought import Brought
-from servotwin.web.server.wire import VERSION, id_of, line_of, message_of, text_of
-from servotwin.web.server.words import answer_to
+from servotwin.web.server.session import EXPORTS, aside
+from servotwin.web.server.wire import VERSION, Allowance, id_of, line_of, message_of, text_of
 
 if TYPE_CHECKING:
+    from collections.abc import Awaitable
+
     from starlette.websockets import WebSocket
 
-    from servotwin.web.server.own.desk import Desk
-    from servotwin.web.server.room import Room
+    from servotwin.web.server.own.brought import Desk
+    from servotwin.web.server.session import Room
+
+
+
+# --- What goes to one browser: the latest push, and short messages in order; a slow one misses pushes -----------------
+
+_MOST_TEXTS = 256  # that wait: who takes none of them is gone
+_MOST_LETTERS = 20_000_000  # of them, beside the one that comes
+_FEW = 4  # texts that wait, and the browser may say more
+SLOWEST = 30.0
+"""How long a browser may take over one message [s]."""
+
+
+class Outbox:
+    """The way to one browser.
+
+    A push that comes while another is on its way replaces the one that waits; `missed` counts those.
+
+    Parameters
+    ----------
+    socket : WebSocket
+        That was accepted.
+    """
+
+    def __init__(self, socket: WebSocket) -> None:
+        self._socket = socket
+        self._texts: deque[str] = deque()
+        self._letters = 0  # of all texts
+        self._push: Callable[[], bytes] | None = None
+        self._something, self._room = asyncio.Event(), asyncio.Event()
+        self._room.set()
+        self.missed = self._sent = self._taken = 0
+        self.closed = False
+
+    @property
+    def free(self) -> bool:
+        """Whether nothing waits."""
+        return self._push is None and not self._texts
+
+    def text(self, text: str) -> None:
+        """Send a message; a browser that takes none of many is given up."""
+        if len(self._texts) >= _MOST_TEXTS or self._letters > _MOST_LETTERS:
+            self.closed = True
+        else:
+            self._texts.append(text)
+            self._letters += len(text)
+            if len(self._texts) >= _FEW:
+                self._room.clear()
+        self._something.set()
+
+    def push(self, packed: Callable[[], bytes]) -> None:
+        """Send a push, unless a later one comes before its turn: only then it is packed."""
+        if self._push is not None:
+            self.missed += 1
+        self._push = packed
+        self._something.set()
+
+    async def room(self) -> None:
+        """Wait until few messages wait: who does not listen is not listened to."""
+        await self._room.wait()
+
+    async def deliver(self) -> None:
+        """Send what waits until the browser is gone, or does not take it."""
+        sending, watching = asyncio.create_task(self._send()), asyncio.create_task(self._watch())
+        try:
+            await asyncio.wait([sending, watching], return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            sending.cancel()
+            watching.cancel()
+            await asyncio.gather(sending, watching, return_exceptions=True)
+
+    async def _send(self) -> None:
+        while not self.closed:
+            await self._something.wait()
+            self._something.clear()
+            while not (self.closed or self.free):
+                self._sent += 1
+                await self._send_next()
+                self._taken = self._sent
+
+    async def _watch(self) -> None:
+        """Return when a message has been on its way for too long: one look for all is cheaper than a timer for each."""
+        last = 0
+        while self._taken == self._sent or self._sent != last:
+            last = self._sent
+            await asyncio.sleep(SLOWEST)
+
+    async def _send_next(self) -> None:
+        if self._texts:
+            text = self._texts.popleft()
+            self._letters -= len(text)
+            if len(self._texts) < _FEW:
+                self._room.set()
+            await self._socket.send_text(text)
+            return
+        push, self._push = self._push, None
+        if push is not None:
+            await self._socket.send_bytes(push())
+
+
+# --- What a page may say, and what is done then: one function a word --------------------------------------------------
+
+Answer = dict[str, Any]
+_LONGEST_EXPORT = 600.0  # s
+
+
+async def answer_to(visitor: Visitor, message: dict[str, Any]) -> Answer:
+    """Do what a message says; return what is answered.
+
+    Raises
+    ------
+    ServotwinError
+        If it says nothing that can be done.
+    """
+    words = [word for word in message if word in WORDS]
+    if len(words) != 1:
+        raise InputError("message", got=", ".join(map(str, message))[:100] or "nothing",
+                         allowed=f"one of {', '.join(WORDS)}")
+    if visitor.role == "watcher":
+        raise InputError("message of a watcher", got=words[0], allowed="watching: the teacher steers")
+    return await WORDS[words[0]](visitor, message)
+
+
+async def _do(visitor: Visitor, message: dict[str, Any]) -> Answer:
+    return {"time": visitor.room.do(message["do"], message.get("value"), message.get("servo"))}
+
+
+async def _run(visitor: Visitor, message: dict[str, Any]) -> Answer:
+    visitor.room.run(_truth(message, "run"))
+    return {"time": visitor.room.bench.time}
+
+
+async def _speed(visitor: Visitor, message: dict[str, Any]) -> Answer:
+    visitor.room.ask(message["speed"])
+    return {"time": visitor.room.bench.time}
+
+
+async def _step(visitor: Visitor, message: dict[str, Any]) -> Answer:
+    visitor.room.step()
+    return {"time": visitor.room.bench.time}
+
+
+async def _reset(visitor: Visitor, message: dict[str, Any]) -> Answer:
+    await visitor.room.reset()
+    return {"time": 0.0}
+
+
+async def _scene(visitor: Visitor, message: dict[str, Any]) -> Answer:
+    await visitor.room.begin("scene", partial(read_scene, _text(message, "scene")))
+    return {"time": 0.0}
+
+
+async def _servos(visitor: Visitor, message: dict[str, Any]) -> Answer:
+    scene = visitor.room.bench.scene()
+    await visitor.room.begin("servos", partial(with_servos, scene, message["servos"], message.get("supply")))
+    return {"time": 0.0}
+
+
+async def _fragment(visitor: Visitor, message: dict[str, Any]) -> Answer:
+    await visitor.room.begin("link", partial(read_fragment, _text(message, "fragment")))
+    return {"time": 0.0}
+
+
+async def _view(visitor: Visitor, message: dict[str, Any]) -> Answer:
+    visitor.room.bench.show(checked_view(message["view"]))
+    return {"time": visitor.room.bench.time}
+
+
+async def _said(visitor: Visitor, message: dict[str, Any]) -> Answer:
+    scene = visitor.room.bench.scene()
+    return await aside("text of the bench", lambda: {"text": scene.text(), "fragment": scene.fragment()})
+
+
+async def _export(visitor: Visitor, message: dict[str, Any]) -> Answer:
+    bench = visitor.room.bench
+    made = partial(exported, message["export"], bench.scene(), bench.now_models, message.get("servo") or 0)
+    async with EXPORTS:
+        return {"file": (await aside("export", made, _LONGEST_EXPORT))._asdict()}
+
+
+async def _lesson(visitor: Visitor, message: dict[str, Any]) -> Answer:
+    lesson = taught.lesson(_text(message, "lesson"))
+    await visitor.room.begin("lesson", lambda: lesson.scene)
+    return {"time": 0.0}
+
+
+async def _mystery(visitor: Visitor, message: dict[str, Any]) -> Answer:
+    await visitor.room.begin("mystery", partial(mystery.mystery_scene, message["mystery"]))
+    return {"time": 0.0}
+
+
+async def _guess(visitor: Visitor, message: dict[str, Any]) -> Answer:
+    servo = visitor.room.bench.scene().servos[0]
+    if servo.mystery is None:
+        raise InputError("guess", got="a bench without a mystery", allowed="a mystery servo")
+    return {"compared": mystery.compare(servo.mystery, message["guess"])}
+
+
+async def _log(visitor: Visitor, message: dict[str, Any]) -> Answer:
+    asked = _table(message, "log")
+    if "columns" in asked:
+        visitor.brought.read_again(asked["columns"], asked.get("mend", ""))
+    elif "show" in asked:
+        visitor.brought.compare(asked)
+    elif "play" in asked:
+        return {"time": visitor.brought.play(asked.get("run", 0))}
+    elif "forget" in asked:
+        visitor.brought.forget()
+    else:
+        raise InputError("log", got=", ".join(map(str, asked))[:100], allowed="one of columns, show, play, forget")
+    return {}
+
+
+async def _fit(visitor: Visitor, message: dict[str, Any]) -> Answer:
+    asked, fits = _table(message, "fit"), visitor.brought.fits
+    if "plan" in asked:
+        return {"plan": await fits.plan(asked.get("servo", 0), asked.get("model"))}
+    if "cancel" in asked:
+        fits.cancel()
+    elif "take" in asked:
+        await fits.take_over(asked["take"])
+    else:
+        fits.begin(asked)
+    return {}
+
+
+def _table(message: dict[str, Any], key: str) -> dict[str, Any]:
+    value = message[key]
+    if not isinstance(value, dict) or not value:
+        raise InputError(key, got=type(value).__name__, allowed="a table of what is asked")
+    return value
+
+
+def _text(message: dict[str, Any], key: str) -> str:
+    value = message[key]
+    if not isinstance(value, str):
+        raise InputError(key, got=type(value).__name__, allowed="a text")
+    return value
+
+
+def _truth(message: dict[str, Any], key: str) -> bool:
+    value = message[key]
+    if not isinstance(value, bool):
+        raise InputError(key, got=value, allowed="true or false")
+    return value
+
+
+WORDS: dict[str, Callable[[Visitor, dict[str, Any]], Awaitable[Answer]]] = {
+    "do": _do, "run": _run, "speed": _speed, "step": _step, "reset": _reset, "scene": _scene, "servos": _servos,
+    "fragment": _fragment,
+    "view": _view, "text": _said, "export": _export, "lesson": _lesson, "mystery": _mystery, "guess": _guess,
+    "log": _log, "fit": _fit}
+"""What a page may say."""
+
+
+# --- One browser: what it says is done in its room, and what it may not do is told in a line --------------------------
 
 _RATE, _BURST = 240.0, 480.0  # messages
 _TOO_MANY = 4008

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from servotwin.web.live.overlay import compared, of_the_bench
-from servotwin.web.live.scene_servo import model_named
-from servotwin.web.server.own.kept import run_of
+from servotwin.web.live.scene import model_named
+from servotwin.web.server.own.frames import run_of
 
 if TYPE_CHECKING:
     from servotwin.web.server.own.work import Tell

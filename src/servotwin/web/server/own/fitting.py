@@ -17,8 +17,8 @@ from servotwin.simulation.progress import HERE
 from servotwin.text import file_stem
 from servotwin.web.lessons.mystery import guess_of
 from servotwin.web.live.overlay import of_the_bench, trace_facts
-from servotwin.web.live.scene_servo import model_named
-from servotwin.web.server.own.kept import logs_of, run_of
+from servotwin.web.live.scene import model_named
+from servotwin.web.server.own.frames import logs_of, run_of
 from servotwin.web.server.own.reading import is_computed
 
 if TYPE_CHECKING:
