@@ -7,7 +7,7 @@ import pytest
 
 from bench_wires import BoardOnTerminal
 from servotwin.bench.backends import EmulatedBackend, MockBackend, SerialBackend
-from servotwin.bench.emulator.build import harness
+from servotwin.bench.emulator.process import harness
 from servotwin.bench.wire import Board, Frame, Splitter, protocol, to_wire
 from servotwin.errors import BenchError
 

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from bench_fits import FREE, judged
-from servotwin.bench.emulator.build import harness
+from servotwin.bench.emulator.process import harness
 from servotwin.errors import BenchError
 
 pytestmark = pytest.mark.long

@@ -16,9 +16,7 @@ from bench import bus_peers as peers
 from servotwin.bench.backends import SerialBackend
 from servotwin.bench.bus import MODELS, Bus, BusRig, columns_of, rig_of, scan, wire_of
 from servotwin.bench.bus import families as tables
-from servotwin.bench.bus.goals import Goals
-from servotwin.bench.bus.servo import BusServo
-from servotwin.bench.bus.ticks import Ticks
+from servotwin.bench.bus.bus import BusServo, Goals, Ticks
 from servotwin.bench.recording import About, Experiment, Hold, Limits, record, record_bus
 from servotwin.errors import BenchError, InputError, MissingExtraError, UnknownNameError
 

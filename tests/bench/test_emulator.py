@@ -15,7 +15,7 @@ import pytest
 
 import servotwin as st
 from servotwin.bench.backends import EmulatedBackend, SerialBackend
-from servotwin.bench.emulator import build
+from servotwin.bench.emulator import process
 from servotwin.bench.emulator.plant import Front, ServoOnPins
 from servotwin.bench.emulator.process import Microcontroller, Pins
 from servotwin.bench.emulator.terminal import Terminal
@@ -34,7 +34,7 @@ TICK = 0.5e-6
 @pytest.fixture(scope="module", autouse=True)
 def _tools():
     try:
-        build.harness()
+        process.harness()
     except BenchError as error:
         pytest.skip(str(error))
 
@@ -339,26 +339,26 @@ def test_a_missing_tool_is_told_in_one_line_that_names_the_packages(tmp_path, mo
 
 def test_the_harness_is_compiled_once(tmp_path, monkeypatch):
     monkeypatch.setenv("SERVOTWIN_CACHE_DIR", str(tmp_path))
-    first = build.harness()
+    first = process.harness()
     made = first.stat().st_mtime_ns
-    assert build.harness() == first
+    assert process.harness() == first
     assert (first.stat().st_mtime_ns, len(list(tmp_path.iterdir()))) == (made, 1)
 
 
 @pytest.mark.long
 def test_a_harness_that_others_may_write_is_not_run(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("SERVOTWIN_CACHE_DIR", str(tmp_path / "cache"))
-    made = build.harness()
+    made = process.harness()
     assert made.stat().st_mode & 0o777 == 0o700
     planted = b"#!/bin/sh\nexit 1\n"
     made.write_bytes(planted)
     made.chmod(0o777)
-    assert build.harness() == made
+    assert process.harness() == made
     assert made.read_bytes() != planted
     assert made.stat().st_mode & 0o777 == 0o700
     assert capsys.readouterr().err == f"servotwin: {made} is made anew, for others may write it, until chmod go-w\n"
     made.parent.chmod(0o777)
-    assert build.harness().parent not in (made.parent, *made.parents)
+    assert process.harness().parent not in (made.parent, *made.parents)
 
 
 @pytest.mark.parametrize("model", [

@@ -9,7 +9,7 @@ import kitchen_draws
 import servotwin as st
 from reference import kitchen_tables
 from servotwin.bench import calibrate_loads, calibrate_table, load_table
-from servotwin.bench.load_names import name_of
+from servotwin.bench.load_columns import name_of
 from servotwin.datasheet.full_drive import FullDrive
 from servotwin.datasheet.holding import changed, hold
 from servotwin.errors import InputError

@@ -5,8 +5,8 @@ import pytest
 
 import servotwin as st
 from servotwin.bench import Bench, bench_servo, compare
-from servotwin.bench.emulator.build import harness
-from servotwin.bench.emulator.paper_chain import chain_rows, display_of
+from servotwin.bench.emulator.plant import chain_rows, display_of
+from servotwin.bench.emulator.process import harness
 from servotwin.errors import BenchError
 
 

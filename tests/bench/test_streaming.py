@@ -5,7 +5,7 @@ import pytest
 
 from servotwin.bench.backends import EmulatedBackend
 from servotwin.bench.backends.emulated import StillPins
-from servotwin.bench.emulator.build import harness
+from servotwin.bench.emulator.process import harness
 from servotwin.bench.wire import Board, protocol
 from servotwin.errors import BenchError
 

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 import servotwin as st
 from servotwin.bench import calibrate_table
-from servotwin.bench.table_words import plus_minus, residual_pattern
+from servotwin.bench.table_parameters import plus_minus, residual_pattern
 from servotwin.cli.fit_report import calibrate_from
 from servotwin.errors import InputError, OutputExistsError
 

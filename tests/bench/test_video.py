@@ -22,7 +22,7 @@ from servotwin.bench.video.filmed import (  # noqa: E402
     sharpened,
     turned,
 )
-from servotwin.bench.video.instant import jump  # noqa: E402
+from servotwin.bench.video.marker import jump  # noqa: E402
 from servotwin.errors import InputError, MissingExtraError, OutputExistsError  # noqa: E402
 
 RATE = 30.0

@@ -13,7 +13,7 @@ import servotwin as st
 from bench import bus_peers
 from bench_wires import BoardOnTerminal
 from servotwin.bench.backends import MockBackend
-from servotwin.bench.emulator.build import harness
+from servotwin.bench.emulator.process import harness
 from servotwin.errors import BenchError
 
 pytest.importorskip("serial")

@@ -10,10 +10,10 @@ from reference import arm_rig as rig
 from reference import arm_rig_recorder as recorder
 from reference.arm_rig_fits import FREE, files_of
 from robots.robots_cases import links
-from servotwin.identification.arms import dynamics
+from servotwin.identification.arms import search
 from servotwin.identification.arms.identify_arm import arm_registers
-from servotwin.identification.arms.problem import Problem
 from servotwin.identification.arms.rows import Numbers, episodes_from, used_rows
+from servotwin.identification.arms.search import Problem
 from servotwin.parameters.registers.held import register_family_of
 from servotwin.parameters.registers.table import set_registers, written
 from servotwin.robots import Motion, Mount, robot_model, run_motion
@@ -55,13 +55,13 @@ def recorded(servos, seed=0):
 
 def searched(believed, true):
     mounts = {joint: Mount(st.DigitalServo(servo)) for joint, servo in zip(JOINTS, believed, strict=True)}
-    bodies, episodes = dynamics.links_of(PLANT, JOINTS), episodes_from([recorded(true)], JOINTS, mounts)
+    bodies, episodes = search.links_of(PLANT, JOINTS), episodes_from([recorded(true)], JOINTS, mounts)
 
     def make(mounts):
-        return Numbers(mounts, dynamics.link_names(PLANT, bodies), BUS)
+        return Numbers(mounts, search.link_names(PLANT, bodies), BUS)
 
     found, after = arm_registers(Problem(PLANT, make(mounts), bodies, episodes, [used_rows(one) for one in episodes],
-                                         lambda: None, dynamics.Demand(PLANT, JOINTS, bodies)), make)
+                                         lambda: None, search.Demand(PLANT, JOINTS, bodies)), make)
     return found, [written(register_family_of(LEROBOT), after[joint].model.servo) for joint in JOINTS]
 
 
@@ -103,7 +103,7 @@ def test_what_was_given_is_held_and_doubted():
 def test_servos_without_registers_have_none_to_search():
     servo = st.load_servo("hitec-hs-755hb")
     numbers = Numbers({joint: Mount(st.PulseServo(servo)) for joint in JOINTS}, (), BUS)
-    problem = Problem(PLANT, numbers, [], [], [], lambda: None, dynamics.Demand(PLANT, JOINTS, []))
+    problem = Problem(PLANT, numbers, [], [], [], lambda: None, search.Demand(PLANT, JOINTS, []))
     assert arm_registers(problem, lambda mounts: numbers) == (None, numbers.mounts)
 
 
@@ -129,13 +129,13 @@ def test_registers_of_an_arm_that_others_simulated(tmp_path, seed, believed, odd
     motion = Motion(time=made.time, angles=dict(zip(joints, made.action.T, strict=True)), source="rig",
                     measured=dict(zip(joints, made.state.T, strict=True)))
     mounts = {joint: Mount(st.DigitalServo(unsaid(servo, believed))) for joint, servo in files_of(truth).items()}
-    bodies, episodes = dynamics.links_of(plant, joints), episodes_from([motion], joints, mounts)
+    bodies, episodes = search.links_of(plant, joints), episodes_from([motion], joints, mounts)
 
     def make(mounts):
-        return Numbers(mounts, dynamics.link_names(plant, bodies), BUS, free=FREE)
+        return Numbers(mounts, search.link_names(plant, bodies), BUS, free=FREE)
 
     found, after = arm_registers(Problem(plant, make(mounts), bodies, episodes, [used_rows(one) for one in episodes],
-                                         lambda: None, dynamics.Demand(plant, joints, bodies)), make)
+                                         lambda: None, search.Demand(plant, joints, bodies)), make)
     raw = {joint: written(register_family_of(LEROBOT), mount.model.servo) for joint, mount in after.items()}
     assert {joint: one["P_Coefficient"] for joint, one in raw.items()} == {joint: P for joint in joints} | alone
     assert {one["Acceleration"] for one in raw.values()} == {254}

@@ -9,12 +9,10 @@ import pytest
 import servotwin as st
 from robots.robots_cases import links
 from servotwin.errors import InputError
-from servotwin.identification.arms import dynamics, identify_arm
+from servotwin.identification.arms import identify_arm, search
 from servotwin.identification.arms.arm_fit import BELIEFS, ArmCause, confirmed, shaken
-from servotwin.identification.arms.dynamics import WholeArm
-from servotwin.identification.arms.lanes import JointLanes
-from servotwin.identification.arms.problem import Problem
 from servotwin.identification.arms.rows import Noise, Numbers, beyond_scatter, episodes_from, used_rows, whitened
+from servotwin.identification.arms.search import JointLanes, Problem, WholeArm
 from servotwin.identification.fitting.case import LogPart
 from servotwin.identification.fitting.uncertainty import Rows, Unidentifiable
 from servotwin.robots import Motion, Mount, run_motion
@@ -51,7 +49,7 @@ def recorded(seed=0, seconds=10.0, *, gain=1.0, hand=None, payload=1.0):
     servo = servo.replace({"firmware.proportional_gain": gain * servo.get("firmware.proportional_gain")})
     time, angles = goals(seed, seconds)
     mounts = {joint: Mount(st.DigitalServo(servo), ZERO) for joint in JOINTS}
-    heavy = dynamics.with_masses(PLANT, dynamics.links_of(PLANT, JOINTS), np.array([1.0, 1.1 * payload]))
+    heavy = search.with_masses(PLANT, search.links_of(PLANT, JOINTS), np.array([1.0, 1.1 * payload]))
     run = run_motion(heavy, mounts, Motion(time=time, source="real", angles={
         joint: values + ZERO for joint, values in angles.items()}), bus=BUS, hold="previous")
     measured = {joint: COUNT * np.round((np.interp(time - LATENCY, run.time, run.record[joint]["joint_angle"]) - ZERO)
@@ -126,9 +124,9 @@ def test_a_payload_is_named_and_none_where_only_single_joints_look_like_one():
     assert "times as heavy" in found.causes[0].sentence
     healthy = fitted([recorded(seed, 8.0) for seed in range(2)])
     episodes = episodes_from([recorded(0, 8.0)], JOINTS, dict.fromkeys(JOINTS, SERVO))
-    what = Problem(PLANT, healthy.numbers, dynamics.links_of(PLANT, JOINTS), episodes,
+    what = Problem(PLANT, healthy.numbers, search.links_of(PLANT, JOINTS), episodes,
                    [used_rows(one) for one in episodes], lambda: None,
-                   dynamics.Demand(PLANT, JOINTS, dynamics.links_of(PLANT, JOINTS)))
+                   search.Demand(PLANT, JOINTS, search.links_of(PLANT, JOINTS)))
     arm, noise = what.whole(), Noise(np.array([healthy.noise[joint] for joint in JOINTS]), healthy.noise["clock"])
     slopes = [one.slopes for one in what.search(arm, noise).linear(healthy.best, central=True)]
     assert confirmed([ArmCause("masses", "as the first stage has it", 99.0)], what, arm, noise, healthy.best,
@@ -152,11 +150,11 @@ def test_without_a_robot_each_joint_gets_a_pendulum():
 
 
 def test_inverse_dynamics_are_linear_in_the_masses():
-    rng, bodies = np.random.default_rng(0), dynamics.links_of(PLANT, JOINTS)
+    rng, bodies = np.random.default_rng(0), search.links_of(PLANT, JOINTS)
     motion = rng.normal(size=(3, 5, 2))
     factors = np.array([1.3, 0.8])
-    torque, inertia = dynamics.asked_of(PLANT, JOINTS, bodies, *motion).of(factors)
-    heavy = dynamics.with_masses(PLANT, bodies, factors)
+    torque, inertia = search.asked_of(PLANT, JOINTS, bodies, *motion).of(factors)
+    heavy = search.with_masses(PLANT, bodies, factors)
     data = mujoco.MjData(heavy)
     for k in range(5):
         data.qpos[:], data.qvel[:], data.qacc[:] = motion[:, k]
@@ -181,11 +179,11 @@ def test_a_fit_simulates_what_a_run_does():
 
 def test_copies_are_what_each_of_them_is_alone():
     """Copies of which a number moves one joint only share the lanes of the others."""
-    bodies = dynamics.links_of(PLANT, JOINTS)
-    numbers = Numbers({joint: Mount(st.DigitalServo(SERVO)) for joint in JOINTS}, dynamics.link_names(PLANT, bodies),
+    bodies = search.links_of(PLANT, JOINTS)
+    numbers = Numbers({joint: Mount(st.DigitalServo(SERVO)) for joint in JOINTS}, search.link_names(PLANT, bodies),
                       BUS, each=True)
     episode = episodes_from([recorded(0, 3.0)], JOINTS, dict.fromkeys(JOINTS, SERVO))[0]
-    lanes = JointLanes(PLANT, numbers, bodies, lambda: None, dynamics.Demand(PLANT, JOINTS, bodies))
+    lanes = JointLanes(PLANT, numbers, bodies, lambda: None, search.Demand(PLANT, JOINTS, bodies))
     points = numbers.start + 0.01 * np.vstack([np.zeros(len(numbers)), np.eye(len(numbers))])
     found = lanes.angles(episode, points)
     for k in range(0, len(points), 5):
@@ -221,15 +219,15 @@ def test_derivatives_are_of_steps_that_an_arm_answers_by_about_its_noise():
     numbers = Numbers({joint: Mount(st.DigitalServo(SERVO)) for joint in JOINTS}, (), low)
     episode = episodes_from([recorded(3, 8.0)], JOINTS, dict.fromkeys(JOINTS, SERVO))[0]
     problem = Problem(PLANT, numbers, [], [episode], [used_rows(episode)], lambda: None,
-                      dynamics.Demand(PLANT, JOINTS, []))
-    search = problem.search(problem.lanes(), Noise(np.full(2, 5e-4), 0.0))
+                      search.Demand(PLANT, JOINTS, []))
+    one = problem.search(problem.lanes(), Noise(np.full(2, 5e-4), 0.0))
     k = numbers.names.index("motor.armature_resistance")
 
     def slope():
-        return search.linear(numbers.start, central=True)[0].slopes[..., k]
+        return one.linear(numbers.start, central=True)[0].slopes[..., k]
 
     coarse, own = slope(), slope()
-    search.steps = np.full(len(numbers), 1e-3)
+    one.steps = np.full(len(numbers), 1e-3)
     true = slope()
     assert np.linalg.norm(coarse - true) > 0.1 * np.linalg.norm(true)
     assert np.linalg.norm(own - true) < 0.05 * np.linalg.norm(true)

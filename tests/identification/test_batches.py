@@ -8,9 +8,8 @@ import pytest
 import servotwin as st
 from identification.synthetic_logs import PENDULUM, TRUTH, run
 from servotwin.errors import InputError
-from servotwin.identification.fitting.batches import Bundle, Running, batches
 from servotwin.identification.fitting.case import DELAY_SCALE, Point
-from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.forecast import Bundle, Forecast, Running, batches
 from servotwin.identification.fitting.free import Space
 from servotwin.simulation.progress import Crew
 

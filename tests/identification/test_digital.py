@@ -14,7 +14,7 @@ from servotwin.identification import Log, Structure, as_structure, compare_struc
 from servotwin.identification.fitting.case import GAIN, with_loop_gain
 from servotwin.identification.fitting.checks import usual_free
 from servotwin.identification.fitting.free import nominal
-from servotwin.identification.fitting.structures import as_arm
+from servotwin.identification.fitting.ladder import as_arm
 
 QUICK = {"priors": None, "starts": 1, "compare_with": (), "holdout": 0, "diagnose": False}
 MOTIONS = ("step", "prbs", "triangle")

@@ -10,7 +10,7 @@ import servotwin as st
 from identification.fits import fitted
 from identification.synthetic_logs import TRUTH, noisy, run
 from servotwin.identification import LUMPED
-from servotwin.identification.fitting.draws import Allowed
+from servotwin.identification.fitting.assumptions import Allowed
 
 N = TRUTH.gear.gear_reduction
 SCALED = ["motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque"]

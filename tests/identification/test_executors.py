@@ -13,9 +13,8 @@ from identification.fits import WRONG, fitted, some
 from identification.synthetic_logs import PENDULUM
 from servotwin.errors import InputError
 from servotwin.identification import friction_ladder
-from servotwin.identification.fitting.batches import Running
 from servotwin.identification.fitting.case import Point
-from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.forecast import Forecast, Running
 from servotwin.identification.fitting.free import Space
 from simulation.test_workers import Backwards
 

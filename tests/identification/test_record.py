@@ -9,7 +9,7 @@ import pytest
 import servotwin as st
 from identification.synthetic_logs import TRUTH, noisy, run
 from servotwin.identification import LUMPED, Space, identify
-from servotwin.identification.fitting.record import data_hash
+from servotwin.identification.fitting.fit import data_hash
 from servotwin.parameters import Servo
 
 DISC = st.loads.Inertia(1.06e-2) + st.loads.Constant(0.3)  # a known torque: the scale of all torques

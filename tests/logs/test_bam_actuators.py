@@ -11,7 +11,7 @@ from servotwin.errors import InputError, UnknownNameError
 from servotwin.identification import BamConvention, read_bam_log, read_bam_parameters, write_bam_parameters
 from servotwin.identification.fitting.case import with_loop_gain
 from servotwin.logs import BAM_ACTUATORS
-from servotwin.logs.bam_convention import bam_name_of
+from servotwin.logs.bam_logs import bam_name_of
 
 PLANT = {"kt": 1.2, "R": 2.5, "armature": 0.02, "friction_viscous": 0.03, "friction_base": 0.05, "model": "m1"}
 # duty per radian and unit of the gain, and the largest duty, as BAM's code has them

@@ -15,8 +15,8 @@ from servotwin import plotting
 from servotwin.cli import linear_report
 from servotwin.datasheet import Bandwidth, Loop
 from servotwin.errors import InputError
-from servotwin.identification.fitting.holdout import ErrorTable, LogError
-from servotwin.identification.report import parts
+from servotwin.identification.fitting.fit import ErrorTable, LogError
+from servotwin.identification.report import page as report_page
 from servotwin.identification.report import pictures as report_pictures
 from servotwin.logs import Log
 from servotwin.look import on_page
@@ -178,7 +178,7 @@ def test_a_page_says_which_it_is():
 
 @pytest.mark.parametrize(("count", "pictures"), [(1, 1), (12, 1), (13, 2)])
 def test_a_report_has_all_pages(count, pictures):
-    assert parts.errors(errors(count), [], "Of all logs.").count("<img") == pictures
+    assert report_page.errors_section(errors(count), [], "Of all logs.").count("<img") == pictures
 
 
 def test_names_of_many_joints_do_not_overlap():

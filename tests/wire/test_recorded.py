@@ -8,7 +8,7 @@ import pytest
 
 import servotwin as st
 from servotwin.bench.bus import BusRig, bus, sdk_wire
-from servotwin.bench.bus.ticks import Ticks
+from servotwin.bench.bus.bus import Ticks
 from servotwin.bench.recording import About, Limits, experiments, record
 from wire_talk import STS
 

@@ -20,13 +20,10 @@ from servotwin.bench.bench import (
     measured_shares,
     model_shares,
 )
-from servotwin.bench.calibration import Interval, command_voltage_interval, zero_offset_interval
 from servotwin.bench.control_supply import ControlSupply, run_on_one_supply
-from servotwin.bench.generator import PulseGenerator
-from servotwin.bench.instruments import InstrumentPair, instrument_pairs
-from servotwin.bench.lift_records import Lifts, is_pattern, lifts
+from servotwin.bench.generator import Interval, PulseGenerator, command_voltage_interval, zero_offset_interval
 from servotwin.bench.load_calibration import LoadCalibration, calibrate_loads
-from servotwin.bench.load_columns import LoadTable, is_load_table, load_table
+from servotwin.bench.load_columns import Lifts, LoadTable, is_load_table, is_pattern, lifts, load_table
 from servotwin.bench.standing import Standing, standing
 from servotwin.bench.table_columns import (
     BenchTable,
@@ -39,7 +36,14 @@ from servotwin.bench.table_columns import (
     fit_line,
     table_fits,
 )
-from servotwin.bench.table_rows import RowFinding, TableCalibration, calibrate_table, row_findings
+from servotwin.bench.table_rows import (
+    InstrumentPair,
+    RowFinding,
+    TableCalibration,
+    calibrate_table,
+    instrument_pairs,
+    row_findings,
+)
 
 __all__ = [
     "FEEDBACK_CONVERTER",

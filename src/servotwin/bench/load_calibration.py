@@ -18,12 +18,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from servotwin.bench.lift_records import LiftRecord
-from servotwin.bench.load_columns import LoadTable, load_table
+from servotwin.bench.load_columns import LiftRecord, LoadTable, load_table
 from servotwin.bench.load_lines import CURRENT, SAG, SPEED, VOLTAGE, LoadLine, LoadLines, load_lines
 from servotwin.bench.table_columns import LineFit, curvature_test, fit_line, wide
-from servotwin.bench.table_parameters import Estimate, with_measured
-from servotwin.bench.table_words import plus_minus, residual_pattern
+from servotwin.bench.table_parameters import Estimate, plus_minus, residual_pattern, with_measured
 from servotwin.parameters import Quantity, Servo, printed_points
 from servotwin.parameters.servo import output_value
 from servotwin.physics import load_share
@@ -682,7 +680,7 @@ def calibrate_loads(table: str | Path | LoadTable | Mapping[str, ArrayLike], ser
 
 
 def _stiffness(servo: Servo, sag: LoadLine, made: dict[str, Estimate]) -> list[str]:
-    from servotwin.bench.load_stiffness import gain_of_sag
+    from servotwin.bench.table_parameters import gain_of_sag
 
     gain = gain_of_sag(servo, sag)
     if isinstance(gain, str):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from servotwin.bench.backends import EmulatedBackend, MockBackend
-from servotwin.bench.emulator.build import harness
 from servotwin.bench.emulator.plant import ServoOnPins, fronts_of
+from servotwin.bench.emulator.process import harness
 from servotwin.bench.recording.analog_rig import AnalogRig
 from servotwin.errors import BenchError
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from servotwin.errors import InputError
-from servotwin.logs.column_values import meaning_of, words_and_unit
+from servotwin.logs.columns import meaning_of, words_and_unit
 from servotwin.tables import read_table
 
 # --- Columns of a dial under names of one's own -----------------------------------------------------------------------

@@ -3,13 +3,72 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from servotwin.bench.table_columns import LineFit, TableFit
+from servotwin.datasheet.holding import changed, hold
 from servotwin.errors import InputError
+from servotwin.models import DigitalServo, PulseServo, default_model
 from servotwin.parameters import Quantity, Servo, unit_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from servotwin.bench.load_lines import LoadLine
+    from servotwin.models import Model
+
+
+
+# --- Numbers of a calibration in words --------------------------------------------------------------------------------
+
+def plus_minus(value: float, error: float) -> str:
+    """Return a value with its standard error in units of the last place, two digits of it.
+
+    Examples
+    --------
+    >>> plus_minus(432.648, 0.841), plus_minus(0.0073244, 0.0000394), plus_minus(-44.13, 1.14), plus_minus(1234.5, 56.0)
+    ('432.65(84)', '0.007324(39)', '-44.1(1.1)', '1234(56)')
+    """
+    if not (math.isfinite(error) and error > 0.0):
+        return f"{value:.6g}"
+    places = max(1 - math.floor(math.log10(error)), 0)
+    shown = f"{error:.{places}f}"
+    return f"{value:.{places}f}({shown if float(shown) >= 1.0 else shown.partition('.')[2].lstrip('0')})"
+
+
+def residual_pattern(x: Sequence[float], residuals: Sequence[float]) -> str:
+    """Return what the signs of residuals do along x.
+
+    Examples
+    --------
+    >>> residual_pattern([0.0, 1.0, 2.0, 3.0, 4.0], [-0.98, 0.64, 0.64, 0.65, -0.95])
+    'the ends lie below the line and the middle above it'
+    >>> residual_pattern([0.0, 1.0, 2.0, 3.0], [0.1, -0.1, 0.1, -0.1])
+    'above and below the line in turn'
+    """
+    ordered = [r for _, r in sorted(zip(x, residuals, strict=True))]
+    least = 1e-9 * max(abs(r) for r in ordered)
+    signs = [math.copysign(1.0, r) for r in ordered if abs(r) > least]
+    if not signs:
+        return "all on the line"
+    runs = 1 + sum(a != b for a, b in pairwise(signs))
+    if runs == 3:
+        ends, middle = ("below", "above") if signs[0] < 0.0 else ("above", "below")
+        return f"the ends lie {ends} the line and the middle {middle} it"
+    if runs == len(signs):
+        return "above and below the line in turn"
+    return f"{runs} runs of one sign among {len(signs)} points: no pattern"
+
+
+# --- From the straight lines of a bench table to the parameters of the servo, each with its standard error ------------
 
 _P, _B_O = "potentiometer.feedback_gain", "potentiometer.feedback_offset"
 _TITLES = {"V_o": "feedback voltage", "q": "output angle", "t_a": "pulse width", "V_i": "command voltage"}
@@ -114,3 +173,86 @@ def _of_voltages(lines: Mapping[str, LineFit], over_t_a: str, over_v_i: str) -> 
     if (line := lines.get("V_o(V_i)")) is not None:
         found["electronics.command_offset"] = Estimate(line.intercept, line.intercept_error, over_v_i)
     return found
+
+
+# --- From how far loads pull a servo off its goal to the gain of its loop, by the servo's own simulation at -----------
+
+_FURTHEST = 8.0  # times the gain of the servo, either way
+_STEP = 1.2  # of the gain, for its derivative
+_VAGUE = 0.5  # of a gain: a larger standard error tells nothing
+_MOST_LOADS = 6  # that are simulated: those of the table, or so many of them
+
+
+def gain_of_sag(servo: Servo, sag: LoadLine) -> tuple[str, Estimate] | str:
+    """Return the gain with which a servo gives way to loads as a table says; a sentence where none does.
+
+    Deadband, friction and frame of the servo are kept: they are what the first sag is made of.
+
+    Parameters
+    ----------
+    servo : Servo
+    sag : LoadLine
+        Angle error over load.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        try:
+            model = default_model(servo)
+        except ValueError as error:
+            return f"the gain of the loop stays: {error}"
+    name = "firmware.proportional_gain" if isinstance(model, DigitalServo) else "electronics.stretcher_gain"
+    now = model.servo.get(name)
+    if not isinstance(model, DigitalServo | PulseServo) or not isinstance(now, float) or not now > 0.0:
+        return f"the gain of the loop stays: {type(model).__name__} of this servo has none that a sag could tell"
+    loads = np.unique(sag.x.values[sag.rows])
+    if loads.size > _MOST_LOADS:
+        loads = np.quantile(loads, np.linspace(0.0, 1.0, _MOST_LOADS))
+    wanted = sag.line.slope
+
+    def off(log_gain: float) -> float:
+        return math.log(_compliance(changed(model, {name: math.exp(log_gain)}), loads) / wanted)
+
+    middle = math.log(now)
+    found = _root(off, middle, math.log(_FURTHEST))
+    if found is None:
+        own = _compliance(model, loads)
+        does = "" if math.isnan(own) else f"; with its {now:.4g} the servo does by {math.degrees(own):.3g}"
+        return (f"{name} stays: no value from {now / _FURTHEST:.3g} to {now * _FURTHEST:.3g} gives way by "
+                f"{math.degrees(wanted):.3g} ° per N m{does}")
+    rate = (off(found + math.log(_STEP)) - off(found - math.log(_STEP))) / (2.0 * math.log(_STEP))
+    if not math.isfinite(rate) or rate == 0.0:
+        return f"{name} stays: loads of this size do not tell it"
+    gain = math.exp(found)
+    spread = gain * sag.line.slope_error / wanted / abs(rate)
+    if spread > _VAGUE * gain:
+        return (f"{name} stays: the table tells it to {100.0 * spread / gain:.0f} % only, {gain:.3g} ± {spread:.2g}; "
+                "more or larger loads would tell it")
+    return name, Estimate(gain, spread, "sag over load, by simulating the servo at rest; deadband, friction and frame "
+                                       "of the servo")
+
+
+def _compliance(model: Model, loads: NDArray[np.float64]) -> float:
+    """Return how much a servo gives way per torque [rad/(N m)]; nan where it does not stand."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        errors = [hold(model, load).error for load in loads.tolist()]
+    slope = float(np.polyfit(loads, errors, 1)[0]) if np.isfinite(errors).all() else math.nan
+    return slope if slope > 0.0 else math.nan
+
+
+def _root(off: Callable[[float], float], middle: float, furthest: float) -> float | None:
+    """Return where a falling function is 0, walking from the middle outwards; None where it is not within reach."""
+    from scipy.optimize import brentq
+
+    low = off(middle)
+    if math.isnan(low):
+        return None
+    at, step = middle, math.copysign(math.log(1.6), low)
+    while abs(at + step - middle) <= furthest + 1e-9:
+        after = off(at + step)
+        if math.isnan(after):
+            return None
+        if (after > 0.0) != (low > 0.0):
+            return float(brentq(off, min(at, at + step), max(at, at + step), xtol=1e-2))
+        at += step
+    return None

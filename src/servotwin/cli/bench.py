@@ -20,10 +20,10 @@ from servotwin.cli.terminal import emit, emit_help, emit_json, json_text, pairs,
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from servotwin.bench.emulator.paper_chain import ChainRow
+    from servotwin.bench.emulator.plant import ChainRow
     from servotwin.bench.recording import About, AnalogRig, Calibration, Experiment, Limits, Recorded, Wiring
     from servotwin.bench.video import Filmed
-    from servotwin.bench.video.instant import Region
+    from servotwin.bench.video.marker import Region
     from servotwin.cli.bench_jobs import Job
     from servotwin.cli.outputs import Target
     from servotwin.loads import Load
@@ -216,7 +216,7 @@ def calibrate(
 
 
 def _with_channel(base: Wiring, what: str) -> Wiring:
-    from servotwin.bench.recording.calibrate import CHANNEL
+    from servotwin.bench.recording.wiring import CHANNEL
 
     return base.replace(channels=tuple(dict.fromkeys((*base.channels, CHANNEL[what]))))
 
@@ -224,7 +224,7 @@ def _with_channel(base: Wiring, what: str) -> Wiring:
 def _wires(rig: AnalogRig, what: str, meter: str | None) -> Calibration:
     """Read a channel at each value of the meter; nothing moves."""
     from servotwin.bench.recording import calibrated
-    from servotwin.bench.recording.calibrate import CHANNEL, UNIT
+    from servotwin.bench.recording.wiring import CHANNEL, UNIT
     from servotwin.units.quantities import quantity
 
     dimension = "current" if UNIT[what] == "A" else "voltage"
@@ -325,7 +325,7 @@ def bench_paper(
 ) -> None:
     """Run the paper's bench in emulation."""
     from servotwin.bench import compare
-    from servotwin.bench.emulator.paper_chain import chain_rows
+    from servotwin.bench.emulator.plant import chain_rows
     from servotwin.parameters import load_dataset
     from servotwin.plotting import save
     from servotwin.tables import csv_text

@@ -16,7 +16,7 @@ import typer
 from servotwin.cli import log as reading
 from servotwin.cli import shared_options as shared
 from servotwin.cli.terminal import emit_json, pairs, patience, show, table
-from servotwin.logs.mend_names import MENDS
+from servotwin.logs.formats import MENDS
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

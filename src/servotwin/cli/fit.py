@@ -14,11 +14,11 @@ from servotwin.cli import log
 from servotwin.cli import shared_options as shared
 from servotwin.cli.shared_options import best_kept, end_if_stopped
 from servotwin.cli.terminal import emit_json, pairs, patience, show, table
-from servotwin.logs.reading import reading_facts
+from servotwin.logs.formats import reading_facts
 
 if TYPE_CHECKING:
     from servotwin.bench import LoadCalibration
-    from servotwin.bench.lift_records import LiftRecord
+    from servotwin.bench.load_columns import LiftRecord
     from servotwin.cli.outputs import Target
     from servotwin.identification import Advice, Fit, Ladder, Log
     from servotwin.identification.fitting.stopping import Within
@@ -39,7 +39,7 @@ def calibrate_of_loads(path: Path, servo: Servo | None, arm: str | None, columns
         If table, record or arm is not usable.
     """
     from servotwin.bench import calibrate_loads, is_pattern, lifts
-    from servotwin.bench.lift_records import length_of
+    from servotwin.bench.load_columns import length_of
     from servotwin.errors import InputError
 
     length = length_of(arm)

@@ -13,8 +13,8 @@ from servotwin.cli.summary import was_set
 from servotwin.cli.terminal import emit_json, pairs, show, table
 from servotwin.errors import InputError, ServotwinError, UnknownNameError
 from servotwin.identification.fitting.checks import MENDED
+from servotwin.identification.fitting.fit import fit_percent
 from servotwin.identification.fitting.free import Space, nominal
-from servotwin.identification.fitting.holdout import fit_percent
 from servotwin.identification.fitting.stopping import Within
 from servotwin.identification.report.pictures import (
     MODELS,
@@ -26,7 +26,7 @@ from servotwin.identification.report.pictures import (
     percent,
     tables_of,
 )
-from servotwin.logs.mend_names import MENDS
+from servotwin.logs.formats import MENDS
 from servotwin.studies.kinds import Distribution, Normal, Offset, Relative, Uniform, distribution_of
 from servotwin.units.quantities import number_and_unit, quantity
 
@@ -35,8 +35,7 @@ if TYPE_CHECKING:
 
     from servotwin.bench import TableCalibration
     from servotwin.identification import Advice, Fit, Ladder, Log
-    from servotwin.identification.fitting.fit import Trace
-    from servotwin.identification.fitting.holdout import ErrorTable
+    from servotwin.identification.fitting.fit import ErrorTable, Trace
     from servotwin.identification.fitting.yielding import Yielded
     from servotwin.models import Model
     from servotwin.parameters import Quantity, Servo
@@ -363,7 +362,7 @@ def calibration_facts(found: TableCalibration, out: Path | None = None) -> dict[
 
 
 def _lines(found: TableCalibration) -> Any:
-    from servotwin.bench.table_words import plus_minus
+    from servotwin.bench.table_parameters import plus_minus
 
     rows = []
     for name, fit in found.lines.items():

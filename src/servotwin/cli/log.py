@@ -13,9 +13,7 @@ import typer
 from servotwin.cli import shared_options as shared
 from servotwin.cli.terminal import emit_json, patience, show, table
 from servotwin.errors import one_line
-from servotwin.logs.formats import FORMATS, LOG_FORMATS
-from servotwin.logs.mend_names import MENDS
-from servotwin.logs.reading import read_alike
+from servotwin.logs.formats import FORMATS, LOG_FORMATS, MENDS, read_alike
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

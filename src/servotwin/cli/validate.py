@@ -12,7 +12,7 @@ import typer
 from servotwin.cli import log
 from servotwin.cli import shared_options as shared
 from servotwin.cli.terminal import emit_json, patience, show, table
-from servotwin.logs.reading import reading_facts
+from servotwin.logs.formats import reading_facts
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.datasheet.warming import HOT_WINDING
-from servotwin.logs.column_values import step_of
+from servotwin.logs.columns import step_of
 from servotwin.physics import Temperatures
 from servotwin.simulation.metrics import tolerance
 from servotwin.simulation.rest import AT_REST, LEAST_REST, look_period, rest_of, swing_of

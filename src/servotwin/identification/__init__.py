@@ -9,13 +9,19 @@ if TYPE_CHECKING:
     from servotwin.identification.fitting.advise import Advice, Experiment, advise
     from servotwin.identification.fitting.case import LogPart, Point
     from servotwin.identification.fitting.checks import findings
-    from servotwin.identification.fitting.fit import Fit, Interval, Start, Trace
+    from servotwin.identification.fitting.fit import ErrorTable, Fit, Interval, LogError, Start, Trace
     from servotwin.identification.fitting.forecast import Forecast
     from servotwin.identification.fitting.free import LUMPED, FreeParameter, Space
-    from servotwin.identification.fitting.holdout import ErrorTable, LogError
     from servotwin.identification.fitting.identify import identify
-    from servotwin.identification.fitting.ladder import RUNGS, Ladder, Rung, friction_ladder
-    from servotwin.identification.fitting.structures import Structure, as_structure, compare_structures
+    from servotwin.identification.fitting.ladder import (
+        RUNGS,
+        Ladder,
+        Rung,
+        Structure,
+        as_structure,
+        compare_structures,
+        friction_ladder,
+    )
     from servotwin.identification.fitting.suspicions.look import Finding
     from servotwin.identification.fitting.uncertainty import Uncertainty, Unidentifiable
     from servotwin.identification.fitting.validate import Validation, validate
@@ -64,13 +70,12 @@ _HOMES = {
     "identification.fitting.advise": ("Advice", "Experiment", "advise"),
     "identification.fitting.case": ("LogPart", "Point"),
     "identification.fitting.checks": ("findings",),
-    "identification.fitting.fit": ("Fit", "Interval", "Start", "Trace"),
+    "identification.fitting.fit": ("ErrorTable", "Fit", "Interval", "LogError", "Start", "Trace"),
     "identification.fitting.forecast": ("Forecast",),
     "identification.fitting.free": ("LUMPED", "FreeParameter", "Space"),
-    "identification.fitting.holdout": ("ErrorTable", "LogError"),
     "identification.fitting.identify": ("identify",),
-    "identification.fitting.ladder": ("RUNGS", "Ladder", "Rung", "friction_ladder"),
-    "identification.fitting.structures": ("Structure", "as_structure", "compare_structures"),
+    "identification.fitting.ladder": (
+        "RUNGS", "Ladder", "Rung", "Structure", "as_structure", "compare_structures", "friction_ladder"),
     "identification.fitting.suspicions.look": ("Finding",),
     "identification.fitting.uncertainty": ("Uncertainty", "Unidentifiable"),
     "identification.fitting.validate": ("Validation", "validate"),

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from servotwin.errors import InputError, UnitError, UnknownNameError
-from servotwin.logs.column_values import CLOCKS
-from servotwin.logs.columns import COMMANDS, NAMES, SWITCH, Column, dimension_of_signal
+from servotwin.logs.columns import CLOCKS, COMMANDS, NAMES, SWITCH, Column, dimension_of_signal
 from servotwin.units.words import scaled_unit, units_written
 
 SAID = "--columns"

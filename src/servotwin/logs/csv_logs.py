@@ -14,22 +14,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, OutputError, OutputExistsError, UnitError, UnknownNameError
-from servotwin.logs import column_values as names
-from servotwin.logs.column_values import Guess, are_counts, clock_of, guess, is_increasing, range_of
+from servotwin.logs import columns as names
 from servotwin.logs.column_words import COMMAND, SAID, SHORT, Wanted, column_said, wanted_columns
 from servotwin.logs.columns import (
     COMMANDS,
     SWITCH,
     TIME,
     Column,
+    Guess,
+    are_counts,
+    clock_of,
     columns_of,
     dimension_of_signal,
+    guess,
+    is_increasing,
+    range_of,
     si_unit_of,
     switch_value,
 )
+from servotwin.logs.formats import DROP, SPREAD, TORN, ReadColumn, Reading
 from servotwin.logs.log import ANGLES, Log
 from servotwin.logs.log_checks import check_said, checked_definition, defined_commands, is_defined
-from servotwin.logs.mend_names import DROP, SPREAD, TORN
 from servotwin.logs.mends import (
     Timed,
     checked_mends,
@@ -40,7 +45,6 @@ from servotwin.logs.mends import (
     without_thousands,
     without_torn,
 )
-from servotwin.logs.reading import ReadColumn, Reading
 from servotwin.logs.register_columns import RawRegisters, named_after_any, raw_registers, register_columns
 from servotwin.logs.sidecar import FOLDER_FILE, Sidecar, json_bytes, sidecar_of, sidecar_path, sidecar_words
 from servotwin.parameters import Servo, write_file

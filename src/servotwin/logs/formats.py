@@ -2,10 +2,132 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib import import_module
 from types import ModuleType
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+if TYPE_CHECKING:
+    from servotwin.logs.columns import Column
+    from servotwin.logs.log import Log
+
+
+
+# --- What a reader mends in a file when it is asked to, by name -------------------------------------------------------
+
+TORN, RESET, DROP, SPREAD, CLOCK16, THOUSANDS = (
+    "torn", "reset", "drop-repeated", "spread-repeated", "clock16", "thousands")
+MENDS: Mapping[str, str] = {
+    TORN: "leaves out rows that are cut, joined or hold no number",
+    RESET: "makes a log of its own of what comes after the time began again",
+    DROP: "leaves out rows with the stamp of the row before",
+    SPREAD: "spreads rows with one stamp between their neighbours",
+    CLOCK16: "joins times of a counter of 16 bits",
+    THOUSANDS: "takes marks within whole numbers for thousands separators",
+}
+"""What a reader mends when it is asked to; the certain faults are mended unasked."""
+
+
+# --- How a file was read: which of its columns is what, and what was passed over --------------------------------------
+
+@dataclass(frozen=True)
+class ReadColumn:
+    """How one column of a file was read.
+
+    Parameters
+    ----------
+    column : str
+        As the header has it.
+    signal : str
+    unit : str
+        Of its numbers, with scale and offset.
+    known : str
+        How this was known: "named" by a name of `servotwin`, "--columns", "sidecar", or "guessed" and from what.
+    """
+
+    column: str
+    signal: str
+    unit: str
+    known: str
+
+    @property
+    def guessed(self) -> bool:
+        """Whether it was guessed."""
+        return self.known.startswith("guessed")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """How a log was read from its file.
+
+    Parameters
+    ----------
+    file : str
+    columns : tuple of ReadColumn
+    remarks : tuple of str
+        What was passed over, each in one line.
+    unread : tuple of str
+        Columns that are none of these.
+    layout : mapping of str to Column
+        Of a CSV file: what its sidecar would say.
+
+    Examples
+    --------
+    >>> print(Reading(columns=(ReadColumn("ms", "time", "ms", "guessed from its name"),), unread=("note",)))
+    column  signal  unit  known
+    ms      time    ms    guessed from its name
+    not read: note
+    """
+
+    file: str = ""
+    columns: tuple[ReadColumn, ...] = ()
+    remarks: tuple[str, ...] = ()
+    unread: tuple[str, ...] = ()
+    layout: Mapping[str, Column] = field(default_factory=dict, repr=False)
+
+    def __str__(self) -> str:
+        rows = [("column", "signal", "unit", "known"),
+                *((one.column, one.signal, one.unit, one.known) for one in self.columns)]
+        widths = [max(len(row[k]) for row in rows) for k in range(4)]
+        lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+        return "\n".join([*lines, *self.notes()])
+
+    def notes(self) -> tuple[str, ...]:
+        """Return what is said below the table: remarks, and what was not read."""
+        unread = (f"not read: {', '.join(self.unread)}",) if self.unread else ()
+        return (*self.remarks, *unread)
+
+
+def read_alike(logs: Sequence[Log]) -> list[list[Log]]:
+    """Return logs in groups whose columns were read in the same way; those without a reading are left out."""
+    groups: dict[Any, list[Log]] = {}
+    for log in logs:
+        if log.reading is not None:
+            groups.setdefault(log.reading.columns, []).append(log)
+    return list(groups.values())
+
+
+def reading_facts(logs: Sequence[Log]) -> list[dict[str, Any]]:
+    """Return how logs were read, as plain data: one entry for each way.
+
+    Examples
+    --------
+    >>> from servotwin.logs import Log
+    >>> log = Log(name="run", time=[0.0, 1.0, 2.0], command=[0.0, 1.0, 1.0], command_kind="angle",
+    ...           measured={"output_angle": [0.0, 0.5, 1.0]},
+    ...           reading=Reading(columns=(ReadColumn("ms", "time", "ms", "guessed from its name"),)))
+    >>> reading_facts([log])[0]["columns"]
+    [{'column': 'ms', 'signal': 'time', 'unit': 'ms', 'known': 'guessed from its name'}]
+    """
+    return [{"logs": [log.name for log in some],
+             "columns": [{"column": one.column, "signal": one.signal, "unit": one.unit, "known": one.known}
+                         for one in some[0].reading.columns if some[0].reading is not None],
+             "remarks": [remark for log in some if log.reading is not None for remark in log.reading.remarks]}
+            for some in read_alike(logs) if some[0].reading is not None]
+
+
+# --- The formats of logs ----------------------------------------------------------------------------------------------
 
 class LogFormat(NamedTuple):
     """A format of logs.

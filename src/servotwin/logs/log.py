@@ -18,7 +18,7 @@ from servotwin.signals.shapes import sampled
 from servotwin.signals.signal import filled
 
 if TYPE_CHECKING:
-    from servotwin.logs.reading import Reading
+    from servotwin.logs.formats import Reading
     from servotwin.signals import Signal
 
 ANGLES = ("output_angle", "feedback_voltage")  # of the signals that tell where the shaft is, the better one first

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, UnknownNameError
-from servotwin.logs.column_values import CLOCKS, clock_of, stamps_of
-from servotwin.logs.columns import COMMANDS, TIME, Column
+from servotwin.logs.columns import CLOCKS, COMMANDS, TIME, Column, clock_of, stamps_of
+from servotwin.logs.formats import CLOCK16, DROP, MENDS, RESET, SPREAD, THOUSANDS, TORN
 from servotwin.logs.log_checks import defined_times, impossible, is_defined, refuse
-from servotwin.logs.mend_names import CLOCK16, DROP, MENDS, RESET, SPREAD, THOUSANDS, TORN
 from servotwin.tables import TextTable, said_lines
 from servotwin.tables.reading import MISSING, grouped_in, without_groups
 

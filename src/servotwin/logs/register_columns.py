@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.logs.column_values import MOST_DEGREES
 from servotwin.logs.column_words import SAID
-from servotwin.logs.columns import Column
+from servotwin.logs.columns import MOST_DEGREES, Column
 from servotwin.parameters import Servo
 from servotwin.parameters.registers.held import register_family_of
 from servotwin.parameters.registers.listing import register_family, register_words

@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from servotwin import units
 from servotwin.errors import InputError, UnitError, UnknownNameError
-from servotwin.logs.joint_tables import is_joint_table
-from servotwin.logs.lerobot_data import Dataset, Joint, Rows, open_dataset
+from servotwin.logs.lerobot import Dataset, Joint, Rows, is_joint_table, open_dataset
 from servotwin.logs.sidecar import read_json
 from servotwin.tables import TextTable, read_table
 from servotwin.units.words import scaled_unit, unit_word, units_written

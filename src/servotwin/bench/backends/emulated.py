@@ -9,8 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from servotwin.bench.emulator.display import Display
-from servotwin.bench.emulator.process import CYCLE, FREQUENCY, Microcontroller, Pins
+from servotwin.bench.emulator.process import CYCLE, FREQUENCY, Display, Microcontroller, Pins
 from servotwin.bench.flash import firmware_file
 from servotwin.bench.wire.frames import Frame, Kind, Splitter, protocol, to_wire
 from servotwin.errors import BenchError, InputError

@@ -5,17 +5,239 @@ from __future__ import annotations
 import contextlib
 import math
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 from servotwin.bench.backends.backend import Backend
-from servotwin.bench.bus.goals import Goals, goal_of
-from servotwin.bench.bus.scan import wire_of
+from servotwin.bench.backends.serial_port import SerialBackend
+from servotwin.bench.bus.families import BusFamily, BusModel, chunks, count_of, decoded
+from servotwin.bench.bus.scan import FoundServo, identified, wire_of
 from servotwin.bench.bus.sdk_wire import BITS, PATIENCE, Answer, BusWire
-from servotwin.bench.bus.servo import BusServo, opened
-from servotwin.bench.bus.ticks import Ticks
 from servotwin.bench.recording.experiment import Experiment
 from servotwin.errors import BenchError, InputError
+
+# --- A servo on a wire, as the recorder knows it: its registers, what it was told, what it said -----------------------
+
+_ALERT = 128  # of a status byte of protocol 2
+
+
+class BusServo:
+    """What is known of a servo.
+
+    Parameters
+    ----------
+    id : int
+    model : BusModel
+    registers : mapping of str to int
+        Raw values of all registers, as they were read.
+
+    Raises
+    ------
+    BenchError
+        If it is not set to control its angle.
+    """
+
+    def __init__(self, id: int, model: BusModel, registers: Mapping[str, int]) -> None:
+        self.id, self.model, self.registers = id, model, dict(registers)
+        self.limits = self.family.goals(self.registers)
+        self.channels = self.family.columns(self.registers)
+        first = self.family.block[0]
+        self._places = [(self.family.registers[one.register], one.scale, one.offset,
+                         self.family.registers[one.register].address - first) for one in self.channels]
+        self.goal = registers.get("Goal_Position", self.family.middle)
+        self.torque = bool(registers.get("Torque_Enable", 0))
+        self.command = math.nan  # deg
+        self.fresh()
+
+    def fresh(self) -> None:
+        """Forget what belongs to a run."""
+        self.order: tuple[int, int] = (-1, -1)
+        self.error, self.lost, self.tripped = 0, 0, False
+        self.misses = 0  # since its last answer
+        self._heard: float | None = None
+
+    @property
+    def family(self) -> BusFamily:
+        """Of its model."""
+        return self.model.family
+
+    def told(self, goal: int) -> None:
+        """Note a goal that was written [counts]."""
+        self.goal = goal
+        self.command = (goal - self.family.middle) * self.family.count
+
+    def heard(self, answer: Answer | None, now: float) -> float:
+        """Note whether it answered; return for how long it has not [s]."""
+        self.misses = 0 if answer is not None else self.misses + 1
+        if answer is not None or self._heard is None:
+            self._heard = now
+        return now - self._heard
+
+    def values(self, data: Sequence[int]) -> list[float]:
+        """Return the values of a block of its registers, in the units of its columns."""
+        return [scale * register.decode(data[place:place + register.size]) + offset
+                for register, scale, offset, place in self._places]
+
+    def words(self, values: Mapping[str, int]) -> str:
+        """Return what its status byte says, with registers that were read because of it."""
+        bits = self.error
+        if self.family.protocol == "dynamixel-2":
+            bits = values.get("Hardware_Error_Status", 0) if self.error & _ALERT else 0
+        said = [text for bit, text in self.family.errors.items() if bits & bit]
+        if not said:
+            return "no error any more" if not self.error else f"status {self.error}"
+        off = "; it has switched its torque off" if values.get("Torque_Enable") == 0 and self.torque else ""
+        return f"error: {', '.join(said)}{off}"
+
+    def facts(self) -> dict[str, Any]:
+        """Return what a sidecar says of it."""
+        return {"servo_id": self.id, "model": self.model.name, "family": self.family.name,
+                "registers": dict(self.registers),
+                "columns": {one.column: {"register": one.register, "scale": one.scale, "offset": one.offset}
+                            for one in self.channels},
+                "columns_source": self.family.source}
+
+
+def opened(wire: BusWire, protocol: str, servo: int) -> BusServo:
+    """Return a servo with all its registers read.
+
+    Raises
+    ------
+    BenchError
+        If it does not answer, is of a model that is not known, or is not set to control its angle.
+    """
+    model = identified(wire, protocol, servo)
+    memory: dict[int, int] = {}
+    for address, size in chunks(model.family.registers):
+        memory.update(enumerate(wire.read(servo, address, size).data, start=address))
+    try:
+        return BusServo(servo, model, decoded(model.family.registers, memory))
+    except BenchError as error:
+        raise BenchError(f"{error.what} at {wire.name}", error.problem) from None
+
+
+# --- A clock that ticks at a fixed rate and does not drift ------------------------------------------------------------
+
+class Ticks:
+    """Instants that lie whole periods behind the first; those that are missed are counted and passed over.
+
+    Parameters
+    ----------
+    rate : float
+        [Hz]
+    clock, sleep : callable
+        Of the host unless given [s].
+
+    Examples
+    --------
+    >>> now = [0.0]
+    >>> ticks = Ticks(100.0, clock=lambda: now[0], sleep=lambda t: now.__setitem__(0, now[0] + t))
+    >>> [ticks.next(), ticks.next()], round(now[0], 3)
+    ([0, 1], 0.01)
+    >>> now[0] = 0.0345  # something took long
+    >>> ticks.next(), ticks.late
+    (3, 1)
+    """
+
+    def __init__(self, rate: float, *, clock: Callable[[], float] = time.perf_counter,
+                 sleep: Callable[[float], None] = time.sleep) -> None:
+        self.rate = rate
+        self.late = 0
+        self.start = 0.0
+        self._clock, self._sleep = clock, sleep
+        self._tick = -1
+
+    def next(self) -> int:
+        """Wait for the next tick that has not passed and return its number; the first is now, and 0."""
+        if self._tick < 0:
+            self.start = self._clock()
+        self._tick += 1
+        missed = int((self._clock() - self.start) * self.rate) - self._tick
+        if missed > 0:
+            self.late += missed
+            self._tick += missed
+        wait = self.start + self._tick / self.rate - self._clock()
+        if wait > 0.0:
+            self._sleep(wait)
+        return self._tick
+
+
+# --- What a servo on a bus is told at which tick of an experiment -----------------------------------------------------
+
+_KIND = "angle"
+
+
+class Order(NamedTuple):
+    """What holds at a tick.
+
+    Parameters
+    ----------
+    goal : int or None
+        [counts]; None: torque off.
+    number : tuple of int
+        Of the order; a new one is to be written.
+    """
+
+    goal: int | None
+    number: tuple[int, int]
+
+
+class Goals:
+    """An experiment in ticks and counts.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    family : BusFamily
+    limits : tuple of int
+        Lowest and highest goal that the servo takes [counts].
+    rate : float
+        Of the ticks [Hz].
+
+    Raises
+    ------
+    InputError
+        If it commands no angles, or more than the servo takes.
+    """
+
+    def __init__(self, experiment: Experiment, family: BusFamily, limits: tuple[int, int], rate: float) -> None:
+        if experiment.kind != _KIND:
+            raise InputError(f"experiment {experiment.name!r}", got=f"commands of {experiment.kind}", allowed=_KIND)
+        self._counts = [None if one.value is None else goal_of(family, limits, one.value) for one in experiment.holds]
+        self._frames = [max(1, round((one.frame_period or experiment.frame_period) * rate)) for one in experiment.holds]
+        lengths = [max(1, round(one.duration * rate)) for one in experiment.holds]
+        self._starts = [0, *accumulate(lengths)]
+
+    @property
+    def ticks(self) -> int:
+        """How many there are."""
+        return self._starts[-1]
+
+    def at(self, tick: int) -> Order:
+        """Return what holds at a tick; behind the end the last goal stays."""
+        hold = min(bisect_right(self._starts, tick), len(self._counts)) - 1
+        return Order(self._counts[hold], (hold, (tick - self._starts[hold]) // self._frames[hold]))
+
+
+def goal_of(family: BusFamily, limits: tuple[int, int], angle: float) -> int:
+    """Return an angle [rad] as a goal [counts].
+
+    Raises
+    ------
+    InputError
+        If the servo does not take it.
+    """
+    goal = count_of(family, angle)
+    if not limits[0] <= goal <= limits[1]:
+        low, high = (round((count - family.middle) * family.count, 1) for count in limits)
+        raise InputError("goal of the servo", got=f"{(goal - family.middle) * family.count:.1f} deg",
+                         allowed=f"{low:g} to {high:g} deg, the limits in its registers")
+    return goal
+
+
+# --- Several servos on one wire, commanded and read at the same ticks -------------------------------------------------
 
 _MOST_RATE = 1000.0  # Hz
 _SILENCE, _MISSES = 0.5, 5  # s and questions without an answer after which a servo counts as gone
@@ -274,3 +496,75 @@ class Bus:
 
 def _towards(start: int, end: int, way: float) -> int:
     return round(start + math.copysign(min(way, abs(end - start)), end - start))
+
+
+# --- A servo on a bus as a rig: what the recorder records from --------------------------------------------------------
+
+class BusRig:
+    """A Feetech or Dynamixel servo on its wire.
+
+    Parameters
+    ----------
+    backend : Backend
+    protocol : {"feetech", "dynamixel-2", "dynamixel-1"}
+    id : int
+        Of the servo.
+    rate : float
+        Rows in a second [Hz].
+    baud : int
+        Speed of the wire [bit/s].
+    patience : float
+        How long an answer may be late beyond its time on the wire; rows wait for so long for one that is lost [s].
+
+    Raises
+    ------
+    InputError
+        If the rate is not possible.
+    """
+
+    kind = "angle"
+
+    def __init__(self, backend: Backend, protocol: str, id: int, *, rate: float = 100.0,
+                 baud: int = 1_000_000, patience: float = PATIENCE) -> None:
+        self.bus = Bus(backend, protocol, [id], rate=rate, baud=baud, patience=patience)
+        self.id = id
+
+    @property
+    def columns(self) -> Sequence[str]:
+        """Of its rows; what is measured depends on the model, which is known once it is open."""
+        return columns_of(self.bus, self.id)
+
+    def open(self) -> None:
+        """Take the wire and read all registers; the servo is limp."""
+        self.bus.open()
+
+    def facts(self) -> Mapping[str, Any]:
+        """Return model, registers, what the columns are made of, and what happened in the last run."""
+        return self.bus.facts(self.id)
+
+    def approach(self, value: float) -> None:
+        """Go to an angle [rad] slowly and wait until the servo stands."""
+        self.bus.approach({self.id: value})
+
+    def run(self, experiment: Experiment) -> Iterator[Sequence[float]]:
+        """Command an experiment and yield rows as they come."""
+        for rows in self.bus.run({self.id: experiment}):
+            yield rows[self.id]
+
+    def limp(self) -> None:
+        """Switch the torque off; never raises."""
+        self.bus.limp()
+
+    def close(self) -> None:
+        """Switch the torque off and give the wire back."""
+        self.bus.close()
+
+
+def columns_of(bus: Bus, servo: int) -> tuple[str, ...]:
+    """Return the columns of a servo's rows."""
+    return ("time_s", "command_angle_deg", *(one.column for one in bus.servos[servo].channels), "torque_on")
+
+
+def rig_of(port: str, found: FoundServo, *, rate: float = 100.0) -> BusRig:
+    """Return the rig of a servo that `scan` has found on a port."""
+    return BusRig(SerialBackend(port, found.baud), found.protocol, found.id, rate=rate, baud=found.baud)

@@ -7,10 +7,8 @@ from typing import NamedTuple
 
 from servotwin.bench.backends.backend import Backend
 from servotwin.bench.backends.serial_port import SerialBackend
-from servotwin.bench.bus.dynamixel import dynamixel_wire
 from servotwin.bench.bus.families import MODEL_NUMBER_AT, MODELS, BusModel
-from servotwin.bench.bus.feetech import feetech_wire
-from servotwin.bench.bus.sdk_wire import PATIENCE, BusWire, SdkWire
+from servotwin.bench.bus.sdk_wire import PATIENCE, BusWire, SdkWire, dynamixel_wire, feetech_wire
 from servotwin.errors import BenchError, InputError, UnknownNameError
 
 BAUDS = (1_000_000, 57_600, 115_200, 500_000, 2_000_000)

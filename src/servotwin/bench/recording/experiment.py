@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
-from servotwin.errors import InputError
+import numpy as np
+
+from servotwin.errors import InputError, UnknownNameError
 from servotwin.units import is_finite
+
+if TYPE_CHECKING:
+    from servotwin.bench.recording.recorder import Limits
+    from servotwin.logs import Log
+
+
+
+# --- An experiment: what a servo is told, piece by piece, before it is known through which wire -----------------------
 
 KINDS = {"pulse_width": "s", "angle": "rad"}  # kind of command -> its SI unit
 
@@ -100,3 +112,190 @@ class Experiment:
     def highest(self) -> float:
         """The highest command (SI)."""
         return max(one.value for one in self.holds if one.value is not None)
+
+
+# --- The experiments that a servo is known by, each within a range of commands that its user allows -------------------
+
+_PERIODS = (0.02, 0.014, 0.01, 0.007, 0.005, 1.0 / 333.0)  # s, 50 to 333 Hz
+_MISSING = (1, 2, 5, 10, 25)  # frames without a pulse
+_STEP = {"pulse_width": 1e-6, "angle": math.radians(0.1)}  # of a staircase; the finest that users can send
+_SLOW = 0.2  # s that a stair is held: ten frames of 50 Hz
+_DWELL = 0.8  # s that a step is held; the servos of the catalog settle in less
+_EDGE = 0.02  # of the range that small motions keep from its middle's ends
+
+
+def steps(limits: Limits, *, duration: float = 10.0, frame_period: float = 0.02, seed: int = 0) -> Experiment:
+    """Return steps of all sizes between levels in random order, each held for 0.8 s."""
+    rng = np.random.default_rng(seed)
+    count = max(math.ceil(duration / _DWELL), 3)
+    levels = limits.low + (limits.high - limits.low) * np.concatenate(
+        [rng.permutation(np.linspace(0.0, 1.0, 8)) for _ in range(count // 8 + 1)])
+    middle = limits.middle
+    holds = [Hold(_DWELL, middle), *(Hold(_DWELL, float(level)) for level in levels[:count - 1])]
+    return _made("step", limits, holds, frame_period)
+
+
+def staircase(limits: Limits, *, duration: float = 10.0, frame_period: float = 0.02, seed: int = 0) -> Experiment:
+    """Return stairs of 1 µs (0.1° on a bus) up and down about the middle: what the deadband swallows shows."""
+    del seed
+    stair = _STEP[limits.kind]
+    most = max(math.floor(0.5 * (limits.high - limits.low) / stair * (1.0 - _EDGE)), 1)
+    count = min(max(round(duration / (4.0 * _SLOW)), 2), most)
+    up = list(range(count + 1))
+    path = [*up, *reversed(up[:-1]), *(-k for k in up[1:]), *(-k for k in reversed(up[:-1]))]
+    return _made("staircase", limits, [Hold(_SLOW, limits.middle + k * stair) for k in path], frame_period)
+
+
+def ramp(limits: Limits, *, duration: float = 10.0, frame_period: float = 0.02, seed: int = 0) -> Experiment:
+    """Return a slow way from end to end and back, a new command each frame: friction and play show."""
+    del seed
+    return _curve("ramp", limits, frame_period, duration, lambda x: 1.0 - abs(1.0 - 2.0 * x) * 2.0)
+
+
+def chirp(limits: Limits, *, duration: float = 10.0, frame_period: float = 0.02, seed: int = 0) -> Experiment:
+    """Return a sine over half of the range whose frequency goes from 0.3 to 5 Hz, at most a tenth of the frame rate."""
+    del seed
+    first, last = 0.3, min(5.0, 0.1 / frame_period)
+    return _curve("chirp", limits, frame_period, duration,
+                  lambda x: 0.5 * math.sin(2.0 * math.pi * duration * x * (first + 0.5 * (last - first) * x)))
+
+
+def prbs(limits: Limits, *, duration: float = 10.0, frame_period: float = 0.02, seed: int = 0) -> Experiment:
+    """Return random jumps between two commands half of the range apart, 120 ms or more between them."""
+    rng = np.random.default_rng(seed)
+    bit = max(0.12, 4.0 * frame_period)
+    half = 0.25 * (limits.high - limits.low)
+    signs = rng.choice([-1.0, 1.0], max(math.ceil(duration / bit), 2)).tolist()
+    holds = [Hold(0.5, limits.middle), *(Hold(bit, limits.middle + half * sign) for sign in signs)]
+    return _made("prbs", limits, holds, frame_period)
+
+
+def missing(limits: Limits, *, duration: float = 10.0, frame_period: float = 0.02, seed: int = 0) -> Experiment:
+    """Return steps that lose 1, 2, 5, 10 and 25 frames 60 ms after they began: what the servo does unheard."""
+    del seed
+    _pulses_only("missing", limits)
+    early = math.ceil(0.06 / frame_period) * frame_period
+    holds, level = [Hold(0.5, limits.at(0.25))], 0.75
+    while sum(one.duration for one in holds) < duration or len(holds) < 4:
+        for lost in _MISSING:
+            value = limits.at(level)
+            holds += [Hold(early, value), Hold(lost * frame_period, None), Hold(0.6, value)]
+            level = 1.0 - level
+    return _made("missing", limits, holds, frame_period)
+
+
+def torque_off(limits: Limits, *, duration: float = 10.0, frame_period: float = 0.02, seed: int = 0) -> Experiment:
+    """Return holds and a step that torque leaves for a second each: what is left when nothing drives."""
+    del seed
+    low, high = limits.at(0.3), limits.at(0.7)
+    one = [Hold(0.6, low), Hold(1.0, None), Hold(0.6, low), Hold(0.1, high), Hold(1.0, None), Hold(0.6, high)]
+    return _made("torque_off", limits, one * max(round(duration / sum(h.duration for h in one)), 1), frame_period)
+
+
+def hold(limits: Limits, *, duration: float = 10.0, frame_period: float = 0.02, seed: int = 0) -> Experiment:
+    """Return one command that stays: noise, the load's droop, heat."""
+    del seed
+    return _made("hold", limits, [Hold(duration, limits.middle)], frame_period)
+
+
+def frame_rates(limits: Limits, *, duration: float = 10.0, frame_period: float = 0.02,
+                seed: int = 0) -> list[Experiment]:
+    """Return the same steps at 50, 71, 100, 143, 200 and 333 Hz; fast rates are not for every analog servo."""
+    del frame_period
+    _pulses_only("frame_rates", limits)
+    widest = limits.high + 200e-6  # the pin is low for as long between two pulses
+    periods = [period for period in _PERIODS if period >= widest]
+    return [replace(steps(limits, duration=duration / len(periods), frame_period=period, seed=seed),
+                    name=f"frame_rate_{1.0 / period:.0f}Hz", motion="frame_rate",
+                    conditions={"frame_rate_Hz": round(1.0 / period)}) for period in periods]
+
+
+EXPERIMENTS: Mapping[str, Callable[..., Experiment | list[Experiment]]] = {
+    "steps": steps, "staircase": staircase, "ramp": ramp, "chirp": chirp, "prbs": prbs, "frame_rates": frame_rates,
+    "missing": missing, "torque_off": torque_off, "hold": hold,
+}
+"""Builders by name; each takes limits, and duration, frame_period [s] and seed by keyword."""
+
+
+def experiments(names: str, limits: Limits, *, duration: float = 10.0, frame_period: float = 0.02,
+                seed: int = 0) -> list[Experiment]:
+    """Return experiments by their names.
+
+    Parameters
+    ----------
+    names : str
+        Such as "steps,chirp"; "all" is all that the wire can carry.
+    limits : Limits
+    duration : float
+        Of each, about [s].
+    frame_period : float
+        [s]
+    seed : int
+        Of what is random.
+
+    Raises
+    ------
+    UnknownNameError, InputError
+        If there is no such experiment, or a number makes no sense.
+
+    Examples
+    --------
+    >>> from servotwin.bench.recording.recorder import Limits
+    >>> limits = Limits(kind="pulse_width", low=1e-3, high=2e-3, voltage=6.0, current=1.0)
+    >>> [one.motion for one in experiments("steps,hold", limits, duration=2.0)]
+    ['step', 'hold']
+    """
+    for what, value in (("duration", duration), ("frame period", frame_period)):
+        if not (is_finite(value) and value > 0.0):
+            raise InputError(f"{what} of an experiment", got=value, allowed="a positive number [s]")
+    pulses = ("missing", "frame_rates") if limits.kind != "pulse_width" else ()
+    wanted = [name for name in EXPERIMENTS if name not in pulses] if names == "all" else names.split(",")
+    made: list[Experiment] = []
+    for name in wanted:
+        if name not in EXPERIMENTS:
+            raise UnknownNameError("experiment", name, EXPERIMENTS)
+        one = EXPERIMENTS[name](limits, duration=duration, frame_period=frame_period, seed=seed)
+        made += one if isinstance(one, list) else [one]
+    return made
+
+
+def of_log(log: Log, *, name: str | None = None, frame_period: float = 0.02) -> Experiment:
+    """Return the experiment that commands what a log was commanded, such as the best one of an advice.
+
+    Raises
+    ------
+    InputError
+        If its command is a voltage, or moves between samples.
+    """
+    kind = {"pulse_width": "pulse_width", "angle": "angle"}.get(log.command_kind)
+    if kind is None:
+        raise InputError(f"log {log.name!r}: command", got=log.command_kind, allowed=", ".join(KINDS))
+    holds: list[Hold] = []
+    ends = np.append(log.time[1:], log.time[-1] + float(np.median(np.diff(log.time))))
+    for start, end, value, sent in zip(log.time.tolist(), ends.tolist(), log.held.tolist(), log.sent.tolist(),
+                                       strict=True):
+        value = value if sent else None
+        if holds and holds[-1].value == value:
+            holds[-1] = Hold(holds[-1].duration + end - start, value)
+        else:
+            holds.append(Hold(end - start, value))
+    return Experiment(name=name or log.name.replace(" ", "_"), motion=log.motion or "log", kind=kind, holds=holds,
+                      frame_period=frame_period)
+
+
+def _made(motion: str, limits: Limits, holds: list[Hold], frame_period: float) -> Experiment:
+    return Experiment(name=motion, motion=motion, kind=limits.kind, holds=holds, frame_period=frame_period)
+
+
+def _curve(motion: str, limits: Limits, frame_period: float, duration: float,
+           shape: Callable[[float], float]) -> Experiment:
+    """Return a command that is new in each frame: `shape` of the time's share, from −1 to 1."""
+    count = max(math.ceil(duration / frame_period), 2)
+    values = [limits.at(0.5 + 0.5 * shape(k / count)) for k in range(count)]
+    return _made(motion, limits, [Hold(0.5, values[0]), *(Hold(frame_period, value) for value in values)],
+                 frame_period)
+
+
+def _pulses_only(name: str, limits: Limits) -> None:
+    if limits.kind != "pulse_width":
+        raise InputError(f"experiment {name!r}", got="a servo on a bus", allowed="one that takes pulses")

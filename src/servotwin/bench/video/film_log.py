@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.bench.video.filmed import Filmed
-from servotwin.bench.video.instant import JUMP, LED
+from servotwin.bench.video.marker import JUMP, LED
 from servotwin.errors import InputError, OutputError, OutputExistsError
 from servotwin.logs.columns import COMMANDS, SWITCH, TIME, Column
 from servotwin.logs.csv_logs import read_log_table

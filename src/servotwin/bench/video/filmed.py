@@ -16,8 +16,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.bench.video.instant import JUMP, LED, NONE, Instant, Lights, Region, jump
-from servotwin.bench.video.marker import CASE, CELLS, DICTIONARY, HORN, dictionary
+from servotwin.bench.video.marker import (
+    CASE,
+    CELLS,
+    DICTIONARY,
+    HORN,
+    JUMP,
+    LED,
+    NONE,
+    Instant,
+    Lights,
+    Region,
+    dictionary,
+    jump,
+)
 from servotwin.errors import InputError
 from servotwin.look.opencv import load_opencv, quiet
 from servotwin.units import is_finite

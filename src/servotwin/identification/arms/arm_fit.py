@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.arms.problem import Problem
 from servotwin.identification.arms.rows import (
     GAIN,
     RESISTANCE,
@@ -23,7 +22,7 @@ from servotwin.identification.arms.rows import (
     parts_of,
     residuals,
 )
-from servotwin.identification.arms.search import ArmSearch
+from servotwin.identification.arms.search import ArmSearch, Problem
 from servotwin.identification.fitting.arrow import Loss, Prior
 from servotwin.identification.fitting.case import LogPart
 from servotwin.identification.fitting.checks import checked_level

@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.identification.arms.arm_fit import HALF, ArmCause, ArmFit, Doubts, causes_of, confirmed, doubts_of
-from servotwin.identification.arms.dynamics import Demand, WholeArm, link_names, links_of, with_masses
-from servotwin.identification.arms.problem import Problem
 from servotwin.identification.arms.rows import (
     CLOCK,
     GAIN,
@@ -40,6 +38,7 @@ from servotwin.identification.arms.rows import (
     usual_steps,
     without,
 )
+from servotwin.identification.arms.search import Demand, Problem, WholeArm, link_names, links_of, with_masses
 from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.case import DELAY_SCALE
 from servotwin.identification.fitting.diagnosis.drifts import counts_turns

@@ -1,10 +1,12 @@
-"""The search of a robot's numbers: bounded least squares with a robust loss (Levenberg, Marquardt)."""
+"""What is fitted in the fit of a robot, and how far simulated joints are off it."""
 
 from __future__ import annotations
 
+import copy
 import math
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +17,311 @@ from servotwin.identification.arms.rows import (
     Linear,
     Mask,
     Noise,
+    Numbers,
     linear_at,
+    model_columns,
     parts_of,
     residuals,
     steps_by,
+    used_rows,
     usual_steps,
 )
 from servotwin.identification.fitting.arrow import Loss, Prior, block
+from servotwin.identification.fitting.task import HUBER
+from servotwin.robots import ServoDrive
+from servotwin.robots.coupling import couple, couplings_of
+from servotwin.robots.places import load_mujoco
+from servotwin.robots.run import ticks_in
+from servotwin.simulation import VectorSimulator
+
+# --- What the measured motion of a robot asks of each joint: torques and inertias, link by link -----------------------
+
+# tau_j = M_jj q''_j + sum over others of M_jk q''_k + Coriolis + gravity
+#
+# The first term is that of the joint's own motion, which a simulated servo has itself; the rest is a torque that comes
+# to it from outside. Both are linear in the masses of the links, where a link keeps its centre and the shape of its
+# inertia.
+
+_NUDGE, _NEAR = 0.01, 0.05  # rad
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """Torques and inertias at the joints that links ask for, each as heavy as the model says.
+
+    Parameters
+    ----------
+    torque : ndarray, shape (n, joints, links)
+        Beside that of the joint's own acceleration [N m]
+    inertia : ndarray, shape (n, joints, links)
+        [kg m²]
+    """
+
+    torque: Array
+    inertia: Array
+
+    def of(self, factors: Array) -> tuple[Array, Array]:
+        """Return torque and inertia of all links whose masses are so many times those of the model."""
+        return self.torque @ factors, self.inertia @ factors
+
+
+class Demand:
+    """What motions of a robot ask of its joints, of zeros near those that were asked for before: worked out once.
+
+    Parameters
+    ----------
+    model : MjModel
+    joints : sequence of str
+    links : sequence of int
+    """
+
+    def __init__(self, model: Any, joints: Sequence[str], links: Sequence[int]) -> None:
+        self.model, self.joints, self.links = model, [*joints], [*links]
+        self._known: dict[tuple[int, ...], _Known] = {}
+
+    def torques(self, episode: Episode, zeros: Array, factors: Array) -> list[tuple[Array, Array]]:
+        """Return torque [N m] and inertia [kg m²] at the joints, shape (n, joints) each, of several copies.
+
+        All of them are about the zeros near those of the first one, so that differences of copies have no steps.
+
+        Parameters
+        ----------
+        episode : Episode
+        zeros : ndarray, shape (copies, joints)
+            [rad]
+        factors : ndarray, shape (copies, links)
+        """
+        key = (id(episode), *np.round(zeros[0] / _NEAR).astype(int).tolist())
+        if key not in self._known:
+            self._known[key] = _Known(episode, zeros[0], self._asked(episode, zeros[0]), {})
+        known, found = self._known[key], []
+        for off, masses in zip(zeros - known.zeros, factors, strict=True):
+            torque, inertia = known.base.of(masses)
+            for j in np.flatnonzero(off).tolist():
+                if j not in known.slopes:
+                    moved = known.zeros + _NUDGE * (np.arange(len(off)) == j)
+                    known.slopes[j] = (self._asked(episode, moved).torque - known.base.torque) / _NUDGE
+                torque = torque + off[j] * (known.slopes[j] @ masses)
+            found.append((torque, inertia))
+        return found
+
+    def _asked(self, episode: Episode, zeros: Array) -> Asked:
+        return asked_of(self.model, self.joints, self.links, episode.angle + zeros, episode.speed,
+                        episode.acceleration)
+
+
+class _Known(NamedTuple):
+    """What an episode asks for at some zeros, and how the torque changes with those that were asked for."""
+
+    episode: Episode
+    zeros: Array
+    base: Asked
+    slopes: dict[int, Array]
+
+
+def links_of(model: Any, joints: Sequence[str]) -> list[int]:
+    """Return the bodies with a mass that some of the joints move."""
+    dofs = {int(model.jnt_dofadr[model.joint(name).id]) for name in joints}
+    found = []
+    for body in range(1, model.nbody):
+        above, moved = body, False
+        while above and not moved:
+            first = int(model.body_dofadr[above])
+            moved = bool(dofs & set(range(first, first + int(model.body_dofnum[above]))))
+            above = int(model.body_parentid[above])
+        if moved and model.body_mass[body] > 0.0:
+            found.append(body)
+    return found
+
+
+def link_names(model: Any, links: Sequence[int]) -> list[str]:
+    """Return the names of bodies."""
+    return [model.body(body).name or f"body {body}" for body in links]
+
+
+def with_masses(model: Any, links: Sequence[int], factors: Array) -> Any:
+    """Return a copy of a model whose links are so many times as heavy."""
+    found = copy.copy(model)
+    found.body_mass[links] = model.body_mass[links] * factors
+    found.body_inertia[links] = model.body_inertia[links] * factors[:, None]
+    load_mujoco().mj_setConst(found, load_mujoco().MjData(found))
+    return found
+
+
+def asked_of(model: Any, joints: Sequence[str], links: Sequence[int], angle: Array, speed: Array,
+             acceleration: Array) -> Asked:
+    """Return what a motion of the joints asks for, others being where the model has them.
+
+    Parameters
+    ----------
+    model : MjModel
+    joints : sequence of str
+    links : sequence of int
+    angle, speed, acceleration : ndarray, shape (n, joints)
+    """
+    mujoco = load_mujoco()
+    own = copy.copy(model)
+    own.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT) | int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    numbers = [model.joint(name).id for name in joints]
+    places, dofs = model.jnt_qposadr[numbers], model.jnt_dofadr[numbers]
+    own.dof_armature[:], own.dof_damping[:], own.dof_frictionloss[:] = 0.0, 0.0, 0.0
+    masses, inertias = model.body_mass.copy(), model.body_inertia.copy()
+    n, count = angle.shape
+    torque, inertia = (np.zeros((n, count, len(links) + 1)) for _ in range(2))  # that of all comes last
+    data, whole, follow = mujoco.MjData(own), np.zeros((model.nv, model.nv)), bool(couplings_of(model))
+    for b in range(-1, len(links)):  # all, then with one twice as heavy: alone, the others would have no inertia
+        own.body_mass[:], own.body_inertia[:] = masses, inertias
+        if b >= 0:
+            own.body_mass[links[b]], own.body_inertia[links[b]] = 2.0 * masses[links[b]], 2.0 * inertias[links[b]]
+        for k in range(n):
+            data.qpos[places], data.qvel[dofs], data.qacc[dofs] = angle[k], speed[k], acceleration[k]
+            if follow:
+                couple(own, data.qpos)
+            mujoco.mj_inverse(own, data)
+            mujoco.mj_fullM(own, data, whole)
+            inertia[k, :, b] = whole[dofs, dofs]
+            torque[k, :, b] = data.qfrc_inverse[dofs]
+    torque, inertia = (some[..., :-1] - some[..., -1:] for some in (torque, inertia))
+    return Asked(torque - inertia * acceleration[:, :, None], np.maximum(inertia, 0.0))
+
+
+# --- The second stage: goals drive the whole arm, with every number moved in a copy of it -----------------------------
+
+_SETTLE = 0.5  # s, at the first goals
+
+
+class WholeArm(Copies):
+    """A robot with its servos, driven by goals."""
+
+    def angles(self, episode: Episode, points: Array, *, fine: bool = False) -> Array:
+        """Return where the joints are, shape (copies, n, joints) [rad]."""
+        return np.stack([self._one(episode, x, fine=fine) for x in points])
+
+    def _one(self, episode: Episode, x: Array, *, fine: bool) -> Array:
+        self.look()
+        mujoco, numbers = load_mujoco(), self.numbers
+        model = with_masses(self.plant, self.links, numbers.masses(x))
+        drive = ServoDrive(model, numbers.mounts_at(x, fine=fine), bus=numbers.supply(x), joint_friction="keep",
+                           assume_heat=False)
+        data, step, zeros = mujoco.MjData(drive.model), float(drive.model.opt.timestep), numbers.zeros(x)
+        places = [int(model.jnt_qposadr[model.joint(name).id]) for name in drive.joints]
+        goals = episode.goals + zeros
+        data.qpos[places] = goals[0]
+        couple(drive.model, data.qpos)
+        data.time = -_SETTLE
+        mujoco.mj_forward(drive.model, data)
+        drive.record(data)
+        drive.command(data, dict(zip(drive.joints, goals[0].tolist(), strict=True)))
+        drive.step(data, round(_SETTLE / step))
+        turn = numbers.turn(x)
+        spans = turn * np.diff(np.append(episode.time, episode.time[-1] + _SETTLE))
+        for row, span in zip(goals.tolist(), spans.tolist(), strict=True):
+            count = ticks_in(span, step)
+            drive.model.opt.timestep = span / count  # a row acts at its time, not with the next tick
+            drive.command(data, dict(zip(drive.joints, row, strict=True)))
+            drive.step(data, count)
+        record = drive.result(data)
+        at = turn * episode.time - numbers.latency(x)
+        return np.stack([np.interp(at, record.time, record[name]["joint_angle"]) for name in drive.joints],
+                        axis=1) - zeros
+
+
+# --- The first stage --------------------------------------------------------------------------------------------------
+
+# All joints, and copies of them with one number moved, run side by side, each as if it were alone on the supply; what
+# the others draw, and how long turns take that stamps only count, counts in the second stage. Time is that of the
+# goals: a joint at a stamp t is where its lane is at t less the latency.
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+_PARTS = 2  # of a sample: over each of them the torque stays
+_DIGITS = 12  # of torques [N m] and inertias [kg m²] that tell lanes apart
+
+
+class JointLanes(Copies):
+    """Lanes of the joints of a robot; parameters as of `Copies`, and what its motions ask of them."""
+
+    def __init__(self, plant: Any, numbers: Numbers, links: Sequence[int], look: Callable[[], object],
+                 demand: Demand) -> None:
+        super().__init__(plant, numbers, links, look)
+        self.demand = demand
+        self.models = [mount.model for mount in numbers.mounts.values()]
+        self._gain = np.array([mount.gain for mount in numbers.mounts.values()])
+        self._zero = np.array([mount.zero for mount in numbers.mounts.values()])
+
+    def angles(self, episode: Episode, points: Array, *, fine: bool = False) -> Array:
+        """Return where the joints are, shape (copies, n, joints) [rad]; nan of a failed lane."""
+        return self.run(episode, points, self.numbers.columns(points), fine=fine)
+
+    def run(self, episode: Episode, points: Array, columns: Sequence[Mapping[str, Array]], *,
+            fine: bool = False) -> Array:
+        """Return where the joints are with servos whose numbers are columns (copies,), a mapping for each joint."""
+        copies, joints = len(points), len(self.models)
+        time = episode.time
+        grid = np.interp(np.arange(_PARTS * (len(time) - 1) + 1) / _PARTS, np.arange(len(time)), time)
+        torque, inertia = self._asked(episode, points, grid)
+        numbers = model_columns(self.models, columns, copies, fine=fine)
+        own, same = _alike(joints, torque, inertia, numbers)
+        torque, inertia = (np.ascontiguousarray(some[:, own]) for some in (torque, inertia))
+        sims = VectorSimulator(self.models[0], len(own), threads=1,
+                               parameters={name: values[own] for name, values in numbers.items()})
+        goals = np.ascontiguousarray(((episode.goals - self._zero) / self._gain)[:, own % joints])
+        first = ((episode.measured[0] - self._zero) / self._gain)[own % joints]
+        sims.reset(command_angle=goals[0], output_angle=first)
+        angle, speed = np.zeros((2, len(grid), len(own)))
+        angle[0] = first
+        entry = sims.c_entry()  # one call of compiled code for each step
+        tick, row = entry.tick(), angle.strides[0]
+        command, outside, load, angles, speeds = (some.ctypes.data for some in (goals, torque, inertia, angle, speed))
+        for k, step in enumerate(np.diff(grid).tolist()):
+            begins = k % _PARTS == 0
+            if begins:
+                self.look()
+            tick.duration = step
+            tick.command_angle = command + k // _PARTS * row if begins else None
+            tick.set_load_inertia = load + k * row if begins else None
+            tick.external_torque = outside + k * row
+            tick.output_angle, tick.output_speed = angles + (k + 1) * row, speeds + (k + 1) * row
+            entry.advance(tick)
+        late = np.array([self.numbers.latency(x) for x in points])
+        angle, speed = (some[:, same].reshape(-1, copies, joints) for some in (angle, speed))
+        found = _hermite(grid, angle, speed, time[:, None] - late)
+        return np.asarray(np.moveaxis(found, 0, 1) * self._gain + self._zero)
+
+    def _asked(self, episode: Episode, points: Array, grid: Array) -> tuple[Array, Array]:
+        """Return external torques and inertias at the servos between the times of a grid, shape (parts, lanes)."""
+        middles, found = 0.5 * (grid[1:] + grid[:-1]), []
+        zeros, masses = (np.array([of(x) for x in points]) for of in (self.numbers.zeros, self.numbers.masses))
+        for x, (torque, inertia) in zip(points, self.demand.torques(episode, zeros, masses), strict=True):
+            late = middles + self.numbers.latency(x)
+            found.append([np.stack([np.interp(late, episode.time, column) for column in some.T], axis=1)
+                          for some in (torque * self._gain, inertia * self._gain**2)])
+        torques, inertias = (np.concatenate([one[k] for one in found], axis=1) for k in range(2))
+        return torques, inertias
+
+
+def _alike(joints: int, torque: Array, inertia: Array, numbers: Mapping[str, Array]) -> tuple[Indices, Indices]:
+    """Return lanes that differ, and which of these each lane is like: many a number moves few joints."""
+    lanes = torque.shape[1]
+    rows = np.column_stack([np.arange(lanes) % joints, *(some for some in numbers.values() if some.dtype.kind == "f"),
+                            np.round(torque.T, _DIGITS), np.round(inertia.T, _DIGITS)])
+    _, own, same = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    return own, same.ravel()
+
+
+def _hermite(grid: Array, angle: Array, speed: Array, at: Array) -> Array:
+    """Return angles between the times of a grid by cubics, shape (n, copies, joints); before it the first one."""
+    place = np.clip(np.searchsorted(grid, at, side="right") - 1, 0, len(grid) - 2)
+    step = grid[place + 1] - grid[place]
+    s = np.clip((at - grid[place]) / step, 0.0, None)[..., None]
+    copy = np.arange(angle.shape[1])[None, :]
+    a, b = angle[place, copy], angle[place + 1, copy]
+    va, vb = speed[place, copy] * step[..., None], speed[place + 1, copy] * step[..., None]
+    return np.asarray(a + s * (va + s * (3.0 * (b - a) - 2.0 * va - vb + s * (2.0 * (a - b) + va + vb))))
+
+
+# --- The search of a robot's numbers: bounded least squares with a robust loss (Levenberg, Marquardt) -----------------
+
 Tell = Callable[[int, Array], object]  # the number of a step, and the best point so far
 _DAMPINGS = (1e-4, 0.1, 10.0)  # tried side by side
 _LEAST_GAIN = 3e-3  # of the cost: servos that count make it rough
@@ -161,3 +459,50 @@ def stepped(x: Array, g: Array, H: Array, damping: float, lower: Array, upper: A
         change[over] = np.clip(x + change, lower, upper)[over] - x[over]
         stays = stays | over
     return np.asarray(np.clip(x + change, lower, upper))
+
+
+# --- What is fitted in the fit of a robot, and how far simulated joints are off it ------------------------------------
+
+class Problem(NamedTuple):
+    """What is fitted: robot, numbers, links, episodes and their samples, what is called, and what motions ask for."""
+
+    plant: Any
+    numbers: Numbers
+    links: list[int]
+    episodes: list[Episode]
+    used: list[Mask]
+    look: Callable[[], object]
+    demand: Demand
+
+    @property
+    def prior(self) -> Prior:
+        """The beliefs."""
+        return Prior(self.numbers.start, self.numbers.weight)
+
+    def shorter(self, seconds: float) -> Problem:
+        """Return the problem of the parts of so many seconds in which goals go furthest."""
+        parts = [(one, used) if rows.all() else (part := one.part(rows), used[rows] & used_rows(part))
+                 for one, used in zip(self.episodes, self.used, strict=True) for rows in (one.busiest(seconds),)]
+        return self._replace(episodes=[one for one, _ in parts], used=[used for _, used in parts])
+
+    def lanes(self) -> JointLanes:
+        """Return the joints one by one."""
+        return JointLanes(self.plant, self.numbers, self.links, self.look, self.demand)
+
+    def whole(self) -> WholeArm:
+        """Return the whole robot."""
+        return WholeArm(self.plant, self.numbers, self.links, self.look)
+
+    def search(self, simulated: Copies, noise: Noise, prior: Prior | None = None,
+               steps: Array | None = None) -> ArmSearch:
+        """Return the least-squares problem of a stage; `steps` are those of derivatives."""
+        return ArmSearch(simulated, self.episodes, self.used, noise, Loss(HUBER), prior or self.prior,
+                         np.zeros(len(self.numbers), np.bool_), steps)
+
+    def left(self, simulated: Copies, x: Array) -> list[Array]:
+        """Return simulated less measured angles of all episodes at a point, shape (n, joints) each."""
+        return [residuals(simulated, episode, x[None])[0] for episode in self.episodes]
+
+    def at_bound(self, x: Array) -> Mask:
+        """Return which numbers are at a bound."""
+        return np.asarray((x <= self.numbers.lower + 1e-9) | (x >= self.numbers.upper - 1e-9))

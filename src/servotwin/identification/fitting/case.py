@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError
 from servotwin.identification.fitting.free import LUMPED, Space
 from servotwin.loads import Load
-from servotwin.logs.bam_convention import writes_gain
+from servotwin.logs.bam_logs import writes_gain
 from servotwin.logs.log import KINDS, Log
 from servotwin.models import BoundedServo, DigitalServo, Model
 from servotwin.parameters import Servo

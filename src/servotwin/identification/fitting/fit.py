@@ -2,37 +2,226 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.identification.fitting.checks import checked_level
-from servotwin.identification.fitting.free import Space
-from servotwin.identification.fitting.holdout import ErrorTable, LogError, log_error
+from servotwin.identification.fitting.free import LUMPED, FreeParameter, Space
 from servotwin.identification.fitting.uncertainty import Unidentifiable
 from servotwin.logs.log import Log
 from servotwin.models import Model
 from servotwin.parameters import Servo
+from servotwin.parameters.servo import N, Quantity
+from servotwin.simulation.lanes.inputs import LOAD_NAMES
 
 if TYPE_CHECKING:
-    from servotwin.identification.fitting.assumptions import Assumption, Ends
-    from servotwin.identification.fitting.draws import Allowed
+    from servotwin.identification.fitting.assumptions import Allowed, Assumption, Ends
     from servotwin.identification.fitting.ladder import Ladder
     from servotwin.identification.fitting.registers import RegisterSearch, RegisterValue
     from servotwin.identification.fitting.uncertainty import Uncertainty
     from servotwin.identification.fitting.verdict import Verdict
-    from servotwin.identification.fitting.yielding import Foreseen, Widened, Yielded
+    from servotwin.identification.fitting.yielding import Doubts, Foreseen, Widened, Yielded
     from servotwin.signals import Signal
+
+
+
+# --- Errors on logs that a fit has not seen, by kind of motion, load and condition, beside simpler models -------------
+
+_FEW = 4  # logs of one kind, below which none of it is held out
+
+
+@dataclass(frozen=True)
+class LogError:
+    """How far a model is off one log.
+
+    Parameters
+    ----------
+    log, motion : str
+    conditions : mapping
+        Labels of the log; its supply voltage and load included.
+    rms, largest : float
+        Of simulated less measured [rad], or [V] where the log has no angle.
+    samples : int
+    spread : float
+        Rms of what was measured about its mean, in the same unit; nan where it is not known.
+    """
+
+    log: str
+    motion: str
+    conditions: Mapping[str, float | str]
+    rms: float
+    largest: float
+    samples: int
+    spread: float = math.nan
+
+    @property
+    def fit_percent(self) -> float:
+        """How much of the measured motion is reproduced: 100 all, 0 no more than by its mean."""
+        return fit_percent([self])
+
+
+@dataclass(frozen=True)
+class ErrorTable:
+    """Errors of several models on the same logs.
+
+    Parameters
+    ----------
+    models : tuple of str
+    errors : mapping of str to tuple of LogError
+        Of each model, log by log.
+
+    Examples
+    --------
+    >>> error = LogError("a", "step", {"gain": 100.0}, 0.03, 0.05, 10)
+    >>> table = ErrorTable(("M1",), {"M1": (error,)})
+    >>> table.by("motion"), table.by("gain")
+    ({'step': {'M1': 0.03}}, {'100': {'M1': 0.03}})
+    """
+
+    models: tuple[str, ...]
+    errors: Mapping[str, tuple[LogError, ...]]
+
+    def __bool__(self) -> bool:
+        return bool(self.models) and bool(self.errors[self.models[0]])
+
+    @property
+    def logs(self) -> tuple[str, ...]:
+        """Names of the logs."""
+        return tuple(error.log for error in self.errors[self.models[0]]) if self.models else ()
+
+    def labels(self) -> tuple[str, ...]:
+        """Return by what the errors can be sorted: "motion", and every condition of which there are several values."""
+        first = self.errors[self.models[0]] if self.models else ()
+        names = dict.fromkeys(name for error in first for name in error.conditions)
+        return ("motion", *(name for name in names if len({_text(e.conditions.get(name)) for e in first}) > 1))
+
+    def by(self, label: str = "motion",
+           measure: Callable[[Iterable[LogError]], float] | None = None) -> dict[str, dict[str, float]]:
+        """Return the rms error over all samples of each value of a label, or another measure, for each model."""
+        measure, found = measure or pooled, dict[str, dict[str, float]]()
+        for model in self.models:
+            groups: dict[str, list[LogError]] = {}
+            for error in self.errors[model]:
+                value = error.motion if label == "motion" else _text(error.conditions.get(label))
+                groups.setdefault(value or "other", []).append(error)
+            for value, group in groups.items():
+                found.setdefault(value, {})[model] = measure(group)
+        return found
+
+    def total(self, measure: Callable[[Iterable[LogError]], float] | None = None) -> dict[str, float]:
+        """Return the rms error over all samples, or another measure, for each model."""
+        return {model: (measure or pooled)(self.errors[model]) for model in self.models}
+
+
+def pooled(errors: Iterable[LogError]) -> float:
+    """Return the rms over all samples of some logs.
+
+    Examples
+    --------
+    >>> pooled([LogError("a", "", {}, 3.0, 3.0, 1), LogError("b", "", {}, 4.0, 4.0, 1)])
+    3.5355339059327378
+    """
+    items = [e for e in errors if e.samples]
+    total = sum(e.samples for e in items)
+    return math.sqrt(sum(e.rms**2 * e.samples for e in items) / total) if total else math.nan
+
+
+def fit_percent(errors: Iterable[LogError]) -> float:
+    """Return how much of the measured motion of some logs is reproduced: 100 (1 − |y − ŷ|/|y − ȳ|), ȳ of each log.
+
+    100 is all, 0 no more than by the mean of each log, and less than 0 is worse; nan of a shaft that stands. It is the
+    "fit" of the System Identification Toolbox (Ljung).
+
+    Examples
+    --------
+    >>> fit_percent([LogError("a", "", {}, 1.0, 3.0, 100, 10.0), LogError("b", "", {}, 3.0, 4.0, 100, 10.0)])
+    77.63932022500211
+    """
+    items = [e for e in errors if e.samples]
+    spread = math.sqrt(sum(e.spread**2 * e.samples for e in items))
+    return 100.0 * (1.0 - math.sqrt(sum(e.rms**2 * e.samples for e in items)) / spread) if spread > 0.0 else math.nan
+
+
+def log_error(log: Log, difference: NDArray[np.float64], measured: NDArray[np.float64] | None = None) -> LogError:
+    """Return the error of one log from the differences at its samples that count, and what was measured there."""
+    conditions: dict[str, float | str] = dict(log.conditions)
+    voltage = log.parameters.get("supply.open_circuit_voltage")
+    if voltage is not None and "voltage" not in conditions:
+        conditions["voltage"] = voltage
+    if "load" not in conditions:
+        conditions["load"] = _load(log)
+    return LogError(log.name, log.motion, conditions, float(np.sqrt(np.mean(difference**2))),
+                    float(np.abs(difference).max()), len(difference),
+                    math.nan if measured is None else float(np.std(measured)))
+
+
+def split(logs: Sequence[Log], holdout: Any, seed: int) -> tuple[list[int], list[int]]:
+    """Return which logs are fitted and which held out.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+    holdout : None, float or sequence of str
+        None holds out a fourth of the logs of each kind of motion of which there are at least four; a fraction as many
+        of each kind; names exactly these; 0 none.
+    seed : int
+
+    Raises
+    ------
+    InputError
+        If there is no such log, or none would be left.
+    """
+    rng = np.random.default_rng(seed)
+    if isinstance(holdout, Sequence) and not isinstance(holdout, str):
+        names = [log.name for log in logs]
+        for name in holdout:
+            if name not in names:
+                raise InputError("holdout", got=name, allowed=", ".join(names))
+        out = [k for k, name in enumerate(names) if name in set(holdout)]
+    else:
+        share = 0.25 if holdout is None else holdout
+        if isinstance(share, bool) or not isinstance(share, int | float) or not 0.0 <= share < 1.0:
+            raise InputError("holdout", got=holdout, allowed="a share of the logs below 1, or names of logs")
+        kinds: dict[str, list[int]] = {}
+        for k, log in enumerate(logs):
+            kinds.setdefault(log.motion, []).append(k)
+        out = []
+        for members in kinds.values():
+            if holdout is None and len(members) < _FEW:
+                continue
+            count = min(math.floor(share * len(members) + 0.5), len(members) - 1)
+            out += rng.permutation(members)[:count].tolist() if count > 0 else []
+    if len(out) == len(logs):
+        raise InputError("holdout", got="all logs", allowed="some of them; the rest is fitted")
+    return sorted(set(range(len(logs))) - set(out)), sorted(out)
+
+
+def _load(log: Log) -> str:
+    load = log.load
+    parts = [f"{load.total_inertia:.3g} kg m²"] if load.total_inertia else []
+    parts += [f"{p.mass * p.length * p.gravity:.3g} N m pendulum" for p in load.pendulums]
+    if load.torque:
+        parts.append(f"{load.torque:.3g} N m")
+    return ", ".join(parts) or "none"
+
+
+def _text(value: object) -> str:
+    if value is None:
+        return ""
+    return f"{value:g}" if isinstance(value, int | float) else str(value)
+
 
 # --- What a fit found -------------------------------------------------------------------------------------------------
 
-Array = NDArray[np.float64]
 NOT_YET = "not determined yet"
 """How an interval is told that a fit which was stopped has left open."""
 LEAST_SHARE = 0.005
@@ -367,3 +556,193 @@ class Fit:
         from servotwin.identification.report.page import write_report
 
         return write_report(self, Path(path), ladder=ladder, overwrite=overwrite)
+
+
+# --- A fitted servo: its numbers with origin and spread, and the record of the fit in its file ------------------------
+
+Array = NDArray[np.float64]
+
+_MOVED = "this value goes with the others of a fit, whose logs do not determine it, see [fit]"
+
+
+def identified_servo(servo: Servo, space: Space, shared: Array, doubts: Doubts, level: float,
+                     yielded: Sequence[str] = ()) -> Servo:
+    """Return a servo with the values of a point.
+
+    What the logs determine is "identified", and its range is the interval. What they leave open keeps its origin, its
+    source and its spread; its value is the one that goes with the others.
+
+    Parameters
+    ----------
+    servo : Servo
+        Before the fit.
+    space : Space
+    shared : ndarray, shape (p,)
+    doubts : Doubts
+    level : float
+        Of the intervals.
+    yielded : sequence of str
+        Names whose prior was dropped: what the file said of them does not hold, and is not kept.
+    """
+    found = space.servo_at(shared[:len(space)])
+    quantities = dict(found.quantities)
+    open_ = {name for item in doubts.unidentifiable for name in item.parameters}
+    for k, p in enumerate(space.parameters):
+        if p.name in LOAD_NAMES:
+            continue
+        members, power, _ = LUMPED.get(p.name, ((p.name,), 0, ""))
+        factor = float(found.get(N) or 1.0) ** power  # type: ignore[arg-type]
+        spread = _spread(p, k, shared, doubts, factor)
+        for member in members:
+            value, unit = float(found.get(member)), found.quantities[member].unit  # type: ignore[arg-type]
+            if p.name in open_ and p.name not in yielded:
+                quantities[member] = _kept(servo.quantities.get(member), value, unit)
+                continue
+            given = {"lower": min(spread[0], value), "upper": max(spread[1], value)} if spread else {}
+            said = f"{100 * level:g} % interval" if given else _unsure(doubts, p.name in open_)
+            if p.name in LUMPED:
+                said = f"as {p.name}; {said}"
+            quantities[member] = Quantity(value=value, unit=unit, origin="identified",
+                                          source=f"fit to logs, see [fit]; {said}", **given)
+    return replace(found, quantities=quantities)
+
+
+def _unsure(doubts: Doubts, left_open: bool) -> str:
+    """Return why a value that a fit found has no range."""
+    if left_open:
+        return "the logs alone do not determine it, and contradict what the file said of it"
+    if any(each.method == "linearised" for each in doubts.ends.values()):
+        return "the fit was stopped before it was determined"
+    return "no interval was sought" if doubts.doubt is None else "ended at a bound of the search"
+
+
+def _spread(p: FreeParameter, k: int, shared: Array, doubts: Doubts, factor: float) -> tuple[float, float] | None:
+    """Return the interval of a number's members; None where it has none."""
+    if doubts.doubt is None or k not in doubts.ends:
+        return None
+    ends, std = doubts.ends[k], float(doubts.doubt.std[k])
+    a, b = (float(np.clip(p.value(shared[k] + end * std), p.lower, p.upper)) / factor
+            for end in (ends.lower, ends.upper))
+    return (min(a, b), max(a, b)) if math.isfinite(a + b) else None
+
+
+def _kept(before: Quantity | None, value: float, unit: str) -> Quantity:
+    """Return what was known of a number that a fit did not determine, with the value that goes with the others."""
+    if before is None:
+        return Quantity(value=value, unit=unit, origin="assumed", source=f"no source; {_MOVED}")
+    if not isinstance(before.value, float) or before.value == value:
+        return before
+    said = (before.source or "no source").removesuffix(f"; {_MOVED}")
+    lower = None if before.lower is None else min(before.lower, value)
+    upper = None if before.upper is None else max(before.upper, value)
+    return replace(before, value=value, source=f"{said}; {_MOVED}", lower=lower, upper=upper)
+
+
+def with_what_logs_say(servo: Servo, logs: Sequence[Log], searched: Sequence[str]) -> Servo:
+    """Return a servo with the parameters that all logs give alike, such as their supply voltage.
+
+    Parameters
+    ----------
+    servo : Servo
+    logs : sequence of Log
+        Those that were fitted.
+    searched : sequence of str
+        What the fit found, which stays.
+    """
+    first, *others = logs
+    stays = {member for name in searched for member in (LUMPED[name][0] if name in LUMPED else (name,))}
+    alike = {name: value for name, value in first.parameters.items() if name not in stays
+             and value != servo.get(name) and all(log.parameters.get(name) == value for log in others)}
+    if not alike:
+        return servo
+    said = servo.replace(alike)
+    quantities = {name: Quantity(value=float(value), unit=said.quantities[name].unit, origin="measured",
+                                 source="said of all logs that were fitted, in their sidecars")
+                  for name, value in alike.items()}
+    return replace(said, quantities={**said.quantities, **quantities})
+
+
+def data_hash(logs: Sequence[Log]) -> str:
+    """Return a hash of all that logs say.
+
+    Examples
+    --------
+    >>> log = Log(name="a", time=[0.0, 1.0, 2.0], command=[0.0, 1.0, 1.0], command_kind="angle",
+    ...           measured={"output_angle": [0.0, 0.5, 1.0]})
+    >>> data_hash([log]) == data_hash([log]), len(data_hash([log]))
+    (True, 64)
+    """
+    digest = hashlib.sha256()
+    for log in logs:
+        digest.update(repr((log.name, log.command_kind, log.command_hold, sorted(log.parameters.items()), log.left_out,
+                            log.load)).encode())
+        digest.update(np.ascontiguousarray(log.time).tobytes())
+        digest.update(np.ascontiguousarray(log.command).tobytes())
+        for name in sorted(log.measured):
+            digest.update(name.encode() + np.ascontiguousarray(log.measured[name]).tobytes())
+        if log.torque_on is not None:
+            digest.update(np.packbits(log.torque_on).tobytes())
+    return digest.hexdigest()
+
+
+def with_record(fit: Fit, logs: Sequence[Log], fitted: Sequence[int], mend: Sequence[str] = ()) -> Fit:
+    """Return a fit whose servo holds the record: data, model, version, bounds, errors, conditions.
+
+    Parameters
+    ----------
+    fit : Fit
+    logs : sequence of Log
+        As they were given.
+    fitted : sequence of int
+        Which of them were fitted.
+    mend : sequence of str
+        Kinds of findings that were mended in them.
+    """
+    import servotwin
+
+    motions = Counter(log.motion or "other" for log in logs)
+    record: dict[str, Any] = {
+        "data": f"sha256:{data_hash(logs)}", "logs": len(logs), "fitted_logs": len(fitted),
+        "model": type(fit.model).__name__, "version": servotwin.__version__, "level": fit.level,
+        "free": list(fit.space.names),
+        "bounds": {p.name: [p.lower, p.upper] for p in fit.space.parameters},
+        "at_bound": list(fit.at_bound), "undetermined": [str(item) for item in fit.unidentifiable],
+        "yielded": [str(one) for one in fit.yielded], "widened": [str(one) for one in fit.widened],
+        "prior_share": {name: round(share, 3) for name, share in fit.prior_share.items() if share >= LEAST_SHARE},
+        "nuisance": {name: fit.estimates[name] for name in fit.names if name not in fit.space.names},
+        "load": {p.name: fit.estimates[p.name] for p in fit.space.parameters if p.name in LOAD_NAMES},
+        "noise": dict(fit.noise),
+        "mended": list(mend),
+        "conditions": {"motions": dict(motions), **_conditions(logs)},
+        "training_error": fit.training.by().copy() if fit.training else {},
+        "holdout_error": fit.holdout.by().copy() if fit.holdout else {},
+    }
+    if fit.phased:
+        record["frame_phase"] = "of each log"
+    if fit.ticked:
+        record["control_phase"] = "of each log"
+    if fit.verdict is not None:
+        record["verdict"] = {"sentence": fit.verdict.sentence, "holds": fit.verdict.holds, "ratio": fit.verdict.ratio,
+                             "causes": [cause.name for cause in fit.verdict.causes]}
+    if fit.interrupted:
+        record |= {"interrupted": True, "unknown": list(fit.unknown)}
+    servo = replace(fit.servo, fit={key: value for key, value in record.items() if value not in ({}, [])})
+    return replace(fit, servo=servo, model=type(fit.model)(servo))
+
+
+def stopped(fit: Fit, missing: Sequence[str]) -> Fit:
+    """Return a fit that a stop has left without something, and that says so."""
+    if not missing:
+        return fit
+    said = f"stopped: the best so far; not known are {', '.join(missing)}"
+    return replace(fit, interrupted=True, unknown=tuple(missing), warnings=(said, *fit.warnings))
+
+
+def _conditions(logs: Sequence[Log]) -> dict[str, Any]:
+    """Return labels and parameters of the logs: one value, or all that there are."""
+    gathered: dict[str, dict[Any, None]] = {}
+    for log in logs:
+        for name, value in (*log.conditions.items(), *log.parameters.items()):
+            gathered.setdefault(name, {})[value] = None
+    return {name: next(iter(values)) if len(values) == 1 else list(values)
+            for name, values in gathered.items() if len(values) <= 8}

@@ -8,20 +8,24 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing, contextmanager
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.batches import Batch, Done, Running, batches, simulated
 from servotwin.identification.fitting.case import (
     DELAY_SCALE,
+    LATER,
     MOST_DELAY,
     NUISANCES,
     OFFSET_SCALE,
+    PERIOD_SCALE,
+    SAG_SCALE,
     SHARED,
     SPEED_SCALE,
     STEP,
@@ -37,16 +41,423 @@ from servotwin.identification.fitting.case import (
     widest,
 )
 from servotwin.identification.fitting.free import Space
-from servotwin.identification.fitting.lanes import LogLanes
+from servotwin.loads import Load
 from servotwin.logs.log import Log
 from servotwin.models import DigitalServo, Model
 from servotwin.parameters.servo import output_value
 from servotwin.signals import Signal
+from servotwin.simulation.lanes.inputs import LOAD_NAMES, lanes_of
+from servotwin.simulation.lanes.many import simulate_lanes
+from servotwin.simulation.progress import HERE, Crew
+
+# --- The simulations of a fit: lanes of several logs in as few calls as pay, wherever a crew does them ----------------
+
+# Lanes are simulated together though their logs were sampled at other times and last as long as others: all are looked
+# at whenever one of them is, and run as long as the longest. No lane feels that, to the last bit.
 
 Array = NDArray[np.float64]
 
+FIT_ACCURACY = 1e-7  # rad
+_LOOK = 1e-3  # s of simulation: about what it costs to look at a lane once
+_CALL = 6e-3  # s: what a call costs besides its lanes
+_WORTH = 4.0  # calls: less is not handed to another worker
+_WORTH_AWAY = 20.0  # the same, where what goes to a worker and comes back is copied
+
+
+@dataclass(frozen=True)
+class Running:
+    """Who simulates, and how closely.
+
+    Parameters
+    ----------
+    crew : Crew
+    accuracy : float
+        Of motions that are integrated [rad].
+    look : callable
+        Called before each simulation; may raise KeyboardInterrupt.
+    """
+
+    crew: Crew = field(default_factory=Crew)
+    accuracy: float = FIT_ACCURACY
+    look: Callable[[], None] = lambda: None
+
+
+@dataclass(frozen=True, eq=False)
+class Bundle:
+    """Lanes that are looked at together; picklable.
+
+    Parameters
+    ----------
+    times : ndarray, shape (T,)
+        When they are looked at, in any order [s].
+    duration : float
+        [s]
+    load : Load
+        Of all of them.
+    signals : sequence of Signal, length n
+    columns : mapping of str to ndarray, shape (n,)
+        Numbers of servo and load by dotted name (SI).
+    initial : mapping of str to ndarray, shape (n,)
+    """
+
+    times: Array
+    duration: float
+    load: Load
+    signals: Sequence[Signal]
+    columns: dict[str, Array]
+    initial: dict[str, Array]
+
+    @property
+    def lanes(self) -> int:
+        """How many there are."""
+        return len(self.signals)
+
+    @cached_property
+    def key(self) -> bytes:
+        """What is the same where bundles are looked at at the same times."""
+        return self.times.tobytes()
+
+    @property
+    def cost(self) -> float:
+        """What it takes, in seconds of one lane of which nothing is looked at."""
+        return self.lanes * (self.duration + _LOOK * len(self.times))
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Bundles of one call, and what they share; picklable.
+
+    Parameters
+    ----------
+    model : Model
+    outputs : tuple of str
+    accuracy : float
+        [rad]
+    strict : bool
+        Whether bad input is raised; otherwise the bundle that has it fails.
+    bundles : tuple of Bundle
+        All with the same names of columns and of initial values.
+    nearly : bool
+        As of `simulate_lanes`.
+    """
+
+    model: Model
+    outputs: tuple[str, ...]
+    accuracy: float
+    strict: bool
+    bundles: tuple[Bundle, ...]
+    nearly: bool = False
+
+
+Done = list[dict[str, Array] | None]
+"""What comes of a batch: signals of each bundle, (n, T) each, None where it failed."""
+
+
+def simulated(batch: Batch) -> Done:
+    """Simulate a batch.
+
+    Raises
+    ------
+    InputError
+        If a lane is nothing that can be simulated, and the batch is strict.
+    """
+    try:
+        return [*_simulated(batch)]
+    except InputError:
+        if batch.strict:
+            raise
+        alone = [replace(batch, bundles=(bundle,)) for bundle in batch.bundles]
+        return [None] if len(alone) == 1 else [one for some in alone for one in simulated(some)]
+
+
+def _simulated(batch: Batch) -> list[dict[str, Array]]:
+    bundles = batch.bundles
+    several = {bundle.key: bundle.times for bundle in bundles}
+    times, where = np.unique(np.concatenate([*several.values()]), return_inverse=True)
+    ends = np.cumsum([len(some) for some in several.values()])
+    places = dict(zip(several, np.split(where, ends[:-1]), strict=True))
+    counts = [bundle.lanes for bundle in bundles]
+    columns, initial = ({name: np.concatenate([getattr(bundle, which)[name] for bundle in bundles])
+                         for name in getattr(bundles[0], which)} for which in ("columns", "initial"))
+    lanes = lanes_of(batch.model, [signal for bundle in bundles for signal in bundle.signals],
+                     [bundle.load for bundle, count in zip(bundles, counts, strict=True) for _ in range(count)],
+                     columns, initial or None, np.zeros(sum(counts), np.int64))
+    made = simulate_lanes(lanes, duration=max(bundle.duration for bundle in bundles), output_times=times,
+                          outputs=batch.outputs, executor=HERE, accuracy=batch.accuracy, nearly=batch.nearly)
+    found, lane = [], 0
+    for bundle, count in zip(bundles, counts, strict=True):
+        rows, at = slice(lane, lane + count), places[bundle.key]
+        found.append({name: np.asarray(made[name][rows, at], np.float64) for name in batch.outputs})
+        lane += count
+    return found
+
+
+def batches(bundles: Sequence[Bundle], pace: float, crew: Crew) -> list[list[int]]:
+    """Return which bundles go into which call: as few calls as keep all workers busy, the longest first.
+
+    Parameters
+    ----------
+    bundles : sequence of Bundle
+        That may be simulated together.
+    pace : float
+        How long a second of one lane takes, about [s].
+    crew : Crew
+    """
+    seconds = [bundle.cost * pace for bundle in bundles]
+    share = max(sum(seconds) / (2 * crew.workers), _CALL * (_WORTH if crew.is_here else _WORTH_AWAY))
+    calls: list[_Call] = []
+    for k in sorted(range(len(bundles)), key=lambda k: (-bundles[k].duration, bundles[k].key)):
+        alone = not calls or calls[-1].seconds + 0.5 * seconds[k] > share
+        vain = 0.0 if alone else calls[-1].in_vain(bundles[k]) * pace
+        if alone or vain > (_CALL + calls[-1].vain) / len(calls[-1].which):  # more than each of these costs beside
+            calls.append(_Call(bundles[k].duration))
+            vain = 0.0
+        calls[-1].add(k, bundles[k], seconds[k], vain)
+    return [call.which for call in sorted(calls, key=lambda call: -call.seconds)]
+
+
+class _Call:
+    """Bundles that go into one call, the longest first."""
+
+    def __init__(self, duration: float) -> None:
+        self.which: list[int] = []
+        self.seconds = self.vain = 0.0
+        self._duration, self._lanes, self._looks = duration, 0, dict[bytes, int]()
+        self._all_looks = 0
+
+    def in_vain(self, bundle: Bundle) -> float:
+        """Return what one more bundle, and the others for its sake, would do that nobody asks for [s of one lane]."""
+        own = self._looks.get(bundle.key, 0)
+        idle = self._duration - bundle.duration + _LOOK * (self._all_looks - own)
+        return bundle.lanes * idle + (0.0 if own else self._lanes * _LOOK * len(bundle.times))
+
+    def add(self, k: int, bundle: Bundle, seconds: float, vain: float) -> None:
+        """Take one more, which does so much in vain [s]."""
+        self.which.append(k)
+        self.seconds += seconds
+        self.vain += vain
+        self._lanes += bundle.lanes
+        if bundle.key not in self._looks:
+            self._looks[bundle.key] = len(bundle.times)
+            self._all_looks += len(bundle.times)
+
+
+# --- The lanes of one log at one point of a search, and what their signals say ----------------------------------------
+
+_VOLTAGE = "supply.open_circuit_voltage"
+_NOISE = "potentiometer.noise"
+_PLAY, _TEETH = "gear.backlash", "gear.gear_reduction"
+_TICK, _PHASE = "firmware.control_period", "firmware.control_phase"
+_DELAYS = ("log_delay", "frame_phase")  # a log's own: what they change follows from the speed, without a lane
+
+
+class LogLanes:
+    """The lanes of one log at one point: the nominal one, and one for each number that is varied."""
+
+    def __init__(self, forecast: Forecast, k: int, at: int, point: Point, *, sides: int, step: float,
+                 rates: bool, noise: Mapping[str, float], nearly: bool = False) -> None:
+        self.nearly = nearly
+        self.forecast, self.case, self.at, self.sides, self.noise = forecast, forecast.cases[k], at, sides, noise
+        p, names = len(forecast.space), forecast.names_of_own(self.case)
+        self.names, own = names, dict(zip(names, point.own[k], strict=True))
+        self.delay = forecast.nuisance_of(point.shared, "delay") + own.get("log_delay", 0.0) * DELAY_SCALE
+        self.offset = forecast.nuisance_of(point.shared, "angle_offset")
+        self.sag = forecast.nuisance_of(point.shared, "angle_sag")
+        self.varied = [name for name in names if name not in _DELAYS]
+        self.shaped = [name for name in forecast.extra if name == "frame_period"]
+        numbers = p + len(self.varied) + len(self.shaped)
+        self.count = 1 + sides * numbers
+        self.cost = self.count * self.case.log.duration
+        self.x = np.repeat(point.shared[None, :p], self.count, axis=0)
+        angle = own.get("output_angle", self.case.start[0] / OFFSET_SCALE) * OFFSET_SCALE - self.offset
+        self.angle = np.full(self.count, angle)
+        self.speed = np.full(self.count, own.get("output_speed", 0.0) * SPEED_SCALE)
+        self.tick = np.full(self.count, own.get("control_phase", 0.0))
+        columns = {"output_angle": (self.angle, OFFSET_SCALE), "output_speed": (self.speed, SPEED_SCALE),
+                   "control_phase": (self.tick, 1.0)}
+        self.steps = np.zeros((sides, numbers))
+        if sides:
+            own_lower, own_upper = self._room(own)
+            open_ = np.full(len(self.shaped), np.inf)
+            self.steps = _steps(
+                np.concatenate([point.shared[:p], [own[name] for name in self.varied], np.zeros(len(open_))]),
+                np.concatenate([forecast.space.lower, own_lower, -open_]),
+                np.concatenate([forecast.space.upper, own_upper, open_]), sides, step)
+            if self.shaped:  # a period that is much longer would have other pulses carry the commands
+                self.steps[:, -1] = np.clip(self.steps[:, -1], -STEP, STEP)
+        for side in range(sides):
+            first = 1 + side * numbers
+            self.x[np.arange(first, first + p), np.arange(p)] += self.steps[side, :p]
+            for i, name in enumerate(self.varied):
+                column, scale = columns[name]
+                column[first + p + i] += self.steps[side, p + i] * scale
+        self.signals = [self.case.signal] * self.count
+        self.begins = 0.0  # from when on ticks are counted, where they go with the pulses [s]
+        if forecast.phased:
+            self._send_pulses(k, point, own["frame_phase"] * DELAY_SCALE, numbers)
+        delayed = sides > 0 and ("delay" in forecast.extra or any(name in names for name in _DELAYS))
+        needs_rate = (delayed or rates) and any(name != "output_angle" for name in self.case.places)
+        self.later = LATER if needs_rate else 0.0
+        self.times = self.case.times - self.delay
+        self.part: LogPart
+
+    def _room(self, own: Mapping[str, float]) -> tuple[Array, Array]:
+        """Return the ends of the log's own numbers that are varied: no shaft starts beyond a stop."""
+        forecast, log = self.forecast, self.case.log
+        columns = forecast.space.columns(self.x[:1])
+        lower, upper = np.full(len(self.varied), -np.inf), np.full(len(self.varied), np.inf)
+        for end, name, none in ((lower, "stops.lower_angle", -np.inf), (upper, "stops.upper_angle", np.inf)):
+            stop = log.parameters.get(name, forecast.model.value_or(name, none))
+            at = float(columns[name][0]) if name in columns else stop
+            end[[one == "output_angle" for one in self.varied]] = (at + self.offset) / OFFSET_SCALE
+        return lower, upper
+
+    def _send_pulses(self, k: int, point: Point, first: float, numbers: int) -> None:
+        """Give every lane its pulses; those of one whose period is varied come a little later one by one."""
+        forecast, log = self.forecast, self.case.log
+        frames, lead = forecast.frames_of(point, k), forecast.lead_at(point, k)
+        self.delay -= lead
+        self.begins = first + lead + frames.tick
+        period = forecast.nuisance_of(point.shared, "frame_period") or frames.period
+        self.signals = [forecast.command_at(point, k)] * self.count
+        for side in range(self.sides if self.shaped else 0):
+            longer = period + self.steps[side, numbers - 1] * PERIOD_SCALE
+            self.signals[(1 + side) * numbers] = signal(log, frames, first, longer, lead)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the signals that are asked for."""
+        measured = [name for name in self.forecast.sensors if name in self.case.places]
+        bus = ["bus_voltage"] if "angle_sag" in self.forecast.extra else []
+        return tuple(dict.fromkeys([*measured, "output_speed", *bus]))
+
+    def bundle(self) -> Bundle:
+        """Return what is simulated."""
+        forecast, log = self.forecast, self.case.log
+        read = (*forecast.model.requires, *forecast.model.optional)
+        own = {name: np.full(self.count, value) for name, value in log.parameters.items()
+               if name in LOAD_NAMES or name in read}
+        if _NOISE in forecast.model.optional and forecast.model.servo.get(_NOISE):
+            own[_NOISE] = np.zeros(self.count)
+        columns = {**forecast.space.columns(self.x), **own}
+        if _PHASE in forecast.model.optional:
+            columns |= self._ticks(columns)
+        asked = np.maximum(np.concatenate([self.times, self.times + self.later]) if self.later else self.times, 0.0)
+        starts = "initial_state" in forecast.nuisance
+        return Bundle(times=asked, duration=max(float(asked.max()), log.duration), load=log.load, signals=self.signals,
+                      columns=columns,
+                      initial=self._start(columns) if starts else {})
+
+    def _start(self, columns: Mapping[str, Array]) -> dict[str, Array]:
+        """Return where every lane starts (SI), the motor within the gear's play where the log tells."""
+        start, model = {"output_angle": self.angle, "output_speed": self.speed}, self.forecast.model
+        play = columns.get(_PLAY, np.full(self.count, model.value_or(_PLAY, 0.0)))
+        known = any(case.leans for case in self.forecast.cases)  # lanes that run together say the same of their starts
+        if known and np.any(play) and any(place.name == "motor_angle" for place in model.states):
+            start["motor_angle"] = model.value_or(_TEETH, 1.0) * (self.angle + self.case.leans * 0.5 * play)
+        return start
+
+    def _ticks(self, columns: Mapping[str, Array]) -> dict[str, Array]:
+        """Return when the first tick of each lane is [s]; pulses that come later move it by as much.
+
+        A command acts from the first tick on that follows its pulse.
+        """
+        model, tick = self.forecast.model, columns.get(_TICK, self.forecast.model.value_or(_TICK, 0.0))
+        if "control_phase" in self.names:
+            phase = np.clip(self.tick, 0.0, 1.0) * tick
+        elif self.forecast.phased:
+            phase = np.full(self.count, columns.get(_PHASE, model.value_or(_PHASE, 0.0)))
+        else:
+            return {}
+        return {_PHASE: np.mod(phase + self.begins, tick)}
+
+    def _fail(self) -> None:
+        """Make a part that is nan."""
+        m, own = self.case.count, len(self.names)
+        width = self.forecast.size if self.sides else 0
+        self.part = LogPart(np.full(m, np.nan), np.full((m, width), np.nan),
+                            np.full((m, own if self.sides else 0), np.nan), np.full(m, np.nan))
+
+    def take(self, signals: dict[str, Array] | None) -> None:
+        """Make the part of the log from the lanes' signals at the times of the bundle; nan where there are none."""
+        if signals is None:
+            self._fail()
+            return
+        self._make(signals if "bus_voltage" not in self.outputs else {**signals, "sag": self._sag(signals)})
+
+    def _sag(self, signals: dict[str, Array]) -> Array:
+        """Return by how much the bus lies above the voltage without current [V], shape (n, T)."""
+        open_circuit = self.forecast.space.columns(self.x).get(_VOLTAGE)
+        if open_circuit is None:
+            open_circuit = np.full(self.count, self.case.log.parameters.get(
+                _VOLTAGE, self.forecast.model.value(_VOLTAGE)))
+        return np.asarray(signals["bus_voltage"] - open_circuit[:, None])
+
+    def _make(self, signals: dict[str, Array]) -> None:
+        early = np.minimum(self.times, 0.0)
+        forecast, case, p = self.forecast, self.case, len(self.forecast.space)
+        k = len(case.times)
+        residuals, shared, own, delayed = [], [], [], []
+        for name, place in case.places.items():
+            values = signals[name][:, :k]
+            speed = signals["output_speed"][0, :k]
+            rate = speed
+            if name == "output_angle":
+                # Before the command of the first sample acts, the servo goes on as it began
+                values = values + self.speed[:, None] * early + self.offset
+                if "sag" in signals:
+                    values = values + self.sag * signals["sag"][:, :k]
+            elif self.later:
+                rate = (signals[name][0, k:] - values[0]) / self.later
+            sigma = case.sigma(name, self.noise)
+            y = values[:, place] / sigma
+            residuals.append(y[0] - case.values[name] / sigma)
+            of_delay = -rate[place] * DELAY_SCALE / sigma
+            delayed.append(of_delay)
+            if not self.sides:
+                continue
+            sloped = self._sloped(y).T
+            # An angle that is read too high: the shaft's own start is as much lower
+            of_offset = np.full(len(place), OFFSET_SCALE / sigma if name == "output_angle" else 0.0)
+            extra = {"delay": of_delay, "angle_offset": of_offset}
+            if "sag" in signals:
+                there = signals["sag"][0, place] if name == "output_angle" else np.zeros(len(place))
+                extra["angle_sag"] = there * (SAG_SCALE / sigma)
+            extra |= {which: sloped[:, p + len(self.varied) + i] for i, which in enumerate(self.shaped)}
+            starts = {which: sloped[:, p + i] for i, which in enumerate(self.varied)}
+            if "output_angle" in starts:
+                extra["angle_offset"] = of_offset - starts["output_angle"]
+            shared.append(np.column_stack([sloped[:, :p], *(extra[n] for n in forecast.extra)]))
+            columns = [starts[n] if n in starts else of_delay for n in self.names]
+            own.append(np.column_stack(columns) if columns else np.zeros((len(place), 0)))
+        residual, later_by = np.concatenate(residuals), np.concatenate(delayed)
+        nothing = np.zeros((len(residual), 0))
+        self.part = LogPart(residual, np.concatenate(shared) if self.sides else nothing,
+                            np.concatenate(own) if self.sides else nothing, later_by)
+
+    def _sloped(self, y: Array) -> Array:
+        """Return the derivatives of the lanes' signals by every varied number, a row each."""
+        n = self.steps.shape[1]
+        if self.sides == 1:
+            return np.asarray((y[1:] - y[0]) / self.steps[0][:, None])
+        return np.asarray((y[1:1 + n] - y[1 + n:]) / (self.steps[0] - self.steps[1])[:, None])
+
+
+def _steps(x: Array, lower: Array, upper: Array, sides: int, step: float) -> Array:
+    """Return the steps of all varied numbers, one row a side; none leaves its bounds."""
+    steps = np.full((sides, len(x)), step)
+    if sides == 1:
+        steps[0] = np.where(x + step > upper, -step, step)
+    elif sides:
+        steps[0] = np.where(x + step > upper, 0.0, step)
+        steps[1] = np.where(x - step < lower, 0.0, -step)
+    return steps
+
+
+# --- What a model says that logs should show, and how that changes with every searched number -------------------------
+
 _PERIOD = "electronics.frame_period"
-_PHASE = "firmware.control_phase"
+_CONTROL_PHASE = "firmware.control_phase"
 _STRIBECK = "friction.stribeck_speed"
 _ANY_TICK = (0.5, 12.0**-0.5)  # of a tick: mean and standard deviation of what may be anywhere in it
 _BEFORE = 5  # pulses: by then a servo hunts as it will
@@ -100,7 +511,7 @@ class Forecast:
                                         or not model.value_or("supply.internal_resistance", 0.0) > 0.0):
             raise InputError("nuisance: angle_sag", got=f"{model!r} whose bus voltage stays",
                              allowed="a pulse servo with supply.internal_resistance")
-        if "control_phase" in nuisance and _PHASE not in model.optional:
+        if "control_phase" in nuisance and _CONTROL_PHASE not in model.optional:
             raise InputError("nuisance: control_phase", got=f"{model!r} without ticks", allowed="a DigitalServo")
         self.noise = dict.fromkeys(self.sensors, 1.0)
         self.step = WIDE if isinstance(model, DigitalServo) else STEP  # of the differences that are derivatives

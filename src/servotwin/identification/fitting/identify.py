@@ -28,7 +28,6 @@ from servotwin.identification.fitting.assumptions import (
     systematic,
     with_assumptions,
 )
-from servotwin.identification.fitting.batches import FIT_ACCURACY, Running
 from servotwin.identification.fitting.case import (
     DELAY_SCALE,
     FINE,
@@ -42,17 +41,23 @@ from servotwin.identification.fitting.case import (
 )
 from servotwin.identification.fitting.checks import BY_ITSELF, explained, first_looks, mended
 from servotwin.identification.fitting.clocks import delay_range, phase_errors, ticking, unsure_commands
-from servotwin.identification.fitting.comparison import BESIDE, SLEW, ErrorTables, compare
+from servotwin.identification.fitting.comparison import BESIDE, SLEW, ErrorTables, compare, trace_of, with_pulses_of
 from servotwin.identification.fitting.diagnosis import diagnose
 from servotwin.identification.fitting.diagnosis.drifts import counted_stamps
-from servotwin.identification.fitting.fit import Fit, Start, Trace
-from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.fit import (
+    Fit,
+    Start,
+    Trace,
+    identified_servo,
+    split,
+    stopped,
+    with_record,
+    with_what_logs_say,
+)
+from servotwin.identification.fitting.forecast import FIT_ACCURACY, Forecast, Running
 from servotwin.identification.fitting.free import Bounds, Priors, Space
-from servotwin.identification.fitting.held_out import trace_of, with_pulses_of
-from servotwin.identification.fitting.holdout import split
 from servotwin.identification.fitting.noise import SensorSeries, noise_of
 from servotwin.identification.fitting.phases import credible, settled
-from servotwin.identification.fitting.record import identified_servo, stopped, with_record, with_what_logs_say
 from servotwin.identification.fitting.registers import RegisterSearch, as_logs_say, register_search
 from servotwin.identification.fitting.stopping import Course, Within
 from servotwin.identification.fitting.task import HUBER, Task
@@ -93,7 +98,7 @@ from servotwin.identification.fitting.yielding import (
     with_remedies,
     yielded,
 )
-from servotwin.logs.column_values import step_of
+from servotwin.logs.columns import step_of
 from servotwin.logs.log import ANGLES, Log
 from servotwin.models import DigitalServo, Model
 from servotwin.parameters import Servo

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.fitting.uncertainty import Rows
-from servotwin.logs.column_values import step_of
+from servotwin.logs.columns import step_of
 from servotwin.logs.log import Log
 
 # --- The noise of a sensor as measured values show it without any model -----------------------------------------------

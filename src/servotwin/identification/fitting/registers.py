@@ -22,7 +22,7 @@ from servotwin.identification.fitting.case import DELAY_SCALE, GAIN, Point, with
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.stopping import Within
-from servotwin.logs.bam_convention import writes_gain
+from servotwin.logs.bam_logs import writes_gain
 from servotwin.logs.log import Log
 from servotwin.models import DigitalServo, Model
 from servotwin.parameters import Servo

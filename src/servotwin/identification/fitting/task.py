@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.arrow import Begin, Loss, Outcome, Prior, Search, together
+from servotwin.identification.fitting.arrow import Begin, Loss, Outcome, Prior, Search, scatter_of, together
 from servotwin.identification.fitting.case import (
     DELAY_SCALE,
     MOST_DELAY,
@@ -28,7 +28,6 @@ from servotwin.identification.fitting.case import (
 from servotwin.identification.fitting.clocks import DELAYS, at_likely_delay, first_offset, ticking, with_clocks
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.phases import Scan, widening
-from servotwin.identification.fitting.scatter import scatter_of
 from servotwin.logs.log import ANGLES
 
 Array = NDArray[np.float64]

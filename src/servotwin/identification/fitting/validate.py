@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, ServoFileError
 from servotwin.identification.fitting import checks
-from servotwin.identification.fitting.arrow import Begin, Loss, Prior
-from servotwin.identification.fitting.batches import Running
+from servotwin.identification.fitting.arrow import Begin, Loss, Prior, scatter_of
 from servotwin.identification.fitting.case import (
     DELAY_SCALE,
     NUISANCES,
@@ -36,13 +35,11 @@ from servotwin.identification.fitting.case import (
 )
 from servotwin.identification.fitting.checks import explained, first_looks
 from servotwin.identification.fitting.clocks import first_offset
-from servotwin.identification.fitting.fit import Trace
-from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.comparison import trace_of, with_pulses_of
+from servotwin.identification.fitting.fit import ErrorTable, Trace
+from servotwin.identification.fitting.forecast import Forecast, Running
 from servotwin.identification.fitting.free import Space
-from servotwin.identification.fitting.held_out import trace_of, with_pulses_of
-from servotwin.identification.fitting.holdout import ErrorTable
 from servotwin.identification.fitting.registers import RegisterSearch, as_logs_say, register_search
-from servotwin.identification.fitting.scatter import scatter_of
 from servotwin.identification.fitting.task import HUBER, Task
 from servotwin.logs.log import Log
 from servotwin.models import MODELS, Model
@@ -244,7 +241,7 @@ class Validation:
         OutputExistsError, OutputError
             If the file exists and `overwrite` is false, or it cannot be written.
         """
-        from servotwin.identification.report.validation import write_validation
+        from servotwin.identification.report.page import write_validation
 
         return write_validation(self, Path(path), overwrite=overwrite)
 

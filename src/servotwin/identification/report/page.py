@@ -3,30 +3,330 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from servotwin.identification.fitting.holdout import fit_percent
-from servotwin.identification.report import parts as report_parts
+from servotwin.identification.fitting.fit import fit_percent
 from servotwin.identification.report import pictures as report_pictures
-from servotwin.identification.report import tables as report_tables
-from servotwin.identification.report.parts import STYLE, figure, space
+from servotwin.identification.report import pictures as report_traces
 from servotwin.identification.report.pictures import (
+    MODELS,
+    dimension_of_free,
     error_shown,
     error_unit,
     estimate_lines,
     percent,
+    rig_text,
+    sensor_dimension,
     share_text,
     tables_of,
 )
-from servotwin.look import MINUS, document, escape, number, table
+from servotwin.identification.report.pictures import error_rows as error_bars
+from servotwin.look import (
+    MINUS,
+    document,
+    escape,
+    figure_in,
+    label_of,
+    number,
+    pages,
+    picture,
+    readable,
+    table,
+    to_bytes,
+    unit_for,
+)
 from servotwin.parameters import write_file
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from servotwin.identification.arms.arm_fit import ArmFit
-    from servotwin.identification.fitting.fit import Fit
+    from servotwin.identification.fitting.fit import ErrorTable, Fit, Trace
     from servotwin.identification.fitting.ladder import Ladder
+    from servotwin.identification.fitting.noise import CrossCorrelation
+    from servotwin.identification.fitting.validate import Validation
     from servotwin.robots import RobotValidation
+
+
+
+# --- The tables of a fit's report -------------------------------------------------------------------------------------
+
+_HOW = {"normal": "normal law", "profile": "profile of the cost", "at bound": "none: at a bound",
+        "undetermined": "none: not determined", "not sought": "none: not asked for"}
+
+
+def estimates(fit: Fit) -> str:
+    """Return the estimates with intervals, and what the servo said before."""
+    rows = []
+    for line in estimate_lines(fit):
+        ends = ["–", "–"] if line.interval == line.method else [line.lower, line.upper]
+        numbers = [text.replace("-", MINUS) for text in (line.value, *ends, line.sheet)]
+        rows.append([f"<code>{escape(line.name)}</code>", *numbers, escape(line.unit),
+                     _HOW.get(line.method, line.method), line.prior])
+    level = f"{100 * fit.level:g} %"
+    return table(("parameter", "value", f"{level} from", "to", "before", "unit", "interval by", "prior"), rows,
+                 caption="“Before” is the value of the servo file; delay and angle offset belong to the rig. “Prior”: "
+                         "how much of what is known is the servo file's range or a prior that was given, not data.") \
+        + _yielded(fit)
+
+
+def _yielded(fit: Fit) -> str:
+    """Return the priors that were dropped beside what the logs say; nothing where there are none."""
+    rows = []
+    for one in fit.yielded:
+        dimension = dimension_of_free(one.name)
+        unit = unit_for(one.logs or one.file, dimension)
+        known = math.isfinite(one.logs_std)
+        numbers = (figure_in(one.file, unit, dimension), figure_in(one.file_std, unit, dimension),
+                   figure_in(one.logs, unit, dimension, within=one.logs_std) if known else "–",
+                   *(figure_in(x, unit, dimension, within=one.logs_std) if known else "–"
+                     for x in (one.logs_lower, one.logs_upper)))
+        rows.append([f"<code>{escape(one.name)}</code>", *(text.replace("-", MINUS) for text in numbers),
+                     escape(label_of(unit)), number(one.apart, 2)])
+    head = ("parameter", "prior", "±", "logs", f"{100 * fit.level:g} % from", "to", "unit", "standard errors apart")
+    return table(head, rows, caption="Priors that the logs contradict: the fit goes without them.") if rows else ""
+
+
+def causes(fit: Fit) -> str:
+    """Return what was tried and explains a bad verdict, the best first."""
+    if fit.verdict is None:
+        return ""
+    factor, unit = error_unit(next(iter(fit.verdict.noise)))
+    rows = [[escape(cause.name), number(cause.before * factor, 3), number(cause.after * factor, 3),
+             escape(cause.remedy)] for cause in fit.verdict.causes]
+    return table(("cause", f"error without it ({unit})", f"with it ({unit})", "what to do"), rows,
+                 caption="Rms errors on parts of the logs that took no part in the trial.")
+
+
+def errors(tables: Mapping[str, ErrorTable], label: str, factor: float, unit: str) -> str:
+    """Return rms errors by the values of a label, of all models."""
+    models = next(iter(tables.values())).models
+    rows = [[escape(row.value), row.which, *(_error(row.errors.get(model, math.nan) * factor) for model in models),
+             _percent(row.fits.get(models[0], math.nan))] for row in error_bars(tables, label)]
+    for which, held in tables.items():
+        total = held.total()
+        rows.append(["<b>all</b>", which, *(_error(total.get(model, math.nan) * factor) for model in models),
+                     _percent(held.total(fit_percent)[models[0]])])
+    words = escape(label.replace("_", " "))
+    return table((words, "logs", *(f"{escape(MODELS.get(m, m))} ({unit})" for m in models), "fit (%)"),
+                 rows, caption=f"Rms error by {words}, over all samples; fit of the servo.", text_columns=2)
+
+
+def logs(tables: Mapping[str, ErrorTable], traces: Sequence[Trace]) -> str:
+    """Return the errors log by log, the worst ones first."""
+    signals = {trace.log.name: trace.signal for trace in traces}
+    every = [(error, which) for which, held in tables.items() for error in held.errors[held.models[0]]]
+    rows = []
+    for error, which in sorted(every, key=lambda item: -item[0].rms if math.isfinite(item[0].rms) else -math.inf):
+        factor, unit = error_unit(signals.get(error.log, "output_angle"))
+        rows.append([escape(error.log), escape(error.motion or "other"), which,
+                     f"{_error(error.rms * factor)} {unit}", f"{_error(error.largest * factor)} {unit}",
+                     _percent(error.fit_percent), str(error.samples)])
+    return table(("log", "motion", "part", "rms error", "largest error", "fit (%)", "samples"), rows, text_columns=3)
+
+
+def starts(fit: Fit) -> str:
+    """Return where the searches from all starts ended."""
+    best = min((start.cost for start in fit.starts), default=math.nan)
+    rows = [[str(k), number(start.cost), number(start.cost / best if best else math.nan, 3),
+             "yes" if start.converged else "no"] for k, start in enumerate(fit.starts, 1)]
+    return table(("start", "cost", "times the best", "converged"), rows,
+                 caption="Cost: half the sum of squared residuals in units of noise, large ones in proportion only "
+                         "where the loss is Huber's. With several starts these are the rough searches on some logs.")
+
+
+def rungs(ladder: Ladder) -> str:
+    """Return all fits of a ladder, and which one is chosen."""
+    factor, unit = error_shown(ladder.fit.traces)
+    rows = [[escape(rung.name), str(len(rung.fit.space)), f"{_error(rung.training * factor)} {unit}",
+             f"{_error(rung.holdout * factor)} {unit}" if math.isfinite(rung.holdout) else "–",
+             number(rung.criterion, 5), "chosen" if rung.name == ladder.chosen else ""] for rung in ladder.rungs]
+    return table(("structure", "parameters", "fitted", "held out", "information criterion", ""), rows)
+
+
+def bounds(fit: Fit) -> str:
+    """Return bounds, prior and end of every searched parameter."""
+    rows = []
+    for p in fit.space.parameters:
+        dimension = dimension_of_free(p.name)
+        unit = unit_for(fit.estimates[p.name] or p.start, dimension)
+        prior = "–" if p.prior is None else f"{figure_in(p.prior[0], unit, dimension, within=p.prior[1])} ± " \
+                                            f"{figure_in(p.prior[1], unit, dimension)}"
+        rows.append([f"<code>{escape(p.name)}</code>", figure_in(p.lower, unit, dimension),
+                     figure_in(p.upper, unit, dimension), prior, escape(label_of(unit)),
+                     "at a bound" if p.name in fit.at_bound else "inside"])
+    return table(("parameter", "from", "to", "prior", "unit", "ended"), rows)
+
+
+def settings(fit: Fit) -> str:
+    """Return what was fitted, and by what."""
+    record = fit.servo.fit
+    noise = ", ".join(f"{name.replace('_', ' ')} {readable(value, sensor_dimension(name))}"
+                      for name, value in fit.noise.items())
+    doubt = fit.doubt
+    rows = [
+        ("servo", escape(f"{fit.servo.title or fit.servo.name} ({fit.servo.name})")),
+        ("model", escape(type(fit.model).__name__)),
+        ("logs", f"{len(fit.traces)}, of which {sum(t.held_out for t in fit.traces)} held out"),
+        ("data", f"<code>{escape(str(record.get('data', '–')))}</code>"),
+        ("version", escape(f"servotwin {record.get('version', '')}")),
+        ("noise of the residuals (σ)", escape(noise)),
+        ("intervals", "none" if doubt is None else escape(
+            f"{100 * fit.level:g} %, {doubt.method}, standard errors {doubt.inflation:.2g} times those of independent "
+            f"residuals (correlation of neighbours {doubt.autocorrelation:.2f})")),
+        ("time", f"{fit.seconds:.3g} s"),
+    ]
+    return table(("what", "value"), [[f"<b>{what}</b>", words] for what, words in rows], text_columns=2)
+
+
+def _error(value: float) -> str:
+    return number(value, 3)
+
+
+def _percent(value: float) -> str:
+    return percent(value).replace("-", MINUS)
+
+
+# --- What the reports of fits and of validations share: frames of pictures, errors, and logs side by side -------------
+
+_MOST_LOGS = 21  # that are drawn folded
+STYLE = """
+.logs figure{margin:.7rem 0}#logs figure{padding:.4rem}#logs figure.held{border-color:#d55e00;background:#fff6ef}
+#logs figcaption{margin:0 0 .2rem;color:var(--ink);font-size:.85rem;overflow-wrap:anywhere}
+.tag{border-radius:4px;padding:0 .35rem;font-size:.8rem;background:#d55e00;color:#fff;white-space:nowrap}
+.key{display:inline-block;width:1.6rem;border-top:3px solid;vertical-align:middle;margin:0 .3rem 0 .8rem}
+figure img.drawing{width:100%;max-width:42rem}#logs figure img{width:100%}
+.verdict{font-size:1.1rem}.good{border-left-color:#009e73;background:#f0faf6}
+details{margin:.8rem 0}summary{cursor:pointer;color:var(--blue)}
+@media print{#logs figure{break-inside:avoid}
+figure img.drawing{max-width:27rem}}
+"""
+
+
+def figure(figure: Figure, words: str) -> str:
+    """Return a picture with its caption."""
+    return figures([figure], words)
+
+
+def figures(drawn: Sequence[Figure], words: str) -> str:
+    """Return the pages of a picture, one below the other, with their caption."""
+    images = "".join(picture(to_bytes(figure, "svg"), words, kind="drawing") for figure in drawn)
+    return f'<figure><div>{images}</div><figcaption>{words}</figcaption></figure>\n'
+
+
+def space(unit: str) -> str:
+    """Return a unit with the space before it that it needs."""
+    return unit if unit == "°" else f" {unit}"
+
+
+def errors_section(tables: Mapping[str, ErrorTable], traces: Sequence[Trace], words: str) -> str:
+    """Return pictures and tables of the errors, by motion and by every other label; `words` say how they were found."""
+    factor, unit = error_shown(traces)
+    parts = []
+    for label in dict.fromkeys(label for each in tables.values() for label in each.labels()):
+        values = {value for each in tables.values() for value in each.by(label)}
+        if len(values) > 1 or label == "motion":
+            parts.append(figures([report_pictures.errors(tables, label, factor, unit, page)
+                                  for page in pages(len(values), report_pictures.VALUES_A_PAGE)],
+                                 f"Rms error by {escape(label.replace('_', ' '))}. {words}"))
+        parts.append(errors(tables, label, factor, unit))
+    every = logs(tables, traces)
+    return f"{''.join(parts)}<details><summary>Log by log</summary>{every}</details>\n"
+
+
+def trace_list(traces: Sequence[Trace]) -> str:
+    """Return measured and simulated log by log: the worst, the middle and the best open, the others folded."""
+    first = report_traces.shown_first(traces)
+    others = [trace for trace in report_traces.by_error(traces) if not any(trace is one for one in first)]
+    mixed = len({trace.held_out for trace in traces}) > 1
+    lines = (("#999", "measured"), ("#0072b2", "simulated"), ("#d55e00", "simulated − measured"))
+    key = ('<p>' + "".join(f'<span class="key" style="border-color:{colour}"></span>{words}' for colour, words in lines)
+           + '. Below each: the yellow window, in which they differ most'
+           + (' &nbsp; <span class="tag">held out</span> not fitted</p>' if mixed else "</p>"))
+    note = ("<p>The log that is furthest off, the one in the middle and the nearest; all others are folded below.</p>\n"
+            if others else "")
+    drawn = "".join(_one(trace, tagged=mixed and trace.held_out) for trace in first)
+    kept = others[:_MOST_LOGS]
+    folded = "".join(f"<details><summary>{_caption(trace, tagged=mixed and trace.held_out)}</summary>"
+                     f"{_one(trace, tagged=mixed and trace.held_out)}</details>\n" for trace in kept)
+    left = (f"<p>{len(others) - len(kept)} further logs, nearer than these, are in the table of errors only.</p>\n"
+            if len(others) > len(kept) else "")
+    return f'{key}{note}<div class="logs">{drawn}</div>\n{folded}{left}'
+
+
+def _caption(trace: Trace, *, tagged: bool) -> str:
+    factor, unit = error_unit(trace.signal)
+    rms = math.sqrt(float((trace.residual**2).mean())) * factor
+    tag = ' <span class="tag">held out</span>' if tagged else ""
+    kind = f", {escape(trace.log.motion)}" if trace.log.motion else ""
+    return f"<b>{escape(trace.log.name)}</b>{kind}: {number(rms, 3)}{space(unit)} rms{tag}"
+
+
+def _one(trace: Trace, *, tagged: bool) -> str:
+    drawn = picture(to_bytes(report_traces.beside(trace), "svg"), f"{trace.log.name}, measured and simulated")
+    kind = ' class="held"' if tagged else ""
+    return f"<figure{kind}><figcaption>{_caption(trace, tagged=tagged)}</figcaption><div>{drawn}</div></figure>\n"
+
+
+def residuals(traces: Sequence[Trace], noise: Mapping[str, float], command: CrossCorrelation | None = None) -> str:
+    """Return the picture of what is left; of logs that were fitted with what the verdict says of the command before."""
+    return figure(report_traces.residuals(traces, noise, command),
+                  "Simulated less measured, in units of each sensor's noise σ. From above: over time; their "
+                  "distribution beside the normal law; how far residuals follow each other; how far they follow the "
+                  "command of some time before, both filtered so that noise has no memory. Grey: where 99 of 100 lags "
+                  "lie if what is left is noise.")
+
+
+# --- The report of a validation: one HTML page that needs nothing but itself ------------------------------------------
+
+def write_validation(found: Validation, path: Path, *, overwrite: bool = False) -> Path:
+    """Write the report of a validation.
+
+    Raises
+    ------
+    OutputExistsError, OutputError
+        If the file exists and `overwrite` is false, or it cannot be written.
+    """
+    write_file(path, validation_page(found).encode(), overwrite=overwrite)
+    return Path(path)
+
+
+def validation_page(found: Validation) -> str:
+    """Return the report as HTML."""
+    tables = {"": found.errors}
+    sections = (
+        ("summary", "Summary", _validation_summary(found)),
+        ("errors", "Errors", errors_section(tables, found.traces, "Every log starts where it was measured.")),
+        ("logs", "Measured and simulated", trace_list(found.traces)),
+        ("residuals", "What is left", residuals(found.traces, found.noise)),
+    )
+    contents = "".join(f'<li><a href="#{key}">{title}</a></li>' for key, title, _ in sections)
+    body = "".join(f'<section id="{key}"><h2>{title}</h2>\n{text}</section>\n' for key, title, text in sections)
+    name, count = found.servo.title or found.servo.name, len(found.traces)
+    logs = f"{count} log" + ("" if count == 1 else "s")
+    return document(f"{name}: validation", f"""<h1>{escape(name)}: validated on {logs}</h1>
+<p class="lead">{escape(type(found.model).__name__)}, <code>{escape(found.servo.name)}</code>. No parameter was fitted
+here.</p>
+<nav aria-label="Contents"><ol>{contents}</ol></nav>
+{body}""", style=STYLE)
+
+
+def _validation_summary(found: Validation) -> str:
+    factor, unit = error_shown(found.traces)
+    errors = found.errors.errors[type(found.model).__name__]
+    told = percent(found.errors.total(fit_percent)[found.errors.models[0]]).replace("-", MINUS)
+    worst = max(errors, key=lambda error: error.rms)
+    cards = [(f"{number(found.total * factor, 3)}{space(unit)}", f"rms error over all samples (fit {told} %)"),
+             (f"{number(worst.rms * factor, 3)}{space(unit)}", f"rms error of the worst log, {escape(worst.log)}"),
+             (f"{number(max(error.largest for error in errors) * factor, 3)}{space(unit)}", "largest error of all")]
+    for name, value in found.nuisance.items():
+        how = "fitted to these logs" if name in found.fitted else "as the servo file's fit recorded it"
+        cards.append((escape(rig_text(name, value)), how))
+    listed = "".join(f"<li><b>{value}</b>{words}</li>" for value, words in cards)
+    notes = "".join(f'<div class="note"><p>{escape(text)}</p></div>\n' for text in found.warnings)
+    return f'<ul class="numbers">{listed}</ul>\n{notes}'
 
 
 # --- The report of a fit: one HTML page that needs nothing but itself -------------------------------------------------
@@ -65,7 +365,7 @@ def page(fit: Fit, ladder: Ladder | None = None) -> str:
         ("unknown", "What the logs cannot say", _unknown(fit)),
         *((("structures", "What was compared", _compared(ladder)),) if ladder is not None else ()),
         ("errors", "Errors beside simpler models", _errors(fit)),
-        ("logs", "Measured and simulated", report_parts.trace_list(fit.traces)),
+        ("logs", "Measured and simulated", trace_list(fit.traces)),
         ("residuals", "What is left", _residuals(fit)),
         ("correlation", "Correlation of the estimates", _correlation(fit)), ("search", "The search", _search(fit)),
         ("reading", "How to read this page", _reading(fit)),
@@ -96,7 +396,7 @@ def _verdict(fit: Fit) -> str:
     good = " good" if fit.verdict.holds else ""
     words = escape(fit.verdict.sentence[:1].upper() + fit.verdict.sentence[1:])
     box = f'<div class="note verdict{good}"><p><strong>{words}.</strong></p></div>\n'
-    return box + (report_tables.causes(fit) if fit.verdict.causes else "")
+    return box + (causes(fit) if fit.verdict.causes else "")
 
 
 def _summary(fit: Fit) -> str:
@@ -144,7 +444,7 @@ def _estimates(fit: Fit) -> str:
     drawn = "" if forest is None else figure(
         forest, f"Estimates and {100 * fit.level:g} % intervals. Grey: what the servo file's own spread allows (95 %). "
                 "An open diamond has no interval.")
-    return drawn + report_tables.estimates(fit)
+    return drawn + estimates(fit)
 
 
 def _unknown(fit: Fit) -> str:
@@ -167,16 +467,16 @@ def _unknown(fit: Fit) -> str:
 
 
 def _compared(ladder: Ladder) -> str:
-    return report_tables.rungs(ladder) + f"<p>{escape(ladder.chosen)}: {escape(ladder.reason)}.</p>"
+    return rungs(ladder) + f"<p>{escape(ladder.chosen)}: {escape(ladder.reason)}.</p>"
 
 
 def _errors(fit: Fit) -> str:
-    return report_parts.errors(tables_of(fit), fit.traces, "Logs that were held out were simulated with the fitted "
+    return errors_section(tables_of(fit), fit.traces, "Logs that were held out were simulated with the fitted "
                                "servo, started where they were measured.")
 
 
 def _residuals(fit: Fit) -> str:
-    drawn = report_parts.residuals(fit.traces, fit.noise, None if fit.verdict is None else fit.verdict.command)
+    drawn = residuals(fit.traces, fit.noise, None if fit.verdict is None else fit.verdict.command)
     if fit.doubt is None:
         return drawn
     if fit.doubt.method == "independent residuals":
@@ -202,8 +502,8 @@ def _correlation(fit: Fit) -> str:
 
 
 def _search(fit: Fit) -> str:
-    return (report_tables.starts(fit) + "<h3>Bounds and priors</h3>" + report_tables.bounds(fit) + "<h3>Settings</h3>"
-            + report_tables.settings(fit))
+    return (starts(fit) + "<h3>Bounds and priors</h3>" + bounds(fit) + "<h3>Settings</h3>"
+            + settings(fit))
 
 
 def _reading(fit: Fit) -> str:

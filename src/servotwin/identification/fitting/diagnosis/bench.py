@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.arrow import Begin, Search
+from servotwin.identification.fitting.arrow import Begin, Search, by_sensor
 from servotwin.identification.fitting.case import LogPart, Point, joined
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.phases import settled
-from servotwin.identification.fitting.scatter import by_sensor
 from servotwin.identification.fitting.task import Task
 from servotwin.logs.log import ANGLES, Log
 from servotwin.models import Model

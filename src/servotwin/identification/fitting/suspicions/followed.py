@@ -20,8 +20,8 @@ from servotwin.units.words import unit_shown
 
 if TYPE_CHECKING:
     from servotwin.logs.columns import Column
+    from servotwin.logs.formats import Reading
     from servotwin.logs.log import Log
-    from servotwin.logs.reading import Reading
     from servotwin.models import Model
 
 
