@@ -251,3 +251,20 @@ def test_no_step_is_taken_under_a_constant_load(servo, monkeypatch):
         told = st.signals.samples([0.0, 0.15], rng.uniform(0.8e-3, 2.3e-3, 2), unit="s")
         st.simulate(st.PulseServo(servo.replace(changes)), told, duration=0.3, output_times=[0.3],
                     load=st.loads.Constant(rng.uniform(-0.6, 0.6))).raise_if_failed()
+
+
+def test_a_shaft_that_slows_down_for_ever_takes_no_more_steps_than_frames():
+    """Friction that grows with the load alone lets a coasting shaft go ever slower, down to numbers next to zero."""
+    servo = st.load_servo("hitec-hs-422").replace({
+        "friction.coulomb_torque_forward": 0.0, "friction.coulomb_torque_backward": 0.0,
+        "friction.breakaway_ratio": 1.0, "friction.stribeck_speed": 60.0, "friction.stribeck_exponent": 1.0,
+        "friction.load_friction": None, "friction.load_friction_motor": 0.11, "friction.load_friction_external": 0.11,
+        "friction.load_friction_motor_stribeck": 5e-4, "friction.load_friction_external_stribeck": 5e-4})
+    command = st.signals.step(0.0, 40.0, at=0.1, unit="deg")
+    result = st.simulate(st.PulseServo(servo), command, duration=20.0, output_times=np.linspace(0.5, 20.0, 40))
+    speed = np.abs(result["output_speed"])
+    rates = np.diff(np.log(speed[:10])) / np.diff(result["time"][:10])
+    assert result.status is st.simulation.Status.COMPLETED
+    np.testing.assert_allclose(rates[2:], rates[2], rtol=1e-6)  # next to a straight law: exponentially
+    assert speed[-1] < 1e-200
+    assert len(result.trajectory.segments) < 3 * 20.0 / servo.get("electronics.frame_period")

@@ -72,6 +72,7 @@ IN_ANY_ORDER = ("_between", "_close")  # functions whose sums a compiler may tak
 _PANELS = 40  # on one way; one that needs more is for the integrator
 _GUESSES = 3  # of the speed at which a panel ends, where the final speed is before
 _NEAR = 1e-7  # of a speed: within that a law is a straight line
+_STILL = 1e-20  # rad/s: slower than that every law is one, for friction that grows with the load alone never quite stops
 _CLOSE = 0.1  # of a speed: within that few points are enough
 _LONG = 3.0  # of a panel, in times in which a straight law settles
 _SHORT = 4e-16  # of a time
@@ -251,7 +252,7 @@ def _panel(numbers: Numbers, course: _Course, x: float, bound: float, sense: flo
     """Return the panel through which a shaft would go in a time if its law were a straight line by two points of it."""
     most, on = abs(bound - x), 1.0 if bound > x else -1.0
     way = on * sense
-    v, near = way * gain, _NEAR * min(x, numbers.friction.w_s)
+    v, near = way * gain, max(_NEAR * min(x, numbers.friction.w_s), _STILL)
     if not v > 0.0 or most == 0.0:
         return _Panel(0.0, 0.0, x, 0.0, x, x, 0.0, False, False)
     reach = min(max(v * span, _NEAR * numbers.friction.w_s), most)
