@@ -5,11 +5,14 @@ Importing the package loads numpy alone; every other part is loaded when its nam
 
 from importlib import import_module
 
+from servotwin.moved import install as _install
+
 TYPE_CHECKING = False  # typing is slow to load
 if TYPE_CHECKING:
     from typing import Any
 
 __version__ = "0.1.0"
+_install()
 
 # public name -> module that defines it
 _LAZY = {

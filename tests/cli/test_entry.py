@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-import servotwin
+import servotwin as st
 from servotwin.cli.failure import describe, one_line
 
 COMMAND = [sys.executable, "-m", "servotwin"]
@@ -15,7 +15,7 @@ SERVO = "hitec-hs-755hb"
 
 
 def test_version(cli):
-    assert cli("--version").out == f"servotwin {servotwin.__version__}\n"
+    assert cli("--version").out == f"servotwin {st.__version__}\n"
 
 
 @pytest.mark.long(but="words7")
@@ -39,7 +39,7 @@ def test_examples_of_the_help_work(cli):
 
 def test_python_m(child_environment):
     done = subprocess.run([*COMMAND, "--version"], capture_output=True, text=True, env=child_environment, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (0, f"servotwin {servotwin.__version__}\n", "")
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"servotwin {st.__version__}\n", "")
 
 
 @pytest.mark.long(but="words0")
@@ -153,3 +153,24 @@ def test_one_line_is_printable_and_not_endless():
     assert one_line("a\r\nb\t\udc80") == "a b \\udc80"
     assert len(one_line("x" * 10_000)) < 700
     assert describe(OSError()).message == "OSError"
+
+
+@pytest.mark.long(but="log")
+@pytest.mark.parametrize(("words", "most"), [
+    ("log run.csv", 260), ("doctor hitec-hs-422 run.csv", 273), ("curves hitec-hs-422 --voltage 5 --quick", 280),
+    ("fit run.csv --servo hitec-hs-422 --free output_inertia --starts 1", 312)], ids=["log", "doctor", "curves", "fit"])
+def test_a_command_loads_what_it_needs(tmp_path, child_environment, words, most):
+    """Of the package; a fit of one servo needs no robot."""
+    result = st.simulate(st.PulseServo(st.load_servo("hitec-hs-422")), st.signals.step(0.0, 20.0, at=0.1, unit="deg"),
+                         duration=0.4)
+    result.save(tmp_path / "run.csv")
+    program = ("import sys; from servotwin.cli import main; code = main(sys.argv[1:]);"
+               "own = [name for name in sys.modules if name.startswith('servotwin')];"
+               "print(len(own), 'servotwin.robots' in own or 'mujoco' in sys.modules, file=open('loaded', 'w'));"
+               "sys.exit(code)")
+    done = subprocess.run([sys.executable, "-c", program, *words.split()], capture_output=True, text=True,
+                          env=child_environment, cwd=tmp_path, check=False)
+    assert done.returncode == 0, done.stderr
+    count, robots = (tmp_path / "loaded").read_text().split()
+    assert int(count) <= most
+    assert robots == "False"
