@@ -12,7 +12,6 @@ import typer
 from servotwin.cli import shared_options as shared
 from servotwin.cli.robot_options import ALL, Chosen, as_options, models_of, named_words, supply_of
 from servotwin.cli.terminal import emit_json, json_text, pairs, patience, show, table
-from servotwin.cli.terminal import table as shown_table
 
 if TYPE_CHECKING:
     from servotwin.cli.outputs import Target
@@ -377,7 +376,7 @@ def compare(
         emit_json(found)
         return
     show("distance of the tool from where it should be, rms, by pulse servos, mean of all tasks",
-         shown_table(words.CONDITION_HEAD, words.condition_rows(done)), "",
+         table(words.CONDITION_HEAD, words.condition_rows(done)), "",
          *words.losses(done), "", pairs([("written", found["files"][-1])]))
 
 

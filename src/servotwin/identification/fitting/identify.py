@@ -385,9 +385,11 @@ def _series(trace: Trace) -> SensorSeries:
 
 # --- Intervals of a fit that was stopped ------------------------------------------------------------------------------
 
-LINEARISED = "intervals (those here are of the problem made straight at the best so far, three times as wide)"
+LINEARISED_TIMES = 3.0
+"""Times as wide as where the problem is straight, assumed: among kinks those of a finished fit are up to so wide."""
+LINEARISED = ("intervals (those here are of the problem made straight at the best so far, "
+              f"{LINEARISED_TIMES:g} times as wide)")
 """What is not known, where there are such."""
-_UNKNOWN = 3.0  # times as wide, assumed: among kinks those of a finished fit are up to three times what is straight
 
 
 def hurried(task: Task, found: Outcome, level: float) -> tuple[Outcome, Doubts]:
@@ -414,7 +416,8 @@ def hurried(task: Task, found: Outcome, level: float) -> tuple[Outcome, Doubts]:
         [r.slope.T @ r.score for r in rows], axis=0)
     ahead, std = np.abs(doubt.curvature @ slope), doubt.std
     reaching = {k: Ends(-reach, reach, "linearised") for k in np.flatnonzero(~flags & ~stuck).tolist()
-                if std[k] > 0.0 and math.isfinite(reach := _UNKNOWN * (doubt.quantile(level, k) + ahead[k] / std[k]))}
+                if std[k] > 0.0 and math.isfinite(
+                    reach := LINEARISED_TIMES * (doubt.quantile(level, k) + ahead[k] / std[k]))}
     spans = _pulses(task, found)
     reaching = {k: reach for k, reach in reaching.items() if not (spans and k == _delay(task))}
     return found, replace(nothing, doubt=doubt, ends=reaching, spans=spans) if reaching else nothing

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from servotwin.identification.fitting.fit import fit_percent
+from servotwin.identification.fitting.identify import LINEARISED_TIMES
 from servotwin.identification.report import pictures as report_pictures
-from servotwin.identification.report import pictures as report_traces
 from servotwin.identification.report.pictures import (
     MODELS,
     dimension_of_free,
@@ -238,8 +238,8 @@ def errors_section(tables: Mapping[str, ErrorTable], traces: Sequence[Trace], wo
 
 def trace_list(traces: Sequence[Trace]) -> str:
     """Return measured and simulated log by log: the worst, the middle and the best open, the others folded."""
-    first = report_traces.shown_first(traces)
-    others = [trace for trace in report_traces.by_error(traces) if not any(trace is one for one in first)]
+    first = report_pictures.shown_first(traces)
+    others = [trace for trace in report_pictures.by_error(traces) if not any(trace is one for one in first)]
     mixed = len({trace.held_out for trace in traces}) > 1
     lines = (("#999", "measured"), ("#0072b2", "simulated"), ("#d55e00", "simulated − measured"))
     key = ('<p>' + "".join(f'<span class="key" style="border-color:{colour}"></span>{words}' for colour, words in lines)
@@ -265,14 +265,14 @@ def _caption(trace: Trace, *, tagged: bool) -> str:
 
 
 def _one(trace: Trace, *, tagged: bool) -> str:
-    drawn = picture(to_bytes(report_traces.beside(trace), "svg"), f"{trace.log.name}, measured and simulated")
+    drawn = picture(to_bytes(report_pictures.beside(trace), "svg"), f"{trace.log.name}, measured and simulated")
     kind = ' class="held"' if tagged else ""
     return f"<figure{kind}><figcaption>{_caption(trace, tagged=tagged)}</figcaption><div>{drawn}</div></figure>\n"
 
 
 def residuals(traces: Sequence[Trace], noise: Mapping[str, float], command: CrossCorrelation | None = None) -> str:
     """Return the picture of what is left; of logs that were fitted with what the verdict says of the command before."""
-    return figure(report_traces.residuals(traces, noise, command),
+    return figure(report_pictures.residuals(traces, noise, command),
                   "Simulated less measured, in units of each sensor's noise σ. From above: over time; their "
                   "distribution beside the normal law; how far residuals follow each other; how far they follow the "
                   "command of some time before, both filtered so that noise has no memory. Grey: where 99 of 100 lags "
@@ -511,8 +511,8 @@ def _reading(fit: Fit) -> str:
     return f"""<ul>
 <li><b>Interval.</b> If the model is right, {level} of such intervals hold the true value. “Normal law”: the cost is a
 parabola near its minimum. “Profile”: it is not, so the ends were found by fixing the number and fitting all
-others. “Linearised”: the fit was stopped; the ends are those of the problem made straight at the best so far, twice as
-far off and beyond where a whole step would lead.</li>
+others. “Linearised”: the fit was stopped; the ends are those of the problem made straight at the best so far,
+{LINEARISED_TIMES:g} times as wide, and beyond where a whole step would lead.</li>
 <li><b>Held out.</b> These logs took no part in the fit. Their error is what to expect of the next log of that kind. An
 error that is much smaller on fitted logs means that the others show what these do not, or that these are too few.</li>
 <li><b>Fit (%).</b> 100 (1 − |y − ŷ|/|y − ȳ|): 100 is all of the measured motion, 0 no more than its mean.</li>

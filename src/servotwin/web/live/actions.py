@@ -16,7 +16,6 @@ from servotwin.models.engine.live.screen import FIELDS, PERIODS
 from servotwin.signals import Signal
 from servotwin.units import is_finite
 from servotwin.web.live.rules import ACTIONS, COMMAND, CONTROL, FOR_ALL
-from servotwin.web.live.rules import checked as by_rule
 from servotwin.web.live.rules import checked as rules_checked
 
 # --- The shapes of commands that a bench can be given, each a table of plain values, as signals from a start ----------
@@ -245,7 +244,7 @@ def checked(time: float, kind: Any, value: Any, servo: Any, servos: int) -> Acti
         raise InputError("servo of an action", got=servo, allowed=f"a whole number from 0 to {servos - 1}")
     if servo is not None and kind in FOR_ALL:
         raise InputError("servo of an action", got=servo, allowed="none: all servos hear one transmitter")
-    return Action(time, kind, _LOOKS[kind](value) if kind in _LOOKS else by_rule(ACTIONS[kind], value), servo)
+    return Action(time, kind, _LOOKS[kind](value) if kind in _LOOKS else rules_checked(ACTIONS[kind], value), servo)
 
 
 _LOOKS = {"command": checked_command, "control": checked_control}  # which make something of it, too
