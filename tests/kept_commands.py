@@ -97,7 +97,7 @@ def commands() -> list[Command]:
              (_BUS, "fit bus.csv --servo feetech-sts3215-12v --free output_inertia --starts 2")]
     found += [(words, (first,), True) for first, words in after]
     found += [(words, (_STEP, _SINE), True) for words in (
-        f"{_FIT} --out fitted.toml --report fit.html", f"{_FIT} --ladder", f"{_FIT} --within 0.5s",
+        f"{_FIT} --out fitted.toml --report fit.html", f"{_FIT} --holdout sine.csv", f"{_FIT} --within 0.5s",
         f"{_FIT} --free nobody")]
     found += [(words, (_STEP, _SINE, _KEPT), True) for words in (
         "catalog check mine.toml", "catalog show mine.toml", "validate mine.toml sine.csv")]

@@ -217,7 +217,7 @@ def installation_facts() -> dict[str, Any]:
 
     Examples
     --------
-    >>> found = facts()
+    >>> found = installation_facts()
     >>> found["servotwin"], found["backend"] in ("c", "plain"), "data" in found["extras"]
     ('0.1.0', True, True)
     """

@@ -341,7 +341,7 @@ def display_of(reading: Reading) -> tuple[str, str]:
 
     Examples
     --------
-    >>> from servotwin.bench.emulator.paper_chain import display_of
+    >>> from servotwin.bench.emulator.plant import display_of
     >>> display_of(Reading(command_voltage=1.425, command_count=582, feedback_voltage=1.253, feedback_count=497,
     ...                    pulse_rate=61.035, output_angle=1.5708, pulse_width=1526e-6))
     ('1.424 582 1526us', '1.251 497 61  91')
