@@ -242,7 +242,7 @@ def _do(arm: Arm, asked: Asked) -> None:
     from servotwin.cli import robot_task_report as written
     from servotwin.cli.robot import check_drawing, check_numbers
 
-    check_numbers(output_step=asked.output_step, rate=written.MOBILE_RATE, blend=None)
+    check_numbers(output_step=asked.output_step, rate=written.TASK_RATE, blend=None)
     criterion, steering = _criterion(arm, asked.redundancy), _steering(asked.controller)
     path = path_of(arm, asked.task, asked.size, asked.speed)
     models = _models(arm, asked)
@@ -263,7 +263,7 @@ def _do(arm: Arm, asked: Asked) -> None:
         emit_json(found)
         return
     show(f"{found['robot']}: {path.name}, {path.duration:.4g} s",
-         pairs([*written.mobile_pairs(found), ("written", found["files"][-1])]),
+         pairs([*written.task_pairs(found), ("written", found["files"][-1])]),
          *(["", table(written.WAYS, written.way_rows(found))] if arm.redundant else []))
 
 
