@@ -304,7 +304,7 @@ def test_bad_input(monkeypatch, tmp_path):
         fmu(model, fmi="1.0")
     with pytest.raises(InputError, match="Motor"):
         fmu(st.DCMotor(st.load_servo("hitec-hs-755hb")))
-    monkeypatch.setattr("servotwin.export.fmu.compilers", lambda: ())
+    monkeypatch.setattr(sys.modules["servotwin.export.fmu"], "compilers", lambda: ())
     with pytest.raises(InputError, match="ziglang"):
         fmu(model)
     path = fmu(model, sources=True).write(tmp_path / "a.fmu")
