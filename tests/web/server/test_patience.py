@@ -19,8 +19,8 @@ from web_talk import Deaf, Page, running
 
 pytestmark = pytest.mark.slow
 HURRY = """
-from servotwin.web.server import aside, line, serve, stint
-aside.LONGEST, line.PATIENCE, line.MOST_CONNECTIONS, serve.PING, stint.PATIENCE = 3.0, 1.0, 60, 2.0, 0.3
+from servotwin.web.server import serve, session
+session.LONGEST_ASIDE, serve.PATIENCE, serve.MOST_CONNECTIONS, serve.PING, session.PATIENCE = 3.0, 1.0, 60, 2.0, 0.3
 """
 SERVO = 'format = 1\n{}[[servo]]\nid = "hitec-hs-755hb"\n'
 STIFF = SERVO.format("") + 'model = "PulseServoInductive"\nparameters = {"motor.rotor_inertia" = 1e-13, ' \
