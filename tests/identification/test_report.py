@@ -4,6 +4,7 @@ import base64
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,11 +14,11 @@ from cli import fit_logs
 from servotwin.errors import OutputExistsError
 from servotwin.identification import identify
 from servotwin.identification.fitting.case import SHARED
+from servotwin.identification.fitting.identify import LINEARISED, LINEARISED_TIMES
 from servotwin.identification.fitting.uncertainty import Unidentifiable
 from servotwin.identification.fitting.verdict import Cause
 from servotwin.identification.report import page as report
 from servotwin.identification.report import pictures as report_pictures
-from servotwin.identification.report import pictures as report_traces
 from servotwin.identification.report.pictures import (
     dimension_of_free,
     error_rows,
@@ -124,7 +125,7 @@ def test_the_window_with_the_largest_difference_is_enlarged(fit):
     trace = fit.traces[0]
     simulated = trace.measured.copy()
     simulated[20] += 1.0
-    low, high = report_traces.worst_window(replace(trace, simulated=simulated))
+    low, high = report_pictures.worst_window(replace(trace, simulated=simulated))
     assert low <= trace.time[20] <= high
     assert high - low < 0.6 * (trace.time[-1] - trace.time[0])
 
@@ -163,6 +164,13 @@ def test_an_interrupted_fit_says_so(fit):
     assert "<p>a &lt; b</p>" in text
     assert "none: not asked for" in text
     read(text)
+
+
+def test_how_wide_intervals_of_a_stopped_fit_are_is_said_alike(page):
+    """A page once said twice where three is meant."""
+    guide = (Path(__file__).parents[2] / "docs" / "guide" / "identify.md").read_text(encoding="utf-8")
+    for text in (page, LINEARISED, guide.replace("three times as wide", "3 times as wide")):
+        assert f"{LINEARISED_TIMES:g} times as wide" in " ".join(text.split())
 
 
 @pytest.mark.long
@@ -214,13 +222,13 @@ def test_a_gap_in_time_breaks_the_line(fit):
     keep = (trace.time < 0.2) | (trace.time > 0.4)
     cut = replace(trace, time=trace.time[keep], measured=trace.measured[keep], simulated=trace.simulated[keep])
     for one, gaps in ((trace, 0), (cut, 1)):
-        line = report_traces.beside(one).axes[0].get_lines()[0]
+        line = report_pictures.beside(one).axes[0].get_lines()[0]
         assert np.isnan(line.get_ydata()).sum() == gaps
 
 
 def test_the_autocorrelation_of_a_wave_is_a_wave():
     k = np.arange(400)
-    found = report_traces.autocorrelation([np.sin(2.0 * np.pi * k / 40.0)])
+    found = report_pictures.autocorrelation([np.sin(2.0 * np.pi * k / 40.0)])
     np.testing.assert_allclose(found[:101], (1.0 - k[:101] / 400.0) * np.cos(2.0 * np.pi * k[:101] / 40.0), atol=0.02)
 
 

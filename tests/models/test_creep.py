@@ -261,7 +261,14 @@ def test_a_shaft_that_slows_down_for_ever_takes_no_more_steps_than_frames():
         "friction.load_friction": None, "friction.load_friction_motor": 0.11, "friction.load_friction_external": 0.11,
         "friction.load_friction_motor_stribeck": 5e-4, "friction.load_friction_external_stribeck": 5e-4})
     command = st.signals.step(0.0, 40.0, at=0.1, unit="deg")
-    result = st.simulate(st.PulseServo(servo), command, duration=20.0, output_times=np.linspace(0.5, 20.0, 40))
+    looks = []
+
+    def look(done, total):  # every 4096 steps: a run that never ends is stopped
+        looks.append(done)
+        assert len(looks) < 4
+
+    result = st.simulate(st.PulseServo(servo), command, duration=20.0, output_times=np.linspace(0.5, 20.0, 40),
+                         progress=look)
     speed = np.abs(result["output_speed"])
     rates = np.diff(np.log(speed[:10])) / np.diff(result["time"][:10])
     assert result.status is st.simulation.Status.COMPLETED

@@ -17,7 +17,7 @@ from servotwin.models.state.modes import (
     limited,
     sign_of,
 )
-from servotwin.models.terms import bridge, duty, follower, source
+from servotwin.models.terms import bridge, duty, follower
 from servotwin.models.terms import source as source_term
 from servotwin.models.terms.bridge import Bridge, coasts
 from servotwin.models.terms.elastic import turning
@@ -44,21 +44,21 @@ def zone_limits(numbers: Numbers, zone: int, u: float) -> tuple[float, float]:
 
 def zone_variable(numbers: Numbers, zone: int, u: float, q: float, w: float, i: float) -> float:
     """Return what a zone lasts by: the error v_e [V]; behind a bridge what drives the current [V], or itself [A]."""
-    if source.present(numbers.source):
+    if source_term.present(numbers.source):
         return i if by_current(numbers, zone) else u - motor.back_emf(w, numbers.motor.K_b)
     return error_of(numbers.sensor, u, q)
 
 
 def zone_rate(numbers: Numbers, zone: int, du: float, w: float, dw: float, di: float) -> float:
     """Return the rate of `zone_variable`, where the motor turns with w and the output at the same speed."""
-    if source.present(numbers.source):
+    if source_term.present(numbers.source):
         return di if by_current(numbers, zone) else du - motor.back_emf(dw, numbers.motor.K_b)
     return error_rate(numbers.sensor, du, w)
 
 
 def zone_of(numbers: Numbers, u: float, du: float, q: float, w: float, i: float) -> int:
     """Return the zone of a state; on a boundary of the error, the one that it moves into."""
-    if source.present(numbers.source):
+    if source_term.present(numbers.source):
         x = u - motor.back_emf(w, numbers.motor.K_b)
         return bridge.zone_of(numbers.bridge, numbers.source, numbers.motor, u, x, i)
     return follower.zone_of(numbers.follower, error_of(numbers.sensor, u, q), error_rate(numbers.sensor, du, w))
@@ -137,7 +137,7 @@ def drive_torque(numbers: Numbers, zone: int, u: float, y: Vector) -> float:
 
 def stall_current(numbers: Numbers, V: float) -> float:
     """Return the current [A] of full drive forward at a standstill, from a source of V [V]."""
-    if source.present(numbers.source):
+    if source_term.present(numbers.source):
         i = bridge_current(V, 0.0, numbers.bridge.D_drive, numbers.bridge.R_drive)
         return min(i, numbers.source.I_max)
     return motor.steady_armature_current(numbers.follower.V_max, 0.0, numbers.motor.R, numbers.motor.K_b)

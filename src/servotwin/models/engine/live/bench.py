@@ -11,7 +11,6 @@ from servotwin.models.engine.bus.coupled_motion import at_start
 from servotwin.models.engine.lanes import Lanes, Tables, inputs_at
 from servotwin.models.engine.lanes import Told as ToldAll
 from servotwin.models.engine.live import posts as those
-from servotwin.models.engine.live import posts as transmitter
 from servotwin.models.engine.live import stretch, together
 from servotwin.models.engine.live.posts import Told
 from servotwin.models.engine.live.screen import NEXT, NO_LOW, USED, Looks, Screen, first_look
@@ -82,17 +81,17 @@ def look(posts: Any, k: int, told: Told, programs: Any, memories: Memories, rows
 
 def tune(sender: Any, rate: float) -> None:
     """Take another rate of frames [Hz] from the next edge on."""
-    transmitter.tune(sender[0], rate)
+    those.tune(sender[0], rate)
 
 
 def snapped(sender: Any, time: float) -> float:
     """Return a time, or that of the edge right next to it [s]."""
-    return transmitter.snapped(sender[0], time)
+    return those.snapped(sender[0], time)
 
 
 def next_edge(sender: Any) -> float:
     """Return when the next frame begins [s]."""
-    return transmitter.next_edge(sender[0])
+    return those.next_edge(sender[0])
 
 
 def advance(posts: Any, told: Told, programs: Any, memories: Memories, sender: Any, log: Log, until: float, rate: float,
@@ -105,12 +104,12 @@ def advance(posts: Any, told: Told, programs: Any, memories: Memories, sender: A
     """
     now, status = sender[0], COMPLETED
     _begin_looks(posts, first_look(now.time, rate), used)
-    while status == COMPLETED and transmitter.snapped(now, until) > now.time:
+    while status == COMPLETED and those.snapped(now, until) > now.time:
         if _is_full(rows, events, pulses, used):
             return PAUSED
         end = _end_of_part(now, until, rate, len(rows[0]))
         those.hear(now, posts, told, pulses, used, end)
-        last = 1 if end == transmitter.snapped(now, until) else 0
+        last = 1 if end == those.snapped(now, until) else 0
         for n in range(len(posts)):
             looks = Looks(used[USED * n + NEXT], rate, end, last, switches)
             how = _advance_one(posts[n], n, len(posts), told, programs, memories, looks, log,
@@ -130,12 +129,12 @@ def advance_together(posts: Any, told: Told, programs: Any, memories: Memories, 
     """
     now, status = sender[0], COMPLETED
     _begin_looks(posts, first_look(now.time, rate), used)
-    while status == COMPLETED and transmitter.snapped(now, until) > now.time:
+    while status == COMPLETED and those.snapped(now, until) > now.time:
         if _is_full(rows, events, pulses, used):
             return PAUSED
         end = _end_of_part(now, until, rate, len(rows[0]))
         those.hear(now, posts, told, pulses, used, end)
-        looks = Looks(used[NEXT], rate, end, 1 if end == transmitter.snapped(now, until) else 0, switches)
+        looks = Looks(used[NEXT], rate, end, 1 if end == those.snapped(now, until) else 0, switches)
         _take_seats(posts, told, memories, lanes, ToldAll(lanes, tables), shared[0], seats)
         status = together.go_on(ToldAll(lanes, tables), posts, memories.firms, shared[0], seats, mates, looks,
                                 tape, rows, events, used)
@@ -166,7 +165,7 @@ def _is_full(rows: Any, events: Any, pulses: Any, used: Any) -> bool:
 
 def _end_of_part(now: Any, until: float, rate: float, room: int) -> float:
     """Return how far to go at once: so that pulses and looks have room [s]."""
-    whole = transmitter.snapped(now, until)
+    whole = those.snapped(now, until)
     end = min(whole, now.base + (now.passed + _FRAMES) / now.rate, now.time + _LONGEST, now.time + room / (4.0 * rate))
     return whole if until - end <= _REST else end
 
