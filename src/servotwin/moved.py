@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from types import ModuleType
 
-MOVED = {  # to be removed in 0.3
+MOVED = {  # to be removed in 0.2
     "servotwin.bench.emulator.paper_chain": "servotwin.bench.emulator.plant",
     "servotwin.robots.comparison": "servotwin.robots.task_run",
     "servotwin.robots.controlled": "servotwin.robots.controllers",
@@ -39,7 +39,7 @@ class Forwarding:
         from importlib import import_module
 
         new = import_module(MOVED[module.__name__])
-        warnings.warn(f"{module.__name__} has moved to {new.__name__}; the old name goes in 0.3", DeprecationWarning,
+        warnings.warn(f"{module.__name__} has moved to {new.__name__}; the old name goes in 0.2", DeprecationWarning,
                       stacklevel=2)
         module.__dict__.update({name: value for name, value in vars(new).items() if not name.startswith("__")})
 

@@ -191,7 +191,7 @@ def heading(servo: Servo) -> list[RenderableType]:
 
 
 def servo_rows(facts: dict[str, Any]) -> list[RenderableType]:
-    """Return the stall torque of the sheet and that of the twin, as `servo_facts.headline` tells them."""
+    """Return the stall torque of the sheet and that of the twin, as `headline` tells them."""
     said = [f"{facts[key]:.3g} N m {words}" for key, words in (
         ("stall_torque", "by the sheet"), ("twin_stall_torque", "by these parameters")) if facts[key] is not None]
     at = f" at {facts['supply_voltage']:.3g} V" if facts["supply_voltage"] is not None else ""
@@ -199,7 +199,7 @@ def servo_rows(facts: dict[str, Any]) -> list[RenderableType]:
 
 
 def parameter_table(rows: list[dict[str, Any]]) -> list[RenderableType]:
-    """Return parameters and sources of a servo, as `servo_facts.parameters` tells them."""
+    """Return parameters and sources of a servo, as `parameters` tells them."""
     sources = list(dict.fromkeys(row["source"] for row in rows if row["source"]))
     lines: list[tuple[str, ...]] = []
     group = ""
