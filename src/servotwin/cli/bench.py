@@ -9,12 +9,14 @@ import statistics
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from servotwin.cli import shared_options as shared
+from servotwin.cli.records import LEFT_OUT, with_records
 from servotwin.cli.terminal import emit, emit_help, emit_json, json_text, pairs, patience, show, table, typed
 
 if TYPE_CHECKING:
@@ -41,43 +43,88 @@ PortOption = Annotated[str | None, typer.Option(
 WiringOption = Annotated[Path | None, typer.Option(
     metavar="FILE.toml", help="Wires of the bench, as servotwin bench calibrate writes them; those of the guide unless "
     "given.", rich_help_panel=BENCH)]
-ExperimentOption = Annotated[str, typer.Option(
-    "--experiment", "-e", metavar="NAMES", help="steps, staircase, ramp, chirp, prbs, frame_rates, missing, "
-    "torque_off, hold, several with commas; all; or advise: the one that would tell most of this servo.",
-    rich_help_panel=RUN)]
-RangeOption = Annotated[str | None, typer.Option(
-    "--range", metavar="LOW:HIGH", help="Commands that are allowed, such as 1000us:2000us, or -60deg:60deg on a bus.",
-    rich_help_panel=RUN)]
-VoltageOption = Annotated[str | None, typer.Option(
-    metavar="VOLTS", help="Supply of the servo as it is set, such as 6V.", rich_help_panel=RUN)]
-CurrentOption = Annotated[str | None, typer.Option(
-    "--current-limit", metavar="AMPERES", help="Mean supply current over 0.25 s that ends the run, such as 0.8A.",
-    rich_help_panel=RUN)]
-DurationOption = Annotated[float, typer.Option(
-    metavar="SECONDS", help="Of each experiment, about.", rich_help_panel=RUN)]
-FramePeriodOption = Annotated[str, typer.Option(
-    metavar="TIME", help="From pulse to pulse, 3.003ms to 25ms; on a bus from goal to goal.", rich_help_panel=RUN)]
-RateOption = Annotated[str, typer.Option(
-    metavar="HOW", help="When the board reads: fast (1 kHz) or frame (once, at each rising edge).",
-    rich_help_panel=RUN)]
-SeedOption = Annotated[int, typer.Option(help="Of what is random in an experiment.", rich_help_panel=RUN)]
-LicenceOption = Annotated[str, typer.Option(
-    metavar="TEXT", help="Under which the logs may be used, such as CC-BY-4.0.", rich_help_panel=SAID)]
-AuthorOption = Annotated[str, typer.Option(metavar="TEXT", help="Who recorded them.", rich_help_panel=SAID)]
-NoteOption = Annotated[str, typer.Option(metavar="TEXT", help="Anything else.", rich_help_panel=SAID)]
-LoadOption = Annotated[list[str] | None, typer.Option(
-    metavar="PART=VALUE", help="What hangs on the shaft, as for simulate: inertia=1e-3, arm=0.2kg:10cm.",
-    rich_help_panel=SAID)]
 OutOption = Annotated[Path, typer.Option(
     metavar="FOLDER", help="Folder for the logs, made if it is not there.", rich_help_panel=shared.OUTPUT)]
-ForceOption = Annotated[bool, typer.Option(
-    "--force", help="Replace logs of the same name.", rich_help_panel=shared.OUTPUT)]
+Ending = Annotated[shared.Ending, {"force": "Replace logs of the same name."}]
 
 _ASKED = {"range": ("--range", "Commands that are allowed (low:high, such as {example})"),
           "voltage": ("--voltage", "Voltage of the supply (such as 6V)"),
           "current": ("--current-limit", "Mean current that ends the run (such as 0.8A)")}
 _ABOUT_EXAMPLE = {"pulse_width": "1000us:2000us", "angle": "-60deg:60deg"}
 _DIMENSION = {"pulse_width": "time", "angle": "angle"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Allowed:
+    """The limits of a run, as they were typed; what was not is asked for on a terminal."""
+
+    span: Annotated[str | None, typer.Option(
+        "--range", metavar="LOW:HIGH", help="Commands that are allowed, such as 1000us:2000us, or -60deg:60deg on a "
+        "bus.", rich_help_panel=RUN)] = None
+    voltage: Annotated[str | None, typer.Option(
+        metavar="VOLTS", help="Supply of the servo as it is set, such as 6V.", rich_help_panel=RUN)] = None
+    current_limit: Annotated[str | None, typer.Option(
+        "--current-limit", metavar="AMPERES", help="Mean supply current over 0.25 s that ends the run, such as 0.8A.",
+        rich_help_panel=RUN)] = None
+
+    def limits(self, kind: str) -> Limits:
+        """Return the limits of commands of a kind (see `limits_from`)."""
+        return limits_from(kind, self.span, self.voltage, self.current_limit)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Course:
+    """The experiments of a run, as they were typed."""
+
+    experiment: Annotated[str, typer.Option(
+        "--experiment", "-e", metavar="NAMES", help="steps, staircase, ramp, chirp, prbs, frame_rates, missing, "
+        "torque_off, hold, several with commas; all; or advise: the one that would tell most of this servo.",
+        rich_help_panel=RUN)] = "steps"
+    duration: Annotated[float, typer.Option(
+        metavar="SECONDS", help="Of each experiment, about.", rich_help_panel=RUN)] = 10.0
+    frame_period: Annotated[str, typer.Option(
+        metavar="TIME", help="From pulse to pulse, 3.003ms to 25ms; on a bus from goal to goal.", rich_help_panel=RUN)
+        ] = "20ms"
+    rate: Annotated[str, typer.Option(
+        metavar="HOW", help="When the board reads: fast (1 kHz) or frame (once, at each rising edge).",
+        rich_help_panel=RUN)] = "fast"
+    seed: Annotated[int, typer.Option(help="Of what is random in an experiment.", rich_help_panel=RUN)] = 0
+
+    @property
+    def period(self) -> float:
+        """From command to command [s]."""
+        return seconds("--frame-period", self.frame_period)
+
+    def experiments(self, limits: Limits, servo: str) -> list[Experiment]:
+        """Return the experiments within limits."""
+        from servotwin.bench.recording import experiments
+
+        if self.experiment != "advise":
+            return experiments(self.experiment, limits, duration=self.duration, frame_period=self.period,
+                               seed=self.seed)
+        return [_advised(limits, servo, self.period)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _About:
+    """What the logs say of themselves, as it was typed."""
+
+    load: Annotated[Sequence[str], typer.Option(
+        metavar="PART=VALUE", help="What hangs on the shaft, as for simulate: inertia=1e-3, arm=0.2kg:10cm.",
+        rich_help_panel=SAID)] = ()
+    licence: Annotated[str, typer.Option(
+        metavar="TEXT", help="Under which the logs may be used, such as CC-BY-4.0.", rich_help_panel=SAID)] = "not said"
+    author: Annotated[str, typer.Option(metavar="TEXT", help="Who recorded them.", rich_help_panel=SAID)] = ""
+    note: Annotated[str, typer.Option(metavar="TEXT", help="Anything else.", rich_help_panel=SAID)] = ""
+
+    def of(self, servo: str) -> About:
+        """Return what the logs of a servo say."""
+        from servotwin.bench.recording import About
+        from servotwin.cli.option_values import load_from
+        from servotwin.logs.sidecar import words_of_load
+
+        return About(servo=servo, licence=self.licence, author=self.author, note=self.note,
+                     load=words_of_load(load_from(self.load)))
 
 
 def limits_from(kind: str, span: str | None, voltage: str | None, current: str | None) -> Limits:
@@ -120,15 +167,6 @@ def wiring_from(path: Path | None) -> Wiring:
     return Wiring() if path is None else load_wiring(path)
 
 
-def about_from(servo: str, licence: str, author: str, note: str, load: list[str] | None) -> About:
-    """Return what the logs say of themselves."""
-    from servotwin.bench.recording import About
-    from servotwin.cli.option_values import load_from
-    from servotwin.logs.sidecar import words_of_load
-
-    return About(servo=servo, licence=licence, author=author, note=note, load=words_of_load(load_from(load or [])))
-
-
 def port_from(port: str | None) -> str:
     """Return the port that was given, or the only one that has a USB plug.
 
@@ -167,7 +205,9 @@ _SET = {"reference": "Put a voltage at A3, below the reference; what does the me
 _EXAMPLE = {"reference": "1.213V", "supply": "6.02V", "shunt": "0.35A"}
 
 
+@with_records
 def calibrate(
+    *,
     what: Annotated[str, typer.Argument(
         help="reference (of the converter), supply (its divider), shunt, or angle (of the servo, by a dial).")],
     port: PortOption = None,
@@ -177,17 +217,13 @@ def calibrate(
     meter: Annotated[str | None, typer.Option(
         metavar="VALUES", help="What the meter or the dial says at each point, with commas, instead of a question; "
         "the points are taken one after the other.", rich_help_panel=BENCH)] = None,
-    span: RangeOption = None,
-    voltage: VoltageOption = None,
-    current_limit: CurrentOption = None,
+    allowed: _Allowed,
     servo: Annotated[str | None, typer.Option(
         metavar="ID", help="Servo that takes what the angles say.", rich_help_panel=SAID)] = None,
     out: Annotated[Path | None, typer.Option(
         metavar="FILE", help="Of angle: the servo (.toml) or the table of readings (.csv).",
         rich_help_panel=shared.OUTPUT)] = None,
-    force: Annotated[bool, typer.Option(
-        "--force", help="Replace existing files.", rich_help_panel=shared.OUTPUT)] = False,
-    as_json: shared.JsonOption = False,
+    ending: shared.Ending,
 ) -> None:
     """Calibrate one thing of the bench."""
     from servotwin.bench.backends import SerialBackend
@@ -196,7 +232,7 @@ def calibrate(
 
     if what not in _WHAT:
         raise UnknownNameError("calibration", what, _WHAT)
-    for given, option in ((out, "--out"), (span, "--range"), (servo, "--servo")):
+    for given, option in ((out, "--out"), (allowed.span, "--range"), (servo, "--servo")):
         if given is not None and what != "angle":
             raise InputError(option, got=f"calibrate {what}", allowed="calibrate angle alone")
     if what != "angle" and wiring is None:
@@ -205,14 +241,14 @@ def calibrate(
         raise InputError("--meter", got="none", allowed="its values, where nobody can be asked")
     base = wiring_from(wiring if wiring is not None and wiring.exists() else None)
     if what == "angle":
-        _angle(AnalogRig(SerialBackend(port_from(port)), base), meter, (span, voltage, current_limit), servo,
-               out, force=force, as_json=as_json)
+        _angle(AnalogRig(SerialBackend(port_from(port)), base), meter, allowed, servo, out, force=ending.force,
+               as_json=ending.as_json)
         return
     rig = AnalogRig(SerialBackend(port_from(port)), _with_channel(base, what))
     found = _wires(rig, what, meter)
     place = Path(wiring or "")
     found.wiring.replace(channels=base.channels).save(place, overwrite=True)
-    _show_wiring(found, place, as_json=as_json)
+    _show_wiring(found, place, as_json=ending.as_json)
 
 
 def _with_channel(base: Wiring, what: str) -> Wiring:
@@ -256,8 +292,8 @@ def _show_wiring(found: Calibration, place: Path, *, as_json: bool) -> None:
     show(pairs([*rows, ("written", str(place))]), *(f"- {text}" for text in found.remarks))
 
 
-def _angle(rig: AnalogRig, meter: str | None, said: tuple[str | None, str | None, str | None], servo: str | None,
-           out: Path | None, *, force: bool, as_json: bool) -> None:
+def _angle(rig: AnalogRig, meter: str | None, allowed: _Allowed, servo: str | None, out: Path | None, *, force: bool,
+           as_json: bool) -> None:
     """Move the servo from place to place, read the tap, and take the angle of a dial."""
     from servotwin.bench import calibrate_table
     from servotwin.cli.fit_report import calibration_facts, show_table_calibration
@@ -265,7 +301,7 @@ def _angle(rig: AnalogRig, meter: str | None, said: tuple[str | None, str | None
     from servotwin.parameters import load_servo, write_file
     from servotwin.tables import csv_text
 
-    limits = limits_from("pulse_width", *said)
+    limits = allowed.limits("pulse_width")
     if out is not None:
         check_targets([Target(option="--out", path=out, endings=(".toml", ".csv"))], force=force)
     loaded = None if servo is None else load_servo(servo)
@@ -427,7 +463,9 @@ def marker(
          "  Print it at 100 % on plain paper and measure the bar: it is 50 mm long.")
 
 
+@with_records
 def video(
+    *,
     clip: Annotated[Path, typer.Argument(metavar="CLIP", help="The clip, such as .mp4 or .mov.")],
     out: Annotated[Path, typer.Option(metavar="FILE.csv", help="Where to write the log; its sidecar is put beside it.",
                                       rich_help_panel=shared.OUTPUT)],
@@ -451,9 +489,7 @@ def video(
         "picture's horizontal)."), rich_help_panel=_ZERO)] = None,
     flip: Annotated[bool, typer.Option("--flip", help="Count clockwise, as the camera sees it, as positive.",
                                        rich_help_panel=_ZERO)] = False,
-    force: Annotated[bool, typer.Option("--force", help="Replace existing files.",
-                                        rich_help_panel=shared.OUTPUT)] = False,
-    as_json: shared.JsonOption = False,
+    ending: shared.Ending,
 ) -> None:
     """Write the angle of a marked horn as a log."""
     from servotwin.bench.video import read_clip
@@ -463,17 +499,17 @@ def video(
     from servotwin.units.quantities import quantity
 
     targets = _targets(out)
-    check_targets(targets, force=force, inputs=[clip] if log is None else [clip, log])
+    check_targets(targets, force=ending.force, inputs=[clip] if log is None else [clip, log])
     options: dict[str, Any] = {
         "mark": mark, "flip": flip, "slow": slow, "instant": _instant(instant, led), "led": _region(led),
         "zero": None if zero is None else quantity("--zero", zero, "angle")}
     with patience(f"looking at {clip}"):
         filmed = read_clip(clip, **options)
     made = film_log(filmed, log, mend=reading_mends(mend))
-    _write(targets, made.text, json_text(made.sidecar) + "\n", force=force)
+    _write(targets, made.text, json_text(made.sidecar) + "\n", force=ending.force)
     remarks = [*filmed.remarks, *made.remarks]
     files = [str(target.path) for target in targets]
-    if as_json:
+    if ending.as_json:
         emit_json({"video": dict(made.sidecar["recorded"]["video"]), "remarks": remarks, "files": files})
         return
     _show(filmed, remarks, files, commanded=log is not None)
@@ -545,7 +581,9 @@ _FIDELITIES = ("pulse", "pulse-inductive", "digital")
 _SLICE = 0.1  # s
 
 
+@with_records
 def record(
+    *,
     servo: Annotated[str, typer.Argument(
         help="What is on the bench: catalog id or servo file (.toml), or any words where the logs are for others.")],
     out: OutOption,
@@ -559,20 +597,10 @@ def record(
     baud: Annotated[int | None, typer.Option(
         metavar="BIT/S", help="Of the bus; found unless given.", rich_help_panel=BENCH)] = None,
     wiring: WiringOption = None,
-    experiment: ExperimentOption = "steps",
-    span: RangeOption = None,
-    voltage: VoltageOption = None,
-    current_limit: CurrentOption = None,
-    duration: DurationOption = 10.0,
-    frame_period: FramePeriodOption = "20ms",
-    rate: RateOption = "fast",
-    seed: SeedOption = 0,
-    load: LoadOption = None,
-    licence: LicenceOption = "not said",
-    author: AuthorOption = "",
-    note: NoteOption = "",
-    force: ForceOption = False,
-    as_json: shared.JsonOption = False,
+    course: _Course,
+    allowed: _Allowed,
+    about: _About,
+    ending: Ending,
 ) -> None:
     """Record experiments."""
     from servotwin.cli.bench_jobs import Files, OneServo, SeveralServos, bus_of, recorded
@@ -582,26 +610,27 @@ def record(
     if bus is None and (identity or baud is not None):
         raise InputError("--id" if identity else "--baud", got="no --bus",
                          allowed="with --bus feetech or dynamixel")
-    limits = limits_from(kind, span, voltage, current_limit)
-    about = about_from(servo, licence, author, note, load)
-    period = seconds("--frame-period", frame_period)
-    made = _experiments(experiment, limits, servo, load, duration, period, seed)
-    files = Files(out, limits, about, force)
+    limits = allowed.limits(kind)
+    said, period = about.of(servo), course.period
+    made = course.experiments(limits, servo)
+    files = Files(out, limits, said, ending.force)
     files.check(made, identity or [])
     job: Job
     if bus is None:
         from servotwin.bench.backends import SerialBackend
         from servotwin.bench.recording import AnalogRig
 
-        job = OneServo(AnalogRig(SerialBackend(port_from(port)), wiring_from(wiring), rate=rate), files)
+        job = OneServo(AnalogRig(SerialBackend(port_from(port)), wiring_from(wiring), rate=course.rate), files)
     else:
         job = SeveralServos(bus_of(bus, port_from(port), identity or [], baud, period), files)
     with files.made():
         done = recorded(job, made)
-    _report(done, out, servo, job, as_json=as_json)
+    _report(done, out, servo, job, as_json=ending.as_json)
 
 
+@with_records
 def rehearse(
+    *,
     servo: shared.ServoArgument,
     out: Annotated[Path | None, typer.Option(
         metavar="FOLDER", help="Folder for the logs, made if it is not there.", rich_help_panel=shared.OUTPUT)] = None,
@@ -621,17 +650,10 @@ def rehearse(
         "--mock", help="A board in Python instead of the firmware itself under simavr.",
         rich_help_panel=BENCH)] = False,
     wiring: WiringOption = None,
-    experiment: ExperimentOption = "steps",
-    span: RangeOption = None,
-    voltage: VoltageOption = None,
-    current_limit: CurrentOption = None,
-    duration: DurationOption = 10.0,
-    frame_period: FramePeriodOption = "20ms",
-    rate: RateOption = "fast",
-    seed: SeedOption = 0,
-    load: LoadOption = None,
-    force: ForceOption = False,
-    as_json: shared.JsonOption = False,
+    course: _Course,
+    allowed: _Allowed,
+    about: Annotated[_About, {"licence": LEFT_OUT, "author": LEFT_OUT, "note": LEFT_OUT}],
+    ending: Ending,
 ) -> None:
     """Record experiments from an emulated bench."""
     from servotwin.bench.rehearsal import rehearsal_rig
@@ -647,24 +669,24 @@ def rehearse(
                          allowed="--out FOLDER for logs, or --pty alone for a port")
     if out is None:
         board = model_of(servo, model, change or [], _FIDELITIES)
-        _offered(board, load_from(load or [], board), wiring_from(wiring),
-                 noise=quantity("--noise", noise, "voltage"), seed=seed)
+        _offered(board, load_from(about.load, board), wiring_from(wiring),
+                 noise=quantity("--noise", noise, "voltage"), seed=course.seed)
         return
-    limits = limits_from("pulse_width", span, voltage, current_limit)
+    limits = allowed.limits("pulse_width")
     whole = model_of(servo, model, [*(change or []), f"supply.open_circuit_voltage={limits.voltage}V"], _FIDELITIES)
-    about = about_from(f"{servo} (emulated)", "CC0-1.0", "", "no real servo: the firmware of the bench under "
-                             "simavr, beside a simulated servo", load)
-    made = _experiments(experiment, limits, servo, load, duration, seconds("--frame-period", frame_period), seed)
-    files = Files(out, limits, about, force)
+    said = replace(about, licence="CC0-1.0", note="no real servo: the firmware of the bench under simavr, beside a "
+                   "simulated servo").of(f"{servo} (emulated)")
+    made = course.experiments(limits, servo)
+    files = Files(out, limits, said, ending.force)
     files.check(made, [])
-    rig, remark = rehearsal_rig(whole, load_from(load or [], whole), wiring_from(wiring), rate=rate, mock=mock,
-                                noise=quantity("--noise", noise, "voltage"), seed=seed)
+    rig, remark = rehearsal_rig(whole, load_from(about.load, whole), wiring_from(wiring), rate=course.rate, mock=mock,
+                                noise=quantity("--noise", noise, "voltage"), seed=course.seed)
     if remark:
         warnings.warn(remark, stacklevel=2)
     job = OneServo(rig, files)
     with files.made():
         done = recorded(job, made)
-    _report(done, out, servo, job, as_json=as_json)
+    _report(done, out, servo, job, as_json=ending.as_json)
 
 
 def _offered(model: Model, load: Load, wiring: Wiring, *, noise: float, seed: int) -> None:
@@ -678,15 +700,6 @@ def _offered(model: Model, load: Load, wiring: Wiring, *, noise: float, seed: in
              + typed("servotwin", "bench", "check", "--port", terminal.port))
         while True:
             terminal.serve(_SLICE)
-
-
-def _experiments(names: str, limits: Limits, servo: str, load: list[str] | None, duration: float,
-                 frame_period: float, seed: int) -> list[Experiment]:
-    from servotwin.bench.recording import experiments
-
-    if names != "advise":
-        return experiments(names, limits, duration=duration, frame_period=frame_period, seed=seed)
-    return [_advised(limits, servo, frame_period)]
 
 
 def _advised(limits: Limits, servo: str, frame_period: float) -> Experiment:

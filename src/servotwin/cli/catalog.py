@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 import warnings
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from servotwin.cli import shared_options as shared
+from servotwin.cli.records import with_records
 from servotwin.cli.robot_options import ContactOption, PackageOption
 from servotwin.cli.terminal import emit_help, emit_json, pairs, patience, show, table, with_span
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from rich.console import RenderableType
 
     from servotwin.cli.which_words import Judged, Prices
@@ -119,39 +119,55 @@ class _Asked:
         return "".join(parts)
 
 
-def which(
+@dataclass(frozen=True, kw_only=True)
+class _Task:
+    """The options that say what is to be done, as they were typed."""
+
     lift: Annotated[str | None, typer.Option(
         metavar="MASS", help="Mass to lift, such as 0.5kg, 120g, 4oz or 1lb; with --arm.",
-        rich_help_panel=_TASK)] = None,
+        rich_help_panel=_TASK)] = None
     arm: Annotated[str | None, typer.Option(
-        metavar="LENGTH", help="Length of the arm, such as 10cm, 80mm or 4in.", rich_help_panel=_TASK)] = None,
+        metavar="LENGTH", help="Length of the arm, such as 10cm, 80mm or 4in.", rich_help_panel=_TASK)] = None
     motion: Annotated[Path | None, typer.Option(
         metavar="FILE", help="Motion to follow, a table with time_s and a column such as arm_deg: of the arm of "
-        "--lift, horizontal at 0, or of the joints of --robot.", rich_help_panel=_TASK)] = None,
+        "--lift, horizontal at 0, or of the joints of --robot.", rich_help_panel=_TASK)] = None
     robot: Annotated[str | None, typer.Option(
         metavar="MODEL.xml", help="Robot whose joints follow --motion: MJCF or URDF file, or so101. Each candidate is "
-        "put at all of its hinges.", rich_help_panel=_TASK)] = None,
-    contact: ContactOption = None, package: PackageOption = None,
-    joint: Annotated[list[str] | None, typer.Option(
-        metavar="NAME", help="Joint of the motion that counts, repeatable (default: all).", rich_help_panel=_TASK)]
-    = None,
+        "put at all of its hinges.", rich_help_panel=_TASK)] = None
+    contact: ContactOption = None
+    package: PackageOption = ()
+    joint: Annotated[Sequence[str], typer.Option(
+        metavar="NAME", help="Joint of the motion that counts, repeatable (default: all).", rich_help_panel=_TASK)] = ()
     voltage: Annotated[str | None, typer.Option(
-        metavar="VOLTS", help=f"Supply voltage (default: {_USUAL}).", rich_help_panel=_TASK)] = None,
-    supply: shared.SupplyOption = None,
-    among: Annotated[list[str] | None, typer.Option(
+        metavar="VOLTS", help=f"Supply voltage (default: {_USUAL}).", rich_help_panel=_TASK)] = None
+    supply: shared.SupplyOption = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Bounds:
+    """The options that say which servos are candidates, and what they may cost, as they were typed."""
+
+    among: Annotated[Sequence[str], typer.Option(
         metavar="ID", help="Candidates, with commas or repeatable: catalog ids, or paths of servo files (default: the "
-        "catalog, or the servos of --prices).", rich_help_panel=_LIMITS)] = None,
-    limit: Annotated[list[str] | None, typer.Option(
+        "catalog, or the servos of --prices).", rich_help_panel=_LIMITS)] = ()
+    limit: Annotated[Sequence[str], typer.Option(
         metavar="NAME=VALUE", help="Limit, repeatable or with commas: current=1A, mass=60g, time=0.2s, price=20 at "
         "most; travel=180deg at least; voltage=7.4V, which the sheet has to reach; kind=analog, digital or bus.",
-        rich_help_panel=_LIMITS)] = None,
+        rich_help_panel=_LIMITS)] = ()
     prices: Annotated[Path | None, typer.Option(
         metavar="FILE.csv", help="Prices: columns servo and price, or such as price_EUR.",
-        rich_help_panel=_LIMITS)] = None,
+        rich_help_panel=_LIMITS)] = None
     time: Annotated[str | None, typer.Option(
         metavar="SECONDS", help="Longest time allowed for 60 degrees, as --limit time=: with --lift from 30 below the "
-        "horizontal to 30 above, else without load.", rich_help_panel=_LIMITS)] = None,
-    register: shared.RegisterOption = None,
+        "horizontal to 30 above, else without load.", rich_help_panel=_LIMITS)] = None
+    register: shared.RegisterOption = ()
+
+
+@with_records
+def which(
+    *,
+    task: _Task,
+    bounds: _Bounds,
     why: Annotated[bool, typer.Option(
         "--why", help="Also list the servos that cannot, and why.", rich_help_panel=shared.OUTPUT)] = False,
     as_json: shared.JsonOption = False,
@@ -161,17 +177,17 @@ def which(
     from servotwin.cli.robot_options import overlap_of
     from servotwin.cli.which_words import limits_of, prices_of
 
-    bounds, shop = limits_of(limit or [], time), None if prices is None else prices_of(prices)
-    named = [name.strip() for word in among or [] for name in word.split(",") if name.strip()]
-    at, bus = _supply(voltage, supply)
-    weight = asked_lift(lift, arm)
-    if not (weight or motion or robot or joint or limit or time or among or prices):
+    limits, prices = limits_of(bounds.limit, bounds.time), bounds.prices
+    shop = None if prices is None else prices_of(prices)
+    named = [name.strip() for word in bounds.among for name in word.split(",") if name.strip()]
+    at, bus = _supply(task.voltage, task.supply)
+    weight = asked_lift(task.lift, task.arm)
+    if not (weight or task.motion or task.robot or task.joint or bounds.limit or bounds.time or bounds.among or prices):
         raise _nothing()
-    plant, followed = _motion(motion, robot, joint or [], weight, package or [])
-    asked = _Asked(lift=weight, motion=followed, plant=plant, robot=robot, joints=tuple(joint or ()), at=at, bus=bus,
-                   limits=bounds, named=bool(named), overlap=overlap_of(contact))
-    servos = _servos(named, shop, prices, bounds, register or [])
-    found = _judged(servos, asked, shop)
+    plant, followed = _motion(task.motion, task.robot, task.joint, weight, task.package)
+    asked = _Asked(lift=weight, motion=followed, plant=plant, robot=task.robot, joints=tuple(task.joint), at=at,
+                   bus=bus, limits=limits, named=bool(named), overlap=overlap_of(task.contact))
+    found = _judged(_servos(named, shop, prices, limits, bounds.register), asked, shop)
     if as_json:
         emit_json(_facts(asked, found))
         return
@@ -198,8 +214,8 @@ def _supply(voltage: str | None, supply: str | None) -> tuple[Supply | float, Su
     return found, found
 
 
-def _motion(path: Path | None, robot: str | None, joints: list[str], lift: tuple[float, float] | None,
-            packages: list[str]) -> tuple[Plant | None, Motion | None]:
+def _motion(path: Path | None, robot: str | None, joints: Sequence[str], lift: tuple[float, float] | None,
+            packages: Sequence[str]) -> tuple[Plant | None, Motion | None]:
     """Return robot and motion; without a robot that of an arm, whose joint is the column of the table."""
     from servotwin.errors import InputError
 
@@ -221,7 +237,7 @@ def _motion(path: Path | None, robot: str | None, joints: list[str], lift: tuple
     return plant, found
 
 
-def _column(path: Path, joints: list[str]) -> str:
+def _column(path: Path, joints: Sequence[str]) -> str:
     """Return the joint of a table of one joint: its column without the unit."""
     from servotwin.errors import InputError
     from servotwin.tables import read_table
@@ -239,7 +255,7 @@ def _column(path: Path, joints: list[str]) -> str:
     return names[0]
 
 
-def _servos(named: list[str], shop: Prices | None, file: Path | None, limits: Limits, register: list[str]
+def _servos(named: list[str], shop: Prices | None, file: Path | None, limits: Limits, register: Sequence[str]
             ) -> list[tuple[Servo, float]]:
     """Return the candidates with their prices."""
     from servotwin.cli.shared_options import with_registers
@@ -371,7 +387,7 @@ def _facts(asked: _Asked, found: list[Judged]) -> dict[str, Any]:
 
 _POINT, _WHOLE, _MANY, _OUTPUT = ("At a supply voltage (repeatable)", "Whole servo", "Other ways to give a sheet",
                                   "Result")
-_Figures = list[str] | None
+_Figures = Sequence[str]
 
 
 def _at(metavar: str, text: str) -> Any:
@@ -382,36 +398,52 @@ def _of(metavar: str, text: str) -> Any:
     return typer.Option(metavar=metavar, help=text, rich_help_panel=_WHOLE)
 
 
-def from_sheet(
-    again: Annotated[str | None, typer.Argument(
-        metavar="SERVO", help="A servo whose own \\[sheet] to use: catalog id, or path.")] = None,
-    torque: Annotated[_Figures, _at('"1.29 N m @6.0"', "Stall torque: N m, N cm, kgf.cm, oz.in.")] = None,
-    speed: Annotated[_Figures, _at('"0.23 s/60deg @6.0"', "No-load speed: s/60deg, deg/s, rad/s, rpm.")] = None,
-    running_current: Annotated[_Figures, _at('"285 mA @6.0"', "Current when running without load: A, mA.")] = None,
-    stall_current: Annotated[_Figures, _at('"1.8 A @6.0"', "Current with the shaft held still: A, mA.")] = None,
-    idle_current: Annotated[_Figures, _at('"9 mA @6.0"', "Current at rest: A, mA.")] = None,
+@dataclass(frozen=True, kw_only=True)
+class _Points:
+    """The figures of a sheet at supply voltages, as they were typed."""
+
+    torque: Annotated[_Figures, _at('"1.29 N m @6.0"', "Stall torque: N m, N cm, kgf.cm, oz.in.")] = ()
+    speed: Annotated[_Figures, _at('"0.23 s/60deg @6.0"', "No-load speed: s/60deg, deg/s, rad/s, rpm.")] = ()
+    running_current: Annotated[_Figures, _at('"285 mA @6.0"', "Current when running without load: A, mA.")] = ()
+    stall_current: Annotated[_Figures, _at('"1.8 A @6.0"', "Current with the shaft held still: A, mA.")] = ()
+    idle_current: Annotated[_Figures, _at('"9 mA @6.0"', "Current at rest: A, mA.")] = ()
     at: Annotated[str | None, typer.Option(
-        metavar="VOLTAGE", help="Supply voltage for figures that do not name one.", rich_help_panel=_POINT)] = None,
-    name: Annotated[str | None, _of("ID", "Short id, such as my-servo.")] = None,
-    title: Annotated[str | None, _of("TEXT", "Name for human readers.")] = None,
-    voltage_range: Annotated[str | None, _of('"4.8-7.2 V"', "Supply voltages that the maker states.")] = None,
-    deadband: Annotated[str | None, _of('"8 us"', "Deadband, taken as its full width.")] = None,
-    pulse_range: Annotated[str | None, _of('"500-2500 us"', "Pulse widths between which the servo turns.")] = None,
-    travel: Annotated[str | None, _of('"180 deg"', "Angle between these pulses; endless: as --continuous.")] = None,
+        metavar="VOLTAGE", help="Supply voltage for figures that do not name one.", rich_help_panel=_POINT)] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Whole:
+    """The figures of a sheet of the whole servo, as they were typed."""
+
+    name: Annotated[str | None, _of("ID", "Short id, such as my-servo.")] = None
+    title: Annotated[str | None, _of("TEXT", "Name for human readers.")] = None
+    voltage_range: Annotated[str | None, _of('"4.8-7.2 V"', "Supply voltages that the maker states.")] = None
+    deadband: Annotated[str | None, _of('"8 us"', "Deadband, taken as its full width.")] = None
+    pulse_range: Annotated[str | None, _of('"500-2500 us"', "Pulse widths between which the servo turns.")] = None
+    travel: Annotated[str | None, _of('"180 deg"', "Angle between these pulses; endless: as --continuous.")] = None
     continuous: Annotated[bool, typer.Option(
         "--continuous", help="Turns without end: a pulse is a speed, the deadband the pulses at which it stands.",
-        rich_help_panel=_WHOLE)] = False,
-    rate: Annotated[str | None, _of('"45 deg/400us"', "Angle per pulse width.")] = None,
-    neutral: Annotated[str | None, _of('"1500 us"', "Pulse width at the middle position.")] = None,
-    stops: Annotated[str | None, _of('"200 deg"', "Angle from stop to stop.")] = None,
-    mass: Annotated[str | None, _of('"40 g"', "Mass: g, kg, oz.")] = None,
-    gear_ratio: Annotated[str | None, _of("280:1", "Motor turns per output turn.")] = None,
-    backlash: Annotated[str | None, _of('"0.5 deg"', "Play of the gear.")] = None,
-    motor_type: Annotated[str, _of("TEXT", "Such as 3-pole or coreless.")] = "",
-    modulation: Annotated[str, _of("WORD", "analog, digital or bus.")] = "",
-    registers: Annotated[str, _of("WORD", "Of a bus servo: feetech-sts, dynamixel-x, -mx or -ax.")] = "",
-    source: Annotated[str, _of("TEXT", "Where the figures come from.")] = "",
-    note: Annotated[str, _of("TEXT", "Remark for human readers.")] = "",
+        rich_help_panel=_WHOLE)] = False
+    rate: Annotated[str | None, _of('"45 deg/400us"', "Angle per pulse width.")] = None
+    neutral: Annotated[str | None, _of('"1500 us"', "Pulse width at the middle position.")] = None
+    stops: Annotated[str | None, _of('"200 deg"', "Angle from stop to stop.")] = None
+    mass: Annotated[str | None, _of('"40 g"', "Mass: g, kg, oz.")] = None
+    gear_ratio: Annotated[str | None, _of("280:1", "Motor turns per output turn.")] = None
+    backlash: Annotated[str | None, _of('"0.5 deg"', "Play of the gear.")] = None
+    motor_type: Annotated[str, _of("TEXT", "Such as 3-pole or coreless.")] = ""
+    modulation: Annotated[str, _of("WORD", "analog, digital or bus.")] = ""
+    registers: Annotated[str, _of("WORD", "Of a bus servo: feetech-sts, dynamixel-x, -mx or -ax.")] = ""
+    source: Annotated[str, _of("TEXT", "Where the figures come from.")] = ""
+    note: Annotated[str, _of("TEXT", "Remark for human readers.")] = ""
+
+
+@with_records
+def from_sheet(
+    *,
+    again: Annotated[str | None, typer.Argument(
+        metavar="SERVO", help="A servo whose own \\[sheet] to use: catalog id, or path.")] = None,
+    points: _Points,
+    whole: _Whole,
     list_file: Annotated[Path | None, typer.Option(
         "--csv", metavar="FILE", help="A list of servos, one row for each servo and voltage: maker, model, V, "
         "stall_torque_Nm, speed_s_per_60deg, ... (see the guide).", rich_help_panel=_MANY)] = None,
@@ -427,16 +459,7 @@ def from_sheet(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.", rich_help_panel=_OUTPUT)] = False,
 ) -> None:
     """Make a servo file from a data sheet."""
-    points = {"stall_torque": torque, "no_load_speed": speed, "no_load_current": running_current,
-              "stall_current": stall_current, "idle_current": idle_current}
-    whole = {"name": name, "title": title, "voltage_range": voltage_range, "deadband": deadband,
-             "pulse_range": pulse_range, "travel": travel, "rate": rate, "neutral": neutral, "stops": stops,
-             "mass": mass, "gear_ratio": gear_ratio, "backlash": backlash, "continuous": continuous,
-             "motor_type": motor_type, "modulation": modulation, "registers": registers, "source": source,
-             "note": note}
-    typed = [f"--{option.replace('_', '-')}" for option, given in (
-        *whole.items(), ("torque", torque), ("speed", speed), ("running-current", running_current),
-        ("stall-current", stall_current), ("idle-current", idle_current), ("at", at)) if given]
+    typed = [f"--{option.replace('_', '-')}" for option, given in (asdict(whole) | asdict(points)).items() if given]
     how = {"load_friction": not plain, "backlash": not plain, "allow_impossible": allow_impossible}
     if list_file is not None:
         _one_way("--csv", typed, again)
@@ -444,8 +467,8 @@ def from_sheet(
         return
     if again is not None:
         _one_way("SERVO", [word for word in typed if word not in ("--name", "--title")], None)
-    sheet = _again(again, name, title) if again is not None else _sheet(points, whole, at)
-    weighed = any(unit in text for text in torque or () for unit in ("kg", "oz"))
+    sheet = _again(again, whole.name, whole.title) if again is not None else _sheet(points, whole)
+    weighed = any(unit in text for text in points.torque for unit in ("kg", "oz"))
     _one_sheet(sheet, how, out, weighed=weighed, force=force, as_json=as_json)
 
 
@@ -467,58 +490,57 @@ def _again(servo: str, name: str | None, title: str | None) -> Sheet:
     return replace(sheet, name=name or sheet.name, title=title or (name or sheet.title))
 
 
-def _sheet(points: dict[str, _Figures], whole: dict[str, Any], at: str | None) -> Sheet:
+def _sheet(points: _Points, whole: _Whole) -> Sheet:
     from servotwin.cli import option_values as fig
     from servotwin.errors import InputError
     from servotwin.identification import Sheet
     from servotwin.identification.sheets.sheet import ENDLESS
     from servotwin.units.quantities import quantity
 
-    if not whole["name"]:
+    if not whole.name:
         raise InputError("--name is missing", allowed="a short id, such as --name my-servo")
-    usual = None if at is None else quantity("--at", at, "voltage", bare=True, positive=True)
-    endless = (whole["travel"] or "").strip().lower() in ENDLESS
-    (lowest, highest), (low, high) = (
-        fig.two_ends(f"--{name.replace('_', '-')}", whole[name], dimension) if whole[name] else (None, None)
-        for name, dimension in (("voltage_range", "voltage"), ("pulse_range", "time")))
+    usual = None if points.at is None else quantity("--at", points.at, "voltage", bare=True, positive=True)
+    endless = (whole.travel or "").strip().lower() in ENDLESS
+    lowest, highest = fig.two_ends("--voltage-range", whole.voltage_range, "voltage") if whole.voltage_range else (
+        None, None)
+    low, high = fig.two_ends("--pulse-range", whole.pulse_range, "time") if whole.pulse_range else (None, None)
 
     def one(option: str, dimension: str) -> float | None:
-        text = whole[option]
+        text = getattr(whole, option)
         return None if text is None or (option == "travel" and endless) else quantity(
             f"--{option}", text, dimension, positive=True)
 
     return Sheet(
-        name=whole["name"], title=whole["title"] or "", points=_points(points, usual), pulse_min=low, pulse_max=high,
+        name=whole.name, title=whole.title or "", points=_points(points, usual), pulse_min=low, pulse_max=high,
         voltage_min=lowest, voltage_max=highest, deadband=one("deadband", "time"),
         neutral_pulse=one("neutral", "time"), travel=one("travel", "angle"),
         stop_travel=one("stops", "angle"), mass=one("mass", "mass"), backlash=one("backlash", "angle"),
-        angle_per_pulse=fig.rate("--rate", whole["rate"]) if whole["rate"] else None,
-        gear_reduction=fig.ratio("--gear-ratio", whole["gear_ratio"]) if whole["gear_ratio"] else None,
-        motor_type=whole["motor_type"], modulation=whole["modulation"], registers=whole["registers"],
-        continuous=whole["continuous"] or endless,
-        source=whole["source"], note=whole["note"])
+        angle_per_pulse=fig.rate("--rate", whole.rate) if whole.rate else None,
+        gear_reduction=fig.ratio("--gear-ratio", whole.gear_ratio) if whole.gear_ratio else None,
+        motor_type=whole.motor_type, modulation=whole.modulation, registers=whole.registers,
+        continuous=whole.continuous or endless, source=whole.source, note=whole.note)
 
 
-def _points(given: dict[str, _Figures], usual: float | None) -> tuple[Any, ...]:
+def _points(given: _Points, usual: float | None) -> tuple[Any, ...]:
     from servotwin.cli import option_values as fig
     from servotwin.errors import InputError
     from servotwin.identification import SheetPoint
     from servotwin.units.quantities import quantity
 
-    options = {"stall_torque": "--torque", "no_load_speed": "--speed", "no_load_current": "--running-current",
-               "stall_current": "--stall-current", "idle_current": "--idle-current"}
+    columns = {"stall_torque": "torque", "no_load_speed": "speed", "no_load_current": "running_current",
+               "stall_current": "stall_current", "idle_current": "idle_current"}
     found: dict[float, dict[str, Any]] = {}
-    for field, texts in given.items():
-        option = options[field]
-        for text in texts or ():
+    for column, name in columns.items():
+        option = f"--{name.replace('_', '-')}"
+        for text in getattr(given, name):
             words, volts = fig.without_voltage(option, text, usual)
-            value = fig.speed(option, words) if field == "no_load_speed" else quantity(
-                option, words, "torque" if field == "stall_torque" else "current", positive=True)
-            if field in found.setdefault(volts, {}):
+            value = fig.speed(option, words) if column == "no_load_speed" else quantity(
+                option, words, "torque" if column == "stall_torque" else "current", positive=True)
+            if column in found.setdefault(volts, {}):
                 raise InputError(f"{option} at {volts:g} V",
-                                 got=f"two, {found[volts][field]:.4g} and {value:.4g} in SI",
+                                 got=f"two, {found[volts][column]:.4g} and {value:.4g} in SI",
                                  allowed="one figure")
-            found[volts][field] = value
+            found[volts][column] = value
     if not found:
         raise InputError("no figures of a sheet are given", allowed="at least --torque and --speed; or --csv, or the "
                          "servo whose [sheet] is taken")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
+from servotwin.cli.records import LEFT_OUT, with_records
 from servotwin.cli.terminal import emit_json, pairs, patience, show, table
 
 if TYPE_CHECKING:
@@ -23,7 +24,9 @@ _ZERO_CELSIUS = 273.15
 _ASKED = "What to compute"
 
 
+@with_records
 def curves(
+    *,
     servos: Annotated[list[str], typer.Argument(
         metavar="ID...", help="Catalog ids, or paths of servo files (.toml).")],
     voltage: Annotated[list[str] | None, typer.Option(
@@ -42,14 +45,8 @@ def curves(
     quick: Annotated[bool, typer.Option(
         "--quick", help="Leave out the bandwidth, which takes longer than everything else.",
         rich_help_panel=_ASKED)] = False,
-    model: Annotated[str | None, typer.Option(
-        metavar="MODEL", help="digital, pulse, pulse-inductive or bounded (default: by the kind of the servo).",
-        rich_help_panel=shared.PLANT)] = None,
-    change: Annotated[list[str] | None, typer.Option(
-        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of all servos; repeatable.",
-        rich_help_panel=shared.PLANT)] = None,
-    register: shared.RegisterOption = None,
-    supply: shared.SupplyOption = None,
+    plant: Annotated[shared.Plant, {
+        "load": LEFT_OUT, "change": "Change a parameter of all servos; repeatable."}],
     out: Annotated[Path | None, typer.Option(
         metavar="FILE.html", help="Write a page with tables and pictures.", rich_help_panel=shared.OUTPUT)] = None,
     plot: Annotated[Path | None, typer.Option(
@@ -60,9 +57,7 @@ def curves(
         rich_help_panel=shared.OUTPUT)] = None,
     csv: Annotated[Path | None, typer.Option(
         "--csv", metavar="FILE.csv", help="Write the curves, a row per point.", rich_help_panel=shared.OUTPUT)] = None,
-    force: Annotated[bool, typer.Option(
-        "--force", help="Replace existing files.", rich_help_panel=shared.OUTPUT)] = False,
-    as_json: shared.JsonOption = False,
+    ending: shared.Ending,
 ) -> None:
     """Compute the sheets of servos from their parameters, beside what their makers print."""
     from servotwin.cli.curves_report import facts
@@ -71,16 +66,16 @@ def curves(
 
     asked, volts = loads_of(lift, arm, load or []), _voltages(voltage)
     targets = _targets({"--out": out, "--plot": plot, "--loop": loop, "--csv": csv}, servos,
-                       1 if volts is None else len(volts), force=force)
-    models = _models(servos, model, change or [], register or [], supply)
-    if voltage and supply:
+                       1 if volts is None else len(volts), force=ending.force)
+    models = _models(servos, plant)
+    if voltage and plant.supply:
         raise InputError("--supply", got=f"also --voltage {','.join(voltage)}", allowed="one of them")
     _check_loop(loop, models)
     sheets = _computed(models, {
         "voltage": volts, "lift": asked.lift, "hot": hot + _ZERO_CELSIUS, "bandwidth": not quick})
-    _write(sheets, targets, asked.torque, force=force)
+    _write(sheets, targets, asked.torque, force=ending.force)
     files = [str(target.path) for target in targets]
-    if as_json:
+    if ending.as_json:
         emit_json({"servos": [facts(sheet, asked.torque) for sheet in sheets], "files": files})
         return
     for sheet in sheets:
@@ -118,13 +113,10 @@ def _voltages(words: list[str] | None) -> list[float] | None:
                               for word in words for part in word.split(",")))
 
 
-def _models(servos: list[str], model: str | None, change: list[str], register: list[str],
-            supply: str | None) -> list[Model]:
-    from servotwin.cli.shared_options import model_of
-
+def _models(servos: list[str], plant: shared.Plant) -> list[Model]:
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=".*: computed as a")  # the notes say which model stands for it
-        return [model_of(servo, model, change, _MODELS, register, supply) for servo in servos]
+        return [plant.of(servo, _MODELS) for servo in servos]
 
 
 def _check_loop(path: Path | None, models: list[Model]) -> None:

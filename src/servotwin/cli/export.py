@@ -8,15 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
+from servotwin.cli.records import with_records
 from servotwin.cli.terminal import emit_help, emit_json, pairs, patience, show
 
 if TYPE_CHECKING:
     from servotwin.export import CCode
 
 _ACCURACY = 1e-9
-_MODELS = ("digital, pulse, pulse-inductive, bounded, averaged or averaged-inductive (default: by the kind of the "
-           "servo).")
-_LOADS = "Load, such as inertia=1e-3 or pendulum=0.1:0.12; repeatable, or with commas."
+_Plant = Annotated[shared.Plant, {
+    "model": "digital, pulse, pulse-inductive, bounded, averaged or averaged-inductive (default: by the kind of the "
+    "servo).",
+    "load": "Load, such as inertia=1e-3 or pendulum=0.1:0.12; repeatable, or with commas."}]
 
 export = typer.Typer(
     help="Write a servo as a program that needs no Python.",
@@ -30,22 +32,16 @@ def _export(context: typer.Context) -> None:
         emit_help(context)
 
 
+@with_records
 def c(
+    *,
     servo: shared.ServoArgument,
     out: Annotated[Path, typer.Option(
         metavar="DIR", help="Folder for the two files; made where there is none.", rich_help_panel=shared.OUTPUT)],
     name: Annotated[str | None, typer.Option(
         metavar="NAME", help="Of the files, and the beginning of all names in them (default: the servo's).",
         rich_help_panel=shared.OUTPUT)] = None,
-    model: Annotated[str | None, typer.Option(
-        metavar="MODEL", help=_MODELS, rich_help_panel=shared.PLANT)] = None,
-    load: Annotated[list[str] | None, typer.Option(
-        metavar="PART=VALUE", help=_LOADS, rich_help_panel=shared.PLANT)] = None,
-    change: Annotated[list[str] | None, typer.Option(
-        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter; repeatable.",
-        rich_help_panel=shared.PLANT)] = None,
-    register: shared.RegisterOption = None,
-    supply: shared.SupplyOption = None,
+    plant: _Plant,
     parameters: Annotated[bool, typer.Option(
         "--parameters", help="Add a function that makes the table of other parameters.",
         rich_help_panel=shared.OUTPUT)] = False,
@@ -54,22 +50,18 @@ def c(
         metavar="DTYPE", help="float64, or float32: all numbers but times have 32 bits, and angles are good to some "
         "1e-5 rad, of a servo on a bus to some counts.",
         rich_help_panel=shared.OUTPUT)] = "float64",
-    force: Annotated[bool, typer.Option(
-        "--force", help="Replace existing files.", rich_help_panel=shared.OUTPUT)] = False,
-    as_json: shared.JsonOption = False,
+    ending: shared.Ending,
 ) -> None:
     """Write a servo as C99: a header and a source."""
-    from servotwin.cli.option_values import load_from
-    from servotwin.cli.shared_options import model_of
     from servotwin.export import c as exported
 
-    chosen = model_of(servo, model, change or [], None, register or [], supply)
-    hangs = load_from(load or [], chosen)
+    chosen = plant.of(servo)
+    hangs = plant.load_on(chosen)
     with patience(f"printing {chosen.servo.name}"):
         code = exported(chosen, hangs, name=name, parameters=parameters, accuracy=accuracy, dtype=dtype)
-        files = code.write(out, overwrite=force)
+        files = code.write(out, overwrite=ending.force)
     facts = _facts(code) | {"model": type(chosen).__name__, "files": [str(path) for path in files]}
-    if as_json:
+    if ending.as_json:
         emit_json(facts)
         return
     show(pairs([("model", type(chosen).__name__), ("left out", facts["left_out"]),
@@ -90,7 +82,9 @@ export.command("c", help="Write a servo as C99: a header and a source, without a
                       "Example: servotwin export c feetech-sts3215-12v --load inertia=1e-3 --out arm --name elbow")(c)
 
 
+@with_records
 def fmu(
+    *,
     servo: shared.ServoArgument,
     out: Annotated[Path, typer.Option(metavar="FILE.fmu", help="The archive.", rich_help_panel=shared.OUTPUT)],
     fmi: Annotated[str, typer.Option(metavar="VERSION", help="2.0 or 3.0.", rich_help_panel=shared.OUTPUT)] = "2.0",
@@ -100,35 +94,23 @@ def fmu(
     name: Annotated[str | None, typer.Option(
         metavar="NAME", help="The model identifier (default: the servo's name).",
         rich_help_panel=shared.OUTPUT)] = None,
-    model: Annotated[str | None, typer.Option(
-        metavar="MODEL", help=_MODELS, rich_help_panel=shared.PLANT)] = None,
-    load: Annotated[list[str] | None, typer.Option(
-        metavar="PART=VALUE", help=_LOADS, rich_help_panel=shared.PLANT)] = None,
-    change: Annotated[list[str] | None, typer.Option(
-        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter; repeatable.",
-        rich_help_panel=shared.PLANT)] = None,
-    register: shared.RegisterOption = None,
-    supply: shared.SupplyOption = None,
+    plant: _Plant,
     accuracy: shared.AccuracyOption = _ACCURACY,
-    force: Annotated[bool, typer.Option(
-        "--force", help="Replace an existing file.", rich_help_panel=shared.OUTPUT)] = False,
-    as_json: shared.JsonOption = False,
+    ending: Annotated[shared.Ending, {"force": "Replace an existing file."}],
 ) -> None:
     """Write a servo as an FMU for co-simulation."""
-    from servotwin.cli.option_values import load_from
-    from servotwin.cli.shared_options import model_of
     from servotwin.export import fmu as exported
 
-    chosen = model_of(servo, model, change or [], None, register or [], supply)
-    hangs = load_from(load or [], chosen)
+    chosen = plant.of(servo)
+    hangs = plant.load_on(chosen)
     with patience(f"compiling {chosen.servo.name}"):
         made = exported(chosen, hangs, fmi=fmi, name=name, accuracy=accuracy, sources=sources)
-        path = made.write(out, overwrite=force)
+        path = made.write(out, overwrite=ending.force)
     of = {kind: [each.name for each in made.variables if each.causality == kind]
           for kind in ("input", "output", "parameter")}
     facts = {"name": made.name, "fmi": made.version, "model": type(chosen).__name__, "inputs": of["input"],
              "outputs": of["output"], "parameters": of["parameter"], "file": str(path)}
-    if as_json:
+    if ending.as_json:
         emit_json(facts)
         return
     show(pairs([("model", type(chosen).__name__), ("FMI", made.version), ("inputs", ", ".join(of["input"])),

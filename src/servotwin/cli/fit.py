@@ -12,6 +12,7 @@ import typer
 
 from servotwin.cli import log
 from servotwin.cli import shared_options as shared
+from servotwin.cli.records import with_records
 from servotwin.cli.shared_options import best_kept, end_if_stopped
 from servotwin.cli.terminal import emit_json, pairs, patience, show, table
 from servotwin.logs.formats import reading_facts
@@ -112,34 +113,133 @@ _MOST_BYTES = 65536  # of a table that was written by hand
 _LOGS, _SEARCH = log.PANEL, "What to search for, and how"
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Sought:
+    """The options that say what is searched for and how, as they were typed."""
+
+    holdout: Annotated[str | None, typer.Option(
+        metavar="SHARE|NAMES", help="Logs to predict rather than fit: a share of each kind of motion, such as "
+        "0.25, or names with commas; 0 for none (default: a quarter of each kind with four logs or more).",
+        rich_help_panel=_LOGS)] = None
+    sensors: Annotated[Sequence[str], typer.Option(
+        metavar="NAME", help="Measured signals to fit; repeatable or with commas (default: the angle and all "
+        "currents).", rich_help_panel=_LOGS)] = ()
+    model: Annotated[str | None, typer.Option(
+        metavar="MODEL", help="pulse, pulse-inductive, bounded or digital (default: the one that stands for the "
+        "servo: pulse, or digital if its file says so; bounded if it has no chip).", rich_help_panel=_SEARCH)] = None
+    free: Annotated[Sequence[str], typer.Option(
+        metavar="NAME", help="Parameters to search for, repeatable or with commas: names of servo and load, and "
+        "output_torque_constant, output_inertia, output_coulomb_torque.", rich_help_panel=_SEARCH)] = ()
+    bounds: Annotated[Sequence[str], typer.Option(
+        metavar="NAME=LOW..HIGH", help="Range to search, such as output_inertia=1e-3..1e-2; "
+        "repeatable.", rich_help_panel=_SEARCH)] = ()
+    prior: Annotated[Sequence[str], typer.Option(
+        metavar="NAME=VALUE±STD", help="Prior knowledge, such as output_inertia=4e-3±30%; "
+        "repeatable. The spreads in the servo file apply to the others.", rich_help_panel=_SEARCH)] = ()
+    no_priors: Annotated[bool, typer.Option(
+        "--no-priors", help="Ignore the spreads in the servo file.", rich_help_panel=_SEARCH)] = False
+    nuisance: Annotated[Sequence[str], typer.Option(
+        metavar="NAME", help="Effects of the rig to fit: delay, log_delay, frame_phase, frame_period, control_phase, "
+        "angle_offset, angle_sag, initial_state, or none (default: delay, frame_phase, angle_offset, initial_state, "
+        "and control_phase where pulses command a program).", rich_help_panel=_SEARCH)] = ()
+    starts: Annotated[int, typer.Option(
+        metavar="NUMBER", help="Number of searches; all but the first start at random.", rich_help_panel=_SEARCH)] = 3
+    loss: Annotated[str, typer.Option(
+        metavar="HOW", help="huber (large residuals count less) or squares.", rich_help_panel=_SEARCH)] = "huber"
+    level: Annotated[str, typer.Option(
+        metavar="SHARE", help="Level of the intervals.", rich_help_panel=_SEARCH)] = "0.95"
+    intervals: Annotated[bool, typer.Option(
+        "--intervals/--no-intervals", help="Compute intervals; faster without.", rich_help_panel=_SEARCH)] = True
+    seed: Annotated[int, typer.Option(
+        metavar="NUMBER", help="Seed for random starts and the choice of held-out logs.", rich_help_panel=_SEARCH)] = 0
+    compare: Annotated[bool, typer.Option(
+        "--compare/--no-compare", help="Also fit simpler models to the same logs.", rich_help_panel=_SEARCH)] = True
+    diagnose: Annotated[bool, typer.Option(
+        "--trials/--no-trials", help="Where what is left is not noise, try what may be the matter; takes up to "
+        "four times as long as the fit itself.", rich_help_panel=_SEARCH)] = True
+    within: Annotated[str | None, typer.Option(
+        metavar="DURATION", help="Stop after this time, such as 90s or 5min, and keep the best so far, as Ctrl-C does.",
+        rich_help_panel=_SEARCH)] = None
+    accuracy: shared.AccuracyOption = 1e-7
+
+    def begun(self, servo: str, logged: shared.LoggedServo) -> _Search:
+        """Return where the search begins, and what is searched."""
+        from servotwin.cli import fit_report
+        from servotwin.identification.fitting.checks import usual_free
+
+        nominal = shared.model_of(servo, self.model, logged.change, fit_report.MODEL_NAMES, logged.register,
+                                  logged.supply)
+        names = fit_report.names(self.free) or usual_free(nominal)
+        fit_report.check_free(names, nominal)
+        return _Search(nominal, names, fit_report.bounds_of(self.bounds, names),
+                       fit_report.priors_of(self.prior, names, nominal, of_servo=not self.no_priors))
+
+    def options(self, mend: Sequence[str]) -> dict[str, Any]:
+        """Return the options of `identify` that words say."""
+        from servotwin.cli import fit_report
+
+        return {
+            "holdout": fit_report.held_out(self.holdout), "mend": fit_report.kinds(mend),
+            "sensors": fit_report.names(self.sensors),
+            "nuisance": fit_report.some_or_none("--nuisance", self.nuisance, None),
+            "level": fit_report.share("--level", self.level), "starts": self.starts, "loss": self.loss,
+            "intervals": self.intervals, "seed": self.seed, "accuracy": self.accuracy, "diagnose": self.diagnose,
+            "within": fit_report.duration("--within", self.within),
+            "compare_with": ("slew", "M1") if self.compare else ()}
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Laws:
+    """The options that ask for several laws or structures, as they were typed."""
+
+    ladder: Annotated[bool, typer.Option(
+        "--ladder", help="Fit friction laws M1 to M6 and choose one by the held-out logs.",
+        rich_help_panel=_SEARCH)] = False
+    structures: Annotated[bool, typer.Option(
+        "--structures", help="Fit analog and digital loops, braking and open bridges, and friction laws M1 to M6, and "
+        "choose the simplest that predicts the held-out logs no worse.", rich_help_panel=_SEARCH)] = False
+    spring: Annotated[Sequence[str], typer.Option(
+        metavar="gear|arm", help="With --structures: try an elastic gear or arm too, which takes longer; repeatable.",
+        rich_help_panel=_SEARCH)] = ()
+
+    def check(self, model: Model) -> None:
+        """Raise InputError if they contradict, or no law is open to a model."""
+        from servotwin.errors import InputError
+        from servotwin.models import BoundedServo
+
+        if self.ladder and self.structures:
+            raise InputError("--ladder", got="also --structures",
+                             allowed="one of them: structures climb the ladder too")
+        if self.spring and not self.structures:
+            raise InputError("--spring", got="no --structures", allowed="both: a spring is one of the structures")
+        if self.ladder and isinstance(model, BoundedServo):
+            raise InputError("--ladder", got="a bounded servo", allowed="pulse, pulse-inductive or digital, which know "
+                             "friction that grows with the load")
+
+    def climber(self, search: _Search, *, asked: bool) -> Callable[..., Ladder] | None:
+        """Return what fits several laws or structures; None where one fit is asked for."""
+        from functools import partial
+
+        from servotwin.cli import fit_report
+        from servotwin.identification import compare_structures, friction_ladder
+
+        servo, kind = search.model.servo, type(search.model)
+        if self.structures:
+            return partial(compare_structures, servo=servo, model=kind, free=search.free if asked else None,
+                           springs=fit_report.names(self.spring) or ())
+        return partial(friction_ladder, servo=servo, model=kind, free=search.free) if self.ladder else None
+
+
+@with_records
 def fit(
+    *,
     logs: Annotated[list[Path] | None, typer.Argument(
         metavar="LOGS", help=log.LOGS_HELP)] = None,
     servo: Annotated[str | None, typer.Option(
         metavar="SERVO", help="Servo to start from, which also supplies the values that are not fitted: catalog id, or "
         "path of a servo file (.toml).", rich_help_panel=_LOGS)] = None,
-    file_format: log.FormatOption = "auto",
-    columns: log.ColumnsOption = None,
-    joint: log.JointOption = None,
-    raw: log.RegistersOption = None,
-    rate: log.RateOption = None,
-    commanded: log.CommandedOption = None,
-    change: Annotated[list[str] | None, typer.Option(
-        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable; with a unit, or "
-        "in SI units.", rich_help_panel=_LOGS)] = None,
-    register: shared.LogRegisterOption = None,
-    supply: shared.LogSupplyOption = None,
-    holdout: Annotated[str | None, typer.Option(
-        metavar="SHARE|NAMES", help="Logs to predict rather than fit: a share of each kind of motion, such as "
-        "0.25, or names with commas; 0 for none (default: a quarter of each kind with four logs or more).",
-        rich_help_panel=_LOGS)] = None,
-    leave_out: Annotated[list[str] | None, typer.Option(
-        "--leave-out", metavar="START..STOP", help="Time window that says nothing about the servo, in all logs or "
-        "in one: LOG=START..STOP; repeatable.", rich_help_panel=_LOGS)] = None,
-    mend: log.MendOption = None,
-    sensors: Annotated[list[str] | None, typer.Option(
-        metavar="NAME", help="Measured signals to fit; repeatable or with commas (default: the angle and all "
-        "currents).", rich_help_panel=_LOGS)] = None,
+    reading: log.Reading,
+    logged: shared.LoggedServo,
     table: Annotated[Path | None, typer.Option(
         metavar="FILE.csv", help="Calibrate from a table instead of logs: readings of a bench, or weights with "
         "currents, speeds or sags, or voltages with speeds; or from records of lifts: 'lift{mass:g}.txt'.",
@@ -147,50 +247,8 @@ def fit(
     arm: Annotated[str | None, typer.Option(
         metavar="LENGTH", help="With --table: the arm, or the radius of the drum, on which the weights hung, such as "
         "1cm.", rich_help_panel=_LOGS)] = None,
-    model: Annotated[str | None, typer.Option(
-        metavar="MODEL", help="pulse, pulse-inductive, bounded or digital (default: the one that stands for the "
-        "servo: pulse, or digital if its file says so; bounded if it has no chip).", rich_help_panel=_SEARCH)] = None,
-    free: Annotated[list[str] | None, typer.Option(
-        metavar="NAME", help="Parameters to search for, repeatable or with commas: names of servo and load, and "
-        "output_torque_constant, output_inertia, output_coulomb_torque.", rich_help_panel=_SEARCH)] = None,
-    bounds: Annotated[list[str] | None, typer.Option(
-        metavar="NAME=LOW..HIGH", help="Range to search, such as output_inertia=1e-3..1e-2; "
-        "repeatable.", rich_help_panel=_SEARCH)] = None,
-    prior: Annotated[list[str] | None, typer.Option(
-        metavar="NAME=VALUE±STD", help="Prior knowledge, such as output_inertia=4e-3±30%; "
-        "repeatable. The spreads in the servo file apply to the others.", rich_help_panel=_SEARCH)] = None,
-    no_priors: Annotated[bool, typer.Option(
-        "--no-priors", help="Ignore the spreads in the servo file.", rich_help_panel=_SEARCH)] = False,
-    nuisance: Annotated[list[str] | None, typer.Option(
-        metavar="NAME", help="Effects of the rig to fit: delay, log_delay, frame_phase, frame_period, control_phase, "
-        "angle_offset, angle_sag, initial_state, or none (default: delay, frame_phase, angle_offset, initial_state, "
-        "and control_phase where pulses command a program).",
-        rich_help_panel=_SEARCH)] = None,
-    starts: Annotated[int, typer.Option(
-        metavar="NUMBER", help="Number of searches; all but the first start at random.", rich_help_panel=_SEARCH)] = 3,
-    loss: Annotated[str, typer.Option(
-        metavar="HOW", help="huber (large residuals count less) or squares.", rich_help_panel=_SEARCH)] = "huber",
-    level: Annotated[str, typer.Option(
-        metavar="SHARE", help="Level of the intervals.", rich_help_panel=_SEARCH)] = "0.95",
-    intervals: Annotated[bool, typer.Option(
-        "--intervals/--no-intervals", help="Compute intervals; faster without.", rich_help_panel=_SEARCH)] = True,
-    seed: Annotated[int, typer.Option(
-        metavar="NUMBER", help="Seed for random starts and the choice of held-out logs.", rich_help_panel=_SEARCH)] = 0,
-    compare: Annotated[bool, typer.Option(
-        "--compare/--no-compare", help="Also fit simpler models to the same logs.",
-        rich_help_panel=_SEARCH)] = True,
-    diagnose: Annotated[bool, typer.Option(
-        "--trials/--no-trials", help="Where what is left is not noise, try what may be the matter; takes up to "
-        "four times as long as the fit itself.", rich_help_panel=_SEARCH)] = True,
-    ladder: Annotated[bool, typer.Option(
-        "--ladder", help="Fit friction laws M1 to M6 and choose one by the held-out logs.",
-        rich_help_panel=_SEARCH)] = False,
-    structures: Annotated[bool, typer.Option(
-        "--structures", help="Fit analog and digital loops, braking and open bridges, and friction laws M1 to M6, and "
-        "choose the simplest that predicts the held-out logs no worse.", rich_help_panel=_SEARCH)] = False,
-    spring: Annotated[list[str] | None, typer.Option(
-        metavar="gear|arm", help="With --structures: try an elastic gear or arm too, which takes longer; repeatable.",
-        rich_help_panel=_SEARCH)] = None,
+    sought: _Sought,
+    laws: _Laws,
     advise: Annotated[bool, typer.Option(
         "--advise", help="Say which experiment to do next; without logs, which one to start with.",
         rich_help_panel=_SEARCH)] = False,
@@ -198,46 +256,33 @@ def fit(
         metavar="FILE.toml", help="Write the fitted servo.", rich_help_panel=shared.OUTPUT)] = None,
     report: Annotated[Path | None, typer.Option(
         metavar="FILE.html", help="Write a page with pictures.", rich_help_panel=shared.OUTPUT)] = None,
-    within: Annotated[str | None, typer.Option(
-        metavar="DURATION", help="Stop after this time, such as 90s or 5min, and keep the best so far, as Ctrl-C does.",
-        rich_help_panel=_SEARCH)] = None,
-    accuracy: shared.AccuracyOption = 1e-7,
     scheduler: shared.SchedulerOption = None,
-    force: Annotated[bool, typer.Option(
-        "--force", help="Replace existing files.", rich_help_panel=shared.OUTPUT)] = False,
-    as_json: Annotated[bool, typer.Option(
-        "--json", help="Print JSON, in SI units.", rich_help_panel=shared.OUTPUT)] = False,
+    ending: shared.Ending,
 ) -> None:
     """Find the parameters of a servo, with intervals."""
-    _check_words(logs, servo, table, report, scheduler, raw, advise=advise, registers=bool(register))
+    force, as_json = ending.force, ending.as_json
+    _check_words(logs, servo, table, report, scheduler, reading.raw, advise=advise, registers=bool(logged.register))
     if table is not None:
         from servotwin.cli.fit_report import calibrate_from
 
-        calibrate_from(table, servo, out, change=change or (), supply=supply, arm=arm, columns=columns or (),
+        calibrate_from(table, servo, out, change=logged.change, supply=logged.supply, arm=arm, columns=reading.columns,
                        force=force, as_json=as_json)
         return
     _check_no_table(logs, arm)
     targets = _targets(out, report, [*(logs or []), Path(servo or "")], force=force)
-    search = _search(_model(servo or "", model, change or [], register or [], supply), free, bounds or [], prior or [],
-                     priors=not no_priors)
+    search = sought.begun(servo or "", logged)
     if not logs:
         _show_advice(_first_advice(search), as_json=as_json)
         return
-    _check_ladder(search.model, ladder=ladder, structures=structures, springs=spring)
-    options = {"holdout": holdout, "mend": mend, "nuisance": nuisance, "sensors": sensors, "starts": starts,
-               "loss": loss, "level": level, "intervals": intervals, "seed": seed, "compare": compare,
-               "diagnose": diagnose, "accuracy": accuracy, "within": within}
-    chosen = _options(options)
-    given = log.read(logs, file_format, columns, joint, leave_out or [], mend=mend, rate=rate,
-                             commanded=commanded, force=force, quiet=as_json, registers=bool(register), raw=raw,
-                             model=search.model)
-    climbs = _climber(search, asked=bool(free), ladder=ladder, structures=structures, springs=spring)
-    found = _run(search, given, chosen, scheduler, climbs)
+    laws.check(search.model)
+    options = sought.options(reading.mend)
+    given = reading.logs(logs, search.model, registers=bool(logged.register), force=force, quiet=as_json)
+    found = _run(search, given, options, scheduler, laws.climber(search, asked=bool(sought.free)))
     files = _write(found, targets, force=force)
     if advise and not found.fit.interrupted and found.fit.doubt is not None:
         found = _Found(found.fit, found.ladder, _advice(found.fit))
     _report(found, files, as_json=as_json)
-    end_if_stopped(found.fit, timed=within is not None)
+    end_if_stopped(found.fit, timed=sought.within is not None)
 
 
 @dataclass(frozen=True)
@@ -291,19 +336,6 @@ def _check_no_table(logs: list[Path] | None, arm: str | None) -> None:
             raise InputError(f"{path}", got="a table of loads and no log", allowed=f"--table {path}")
 
 
-def _check_ladder(model: Model, *, ladder: bool, structures: bool, springs: list[str] | None) -> None:
-    from servotwin.errors import InputError
-    from servotwin.models import BoundedServo
-
-    if ladder and structures:
-        raise InputError("--ladder", got="also --structures", allowed="one of them: structures climb the ladder too")
-    if springs and not structures:
-        raise InputError("--spring", got="no --structures", allowed="both: a spring is one of the structures")
-    if ladder and isinstance(model, BoundedServo):
-        raise InputError("--ladder", got="a bounded servo",
-                         allowed="pulse, pulse-inductive or digital, which know friction that grows with the load")
-
-
 def _targets(out: Path | None, report: Path | None, inputs: list[Path], *, force: bool) -> list[Target]:
     from servotwin.cli.outputs import Target, check_targets
 
@@ -314,52 +346,6 @@ def _targets(out: Path | None, report: Path | None, inputs: list[Path], *, force
         targets.append(Target(option="--report", path=report, endings=(".html", ".htm")))
     check_targets(targets, force=force, inputs=inputs)
     return targets
-
-
-def _model(servo: str, model: str | None, change: list[str], register: list[str], supply: str | None) -> Model:
-    from servotwin.cli import fit_report
-    from servotwin.cli.shared_options import model_of
-
-    return model_of(servo, model, change, fit_report.MODEL_NAMES, register, supply)
-
-
-def _search(nominal: Model, free: list[str] | None, bounds: list[str], prior: list[str], *, priors: bool) -> _Search:
-    from servotwin.cli import fit_report
-    from servotwin.identification.fitting.checks import usual_free
-
-    names = fit_report.names(free) or usual_free(nominal)
-    fit_report.check_free(names, nominal)
-    return _Search(nominal, names, fit_report.bounds_of(bounds, names),
-                   fit_report.priors_of(prior, names, nominal, of_servo=priors))
-
-
-def _options(given: dict[str, Any]) -> dict[str, Any]:
-    """Return the options of `identify` that words say."""
-    from servotwin.cli import fit_report
-
-    return {
-        "holdout": fit_report.held_out(given["holdout"]), "mend": fit_report.kinds(given["mend"]),
-        "sensors": fit_report.names(given["sensors"]),
-        "nuisance": fit_report.some_or_none("--nuisance", given["nuisance"], None),
-        "level": fit_report.share("--level", given["level"]), "starts": given["starts"], "loss": given["loss"],
-        "intervals": given["intervals"], "seed": given["seed"], "accuracy": given["accuracy"],
-        "diagnose": given["diagnose"], "within": fit_report.duration("--within", given["within"]),
-        "compare_with": ("slew", "M1") if given["compare"] else ()}
-
-
-def _climber(search: _Search, *, asked: bool, ladder: bool, structures: bool,
-             springs: list[str] | None) -> Callable[..., Ladder] | None:
-    """Return what fits several laws or structures; None where one fit is asked for."""
-    from functools import partial
-
-    from servotwin.cli import fit_report
-    from servotwin.identification import compare_structures, friction_ladder
-
-    servo, kind = search.model.servo, type(search.model)
-    if structures:
-        return partial(compare_structures, servo=servo, model=kind, free=search.free if asked else None,
-                       springs=fit_report.names(springs) or ())
-    return partial(friction_ladder, servo=servo, model=kind, free=search.free) if ladder else None
 
 
 def _run(search: _Search, logs: list[Log], options: dict[str, Any], scheduler: str | None,

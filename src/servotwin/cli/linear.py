@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
+from servotwin.cli.records import with_records
 from servotwin.cli.terminal import emit_json, pairs, patience, show, table
 
 if TYPE_CHECKING:
@@ -22,7 +23,9 @@ _ENDINGS = {"--out": (".html", ".htm"), "--plot": (".png", ".svg", ".pdf"), "--c
 _VIEW, _TUNE = "What to compute", "Which gain"
 
 
+@with_records
 def linear(
+    *,
     servo: shared.ServoArgument,
     amplitude: Annotated[list[str] | None, typer.Option(
         metavar="ANGLE", help="Amplitudes of the simulated sines, such as 1deg,5deg (default: 1, 5 and 20 degrees).",
@@ -44,17 +47,9 @@ def linear(
         metavar="ANGLE", help="Size of that step (default: 10deg).", rich_help_panel=_TUNE)] = None,
     derivative: Annotated[bool, typer.Option(
         "--derivative", help="Look for D too.", rich_help_panel=_TUNE)] = False,
-    load: Annotated[list[str] | None, typer.Option(
-        metavar="PART=VALUE", help="Load, such as inertia=1e-3 or pendulum=0.1:0.12; repeatable, or with commas.",
-        rich_help_panel=shared.PLANT)] = None,
-    model: Annotated[str | None, typer.Option(
-        metavar="MODEL", help=f"{', '.join(_MODELS)} (default: by the kind of the servo).",
-        rich_help_panel=shared.PLANT)] = None,
-    change: Annotated[list[str] | None, typer.Option(
-        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter; repeatable.",
-        rich_help_panel=shared.PLANT)] = None,
-    register: shared.RegisterOption = None,
-    supply: shared.SupplyOption = None,
+    plant: Annotated[shared.Plant, {
+        "model": f"{', '.join(_MODELS)} (default: by the kind of the servo).",
+        "load": "Load, such as inertia=1e-3 or pendulum=0.1:0.12; repeatable, or with commas."}],
     out: Annotated[Path | None, typer.Option(
         metavar="FILE.html", help="Write a page with tables and pictures.", rich_help_panel=shared.OUTPUT)] = None,
     plot: Annotated[Path | None, typer.Option(
@@ -63,31 +58,27 @@ def linear(
     csv: Annotated[Path | None, typer.Option(
         "--csv", metavar="FILE.csv", help="Write gains and phases, a row for each frequency.",
         rich_help_panel=shared.OUTPUT)] = None,
-    force: Annotated[bool, typer.Option(
-        "--force", help="Replace existing files.", rich_help_panel=shared.OUTPUT)] = False,
-    as_json: shared.JsonOption = False,
+    ending: shared.Ending,
 ) -> None:
     """Show the linear views of a servo, or find its gain."""
     from servotwin.cli import linear_report as words
-    from servotwin.cli.option_values import load_from
-    from servotwin.cli.shared_options import model_of
 
-    chosen = model_of(servo, model, change or [], _MODELS, register or [], supply)
-    hangs = load_from(load or [], chosen)
+    chosen = plant.of(servo, _MODELS)
+    hangs = plant.load_on(chosen)
     words.check_together({"--amplitude": amplitude, "--angle": angle, "--phase-margin": phase_margin,
                           "--overshoot": overshoot, "--step": step, "--derivative": derivative or None}, tune=tune)
     asked = {"amplitudes": []} if tune else words.asked(chosen, amplitude, frame, angle)
     targets = _targets({"--out": out, "--plot": plot, "--csv": csv}, servo, len(asked["amplitudes"]), tune=tune,
-                       force=force)
+                       force=ending.force)
     if tune:
         wanted = words.wanted(phase_margin=phase_margin, overshoot=overshoot, step=step, frame=frame,
                               derivative=derivative)
-        _tune(chosen, hangs, wanted, as_json=as_json)
+        _tune(chosen, hangs, wanted, as_json=ending.as_json)
         return
     found = _computed(chosen, hangs, asked)
-    _write(found, targets, force=force)
+    _write(found, targets, force=ending.force)
     facts = words.facts(found) | {"files": [str(target.path) for target in targets]}
-    if as_json:
+    if ending.as_json:
         emit_json(facts)
         return
     _show(found, targets)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from servotwin.cli import shared_options as shared
+from servotwin.cli.records import LEFT_OUT, with_records
 from servotwin.cli.terminal import emit_json, patience, show, table
 from servotwin.errors import one_line
 from servotwin.logs.formats import FORMATS, LOG_FORMATS, MENDS, read_alike
@@ -30,72 +31,81 @@ if TYPE_CHECKING:
 _MOST_REMARKS = 5
 _QUIET = ("named", "sidecar")  # someone said so before
 
-PANEL = "Logs and servo"
+PANEL = shared.LOGS
 LOGS_HELP = f"Log files or folders: {', '.join(each.what for each in LOG_FORMATS.values())}."
-FormatOption = Annotated[str, typer.Option(
-    "--format", metavar="FORMAT", help=f"Format of the logs: {', '.join(FORMATS)}.", rich_help_panel=PANEL)]
-ColumnsOption = Annotated[list[str] | None, typer.Option(
-    metavar="SIGNAL=COLUMN:UNIT", help='What the columns of a table mean: "time=t:ms angle=pos:deg-90"; kept in the '
-    "sidecar. Other columns are recognised by name or guessed, and shown.", rich_help_panel=PANEL)]
-JointOption = Annotated[list[str] | None, typer.Option(
-    metavar="NAME[:UNIT]", help="Joints of a LeRobot dataset to read, and their unit; repeatable or with commas, *:deg "
-    "for all.", rich_help_panel=PANEL)]
-
-MendOption = Annotated[list[str] | None, typer.Option(
-    metavar="KIND", help="What to put right in the logs first, of what is said to be wrong with them: wrap, stamps, "
-    f"sign, span, rows, not-followed; and in their files {', '.join(MENDS)}; repeatable or with commas.",
-    rich_help_panel=PANEL)]
-RegistersOption = Annotated[str | None, typer.Option(
-    "--registers", metavar="FAMILY|MODEL", help="Whose registers the columns of a table are named after and hold raw: "
-    "feetech-sts, dynamixel-x, -mx, -ax, -xl320, or a model such as XM430-W350 (default: those of the servo, where the "
-    "numbers cannot be degrees).", rich_help_panel=PANEL)]
-RateOption = Annotated[str | None, typer.Option(
-    metavar="RATE", help="Rows per second of tables without times, such as 50Hz.", rich_help_panel=PANEL)]
-CommandedOption = Annotated[str | None, typer.Option(
-    metavar="VALUE[@TIME]", help="What was commanded in tables without a command: 153deg@0s, or jumps such as "
-    "1500us@0s,1700us@0.5s.", rich_help_panel=PANEL)]
 
 
-def read(paths: Sequence[Path], file_format: str, columns: Sequence[str] | None, joints: Sequence[str] | None,
-         leave_out: Sequence[str], *, mend: Sequence[str] | None = None, rate: str | None = None,
-         commanded: str | None = None, force: bool = False, quiet: bool = False, registers: bool = False,
-         raw: str | None = None, model: Model) -> list[Log]:
-    """Return the logs of files and folders, with commands that count from the middle of the servo's travel.
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """The options that say how logs are read, as they were typed."""
 
-    What was guessed, said or found of columns is shown, unless `quiet`, and what was said or found is written into
-    sidecars. Where the user says the registers of the servo (`registers`), those that a dataset's robot has are not
-    assumed. Columns that are named after registers hold those of the family or model `raw`, else of the servo.
+    file_format: Annotated[str, typer.Option(
+        "--format", metavar="FORMAT", help=f"Format of the logs: {', '.join(FORMATS)}.", rich_help_panel=PANEL)
+        ] = "auto"
+    columns: Annotated[Sequence[str], typer.Option(
+        metavar="SIGNAL=COLUMN:UNIT", help='What the columns of a table mean: "time=t:ms angle=pos:deg-90"; kept in '
+        "the sidecar. Other columns are recognised by name or guessed, and shown.", rich_help_panel=PANEL)] = ()
+    joint: Annotated[Sequence[str], typer.Option(
+        metavar="NAME[:UNIT]", help="Joints of a LeRobot dataset to read, and their unit; repeatable or with commas, "
+        "*:deg for all.", rich_help_panel=PANEL)] = ()
+    raw: Annotated[str | None, typer.Option(
+        "--registers", metavar="FAMILY|MODEL", help="Whose registers the columns of a table are named after and hold "
+        "raw: feetech-sts, dynamixel-x, -mx, -ax, -xl320, or a model such as XM430-W350 (default: those of the servo, "
+        "where the numbers cannot be degrees).", rich_help_panel=PANEL)] = None
+    rate: Annotated[str | None, typer.Option(
+        metavar="RATE", help="Rows per second of tables without times, such as 50Hz.", rich_help_panel=PANEL)] = None
+    commanded: Annotated[str | None, typer.Option(
+        metavar="VALUE[@TIME]", help="What was commanded in tables without a command: 153deg@0s, or jumps such as "
+        "1500us@0s,1700us@0.5s.", rich_help_panel=PANEL)] = None
+    leave_out: Annotated[Sequence[str], typer.Option(
+        "--leave-out", metavar="START..STOP", help="Time window that says nothing about the servo, in all logs or "
+        "in one: LOG=START..STOP; repeatable.", rich_help_panel=PANEL)] = ()
+    mend: Annotated[Sequence[str], typer.Option(
+        metavar="KIND", help="What to put right in the logs first, of what is said to be wrong with them: wrap, "
+        f"stamps, sign, span, rows, not-followed; and in their files {', '.join(MENDS)}; repeatable or with commas.",
+        rich_help_panel=PANEL)] = ()
 
-    Raises
-    ------
-    InputError
-        If one cannot be read, a window is none, the servo cannot follow a command, or a sidecar says otherwise and
-        `force` is false.
-    """
-    from servotwin.cli import fit_report
-    from servotwin.identification import read_logs
-    from servotwin.identification.fitting.registers import of_no_robot
-    from servotwin.identification.fitting.suspicions.followed import centred
+    @property
+    def said(self) -> str | None:
+        """The words of `--columns`, with those of `--rate` and `--commanded` among them."""
+        return columns_said(self.columns, self.rate, self.commanded)
 
-    windows = fit_report.left_out(leave_out)
-    said = columns_said(columns, rate, commanded)
-    mends = fit_report.reading_mends(mend)
-    chosen = None if not joints else ",".join(joints)
-    with patience("reading"):
-        given = [(path, read_logs(path, file_format, columns=said, joints=chosen, mend=mends,
-                                  registers=raw or model.servo)) for path in paths]
-        logs = fit_report.without([log for _, some in given for log in some], windows)
-    found = centred(logs, model)
-    parts = _parts(logs)
-    lines = list(found.sentences)
-    rest = iter(found.logs)
-    for path, some in given:
-        lines += _kept(some, list(islice(rest, len(some))), path, said=_option(said, raw), force=force)
-    if (parts or lines) and not quiet:
-        show(*parts, *lines, "")
-    for line in lines if quiet else ():
-        typer.echo(one_line(line), err=True)
-    return of_no_robot(found.logs) if registers else list(found.logs)
+    def logs(self, paths: Sequence[Path], model: Model, *, registers: bool, force: bool = False, quiet: bool = False
+             ) -> list[Log]:
+        """Return the logs of files and folders, with commands that count from the middle of the servo's travel.
+
+        What was guessed, said or found of columns is shown, unless `quiet`, and what was said or found is written into
+        sidecars. Where the user says the registers of the servo (`registers`), those that a dataset's robot has are
+        not assumed. Columns that are named after registers hold those of the family or model `raw`, else of the servo.
+
+        Raises
+        ------
+        InputError
+            If one cannot be read, a window is none, the servo cannot follow a command, or a sidecar says otherwise and
+            `force` is false.
+        """
+        from servotwin.cli import fit_report
+        from servotwin.identification import read_logs
+        from servotwin.identification.fitting.registers import of_no_robot
+        from servotwin.identification.fitting.suspicions.followed import centred
+
+        windows, said = fit_report.left_out(self.leave_out), self.said
+        mends = fit_report.reading_mends(self.mend)
+        with patience("reading"):
+            given = [(path, read_logs(path, self.file_format, columns=said, joints=",".join(self.joint) or None,
+                                      mend=mends, registers=self.raw or model.servo)) for path in paths]
+            logs = fit_report.without([log for _, some in given for log in some], windows)
+        found = centred(logs, model)
+        parts = _parts(logs)
+        lines = list(found.sentences)
+        rest = iter(found.logs)
+        for path, some in given:
+            lines += _kept(some, list(islice(rest, len(some))), path, said=_option(said, self.raw), force=force)
+        if (parts or lines) and not quiet:
+            show(*parts, *lines, "")
+        for line in lines if quiet else ():
+            typer.echo(one_line(line), err=True)
+        return of_no_robot(found.logs) if registers else list(found.logs)
 
 
 def _option(said: str | None, raw: str | None) -> str:
@@ -175,43 +185,36 @@ EPILOG = ("Example: servotwin log run.csv --mend torn,reset --out mended.csv --p
           'Example: servotwin log lift0.txt --columns "1:ms 2:deg 3:A" --commanded 153deg@0s')
 
 
+@with_records
 def log(
+    *,
     files: Annotated[list[Path], typer.Argument(metavar="FILES", help=LOGS_HELP)],
-    file_format: FormatOption = "auto",
-    columns: ColumnsOption = None,
-    joint: JointOption = None,
-    registers: RegistersOption = None,
-    rate: RateOption = None,
-    commanded: CommandedOption = None,
-    mend: Annotated[list[str] | None, typer.Option(
-        metavar="KIND", help="What to mend of what is not certain: " + "; ".join(
-            f"{name} {what}" for name, what in MENDS.items()) + "; repeatable or with commas.",
-        rich_help_panel=PANEL)] = None,
+    reading: Annotated[Reading, {
+        "leave_out": LEFT_OUT, "mend": "What to mend of what is not certain: " + "; ".join(
+            f"{name} {what}" for name, what in MENDS.items()) + "; repeatable or with commas."}],
     out: Annotated[Path | None, typer.Option(
         metavar="FILE.csv", help="Write the mended log, in SI, and its sidecar.",
         rich_help_panel=shared.OUTPUT)] = None,
     plot: Annotated[Path | None, typer.Option(
         metavar="FILE", help="Draw it: .png, .svg or .pdf.", rich_help_panel=shared.OUTPUT)] = None,
-    force: Annotated[bool, typer.Option(
-        "--force", help="Replace existing files.", rich_help_panel=shared.OUTPUT)] = False,
-    as_json: shared.JsonOption = False,
+    ending: shared.Ending,
 ) -> None:
     """Say what a log holds and lacks."""
     from servotwin.cli.log_words import sections
     from servotwin.identification import read_logs
     from servotwin.identification.survey.survey import survey_of
 
-    said, mends = columns_said(columns, rate, commanded), _mends(mend)
+    said, mends, force = reading.said, _mends(reading.mend), ending.force
     if out is not None or plot is not None:
         _check(files, out, plot, 1, force=force)
     with patience("reading"):
         logs = [one for path in files for one in read_logs(
-            path, file_format, columns=said, joints=",".join(joint) if joint else None, mend=mends, unknown_step=True,
-            registers=registers)]
+            path, reading.file_format, columns=said, joints=",".join(reading.joint) or None, mend=mends,
+            unknown_step=True, registers=reading.raw)]
         targets = _check(files, out, plot, len(logs), force=force)
         found = [survey_of(one) for one in logs]
     written = _write(found, targets, force=force)
-    if as_json:
+    if ending.as_json:
         emit_json({"logs": [one.facts for one in found], "files": written})
         return
     for k, one in enumerate(found):
@@ -219,7 +222,7 @@ def log(
         show(*sections(one, written if last else ()), *([] if last else [""]))
 
 
-def _mends(words: list[str] | None) -> tuple[str, ...]:
+def _mends(words: Sequence[str]) -> tuple[str, ...]:
     """Return what the reader mends.
 
     Raises

@@ -13,6 +13,7 @@ import typer
 
 from servotwin.cli import robot_options as options
 from servotwin.cli import shared_options as shared
+from servotwin.cli.records import LEFT_OUT, with_records
 from servotwin.cli.robot_tasks import add_to, compare, mobile
 from servotwin.cli.terminal import emit_help, emit_json, json_text, pairs, patience, show, table
 from servotwin.text import file_stems
@@ -33,22 +34,18 @@ DatasetArgument = Annotated[Path, typer.Argument(
     "joint (action.elbow_deg, state.elbow_deg).")]
 OutOption = Annotated[Path | None, typer.Option(
     metavar="FOLDER", help="Folder for page, pictures and numbers (default: none).", rich_help_panel=shared.OUTPUT)]
-ForceOption = Annotated[bool, typer.Option("--force", help="Replace existing files.", rich_help_panel=shared.OUTPUT)]
 
 
+@with_records
 def validate(
-    model_file: options.ModelArgument, dataset: DatasetArgument, servo: options.ServoOption = None,
-    mount: options.MountOption = None, model: options.ModelOption = None, change: options.SetOption = None,
-    register: options.RegisterOption = None, supply: options.SupplyOption = None,
-    package: options.PackageOption = None,
-    friction: options.FrictionOption = "refuse", calibration: options.CalibrationOption = None,
-    episode: options.EpisodesOption = None, unit: options.UnitOption = None,
+    *, model_file: options.ModelArgument, dataset: DatasetArgument, servos: options.Servos,
+    friction: options.FrictionOption = "refuse", recorded: options.Recorded,
     latency: Annotated[float | None, typer.Option(
         metavar="SECONDS", help="Between the reading of positions and when the goal of the same row acts (default: "
         "the one that fits best).", rich_help_panel=options.MOTION)] = None,
     timestep: Annotated[float | None, typer.Option(
         metavar="SECONDS", help="Of MuJoCo (default: that of the model).", rich_help_panel=shared.OUTPUT)] = None,
-    out: OutOption = None, force: ForceOption = False, as_json: shared.JsonOption = False,
+    out: OutOption = None, ending: shared.Ending,
 ) -> None:
     """Replay recorded goals, and compare with the measured joints."""
     from servotwin.cli import robot_report as files
@@ -56,9 +53,7 @@ def validate(
     from servotwin.robots import validate_robot
     from servotwin.robots.replay import measured_joints
 
-    asked = options.asked_robot(model_file, dataset, servo=servo or [], mount=mount or [], model=model,
-                                change=change or [], register=register or [], supply=supply, calibration=calibration,
-                                episodes=episode or [], unit=unit or [], package=package or [])
+    asked, force, as_json = options.asked_robot(model_file, dataset, servos, recorded), ending.force, ending.as_json
 
     def done(targets: Sequence[Target]) -> dict[str, Any]:
         with as_options():
@@ -157,13 +152,9 @@ def _write(found: RobotValidation, told: dict[str, Any], targets: Sequence[Targe
 _FIT = "Fit"
 
 
+@with_records
 def fit(
-    model_file: options.ModelArgument, logs: DatasetArgument, servo: options.ServoOption = None,
-    mount: options.MountOption = None, model: options.ModelOption = None, change: options.SetOption = None,
-    register: options.RegisterOption = None, supply: options.SupplyOption = None,
-    package: options.PackageOption = None,
-    calibration: options.CalibrationOption = None, episode: options.EpisodesOption = None,
-    unit: options.UnitOption = None,
+    *, model_file: options.ModelArgument, logs: DatasetArgument, servos: options.Servos, recorded: options.Recorded,
     each: Annotated[bool, typer.Option("--each", help="Fit every servo by itself (default: one for all that are "
                                        "equal).", rich_help_panel=_FIT)] = False,
     masses: Annotated[float, typer.Option(metavar="SHARE", help="How far the masses of the robot's file may be off, as "
@@ -178,7 +169,7 @@ def fit(
     within: Annotated[str | None, typer.Option(metavar="DURATION", help="Stop after this time, such as 90s or 5min, "
                                                "and keep the best so far, as Ctrl-C does.",
                                                rich_help_panel=_FIT)] = None,
-    out: OutOption = None, force: ForceOption = False, as_json: shared.JsonOption = False,
+    out: OutOption = None, ending: shared.Ending,
 ) -> None:
     """Fit the servos of a robot."""
     from servotwin.cli import robot_report as files
@@ -189,11 +180,9 @@ def fit(
     from servotwin.identification.arms.identify_arm import UNKNOWN, mounts_of, plant_of
     from servotwin.robots.motion import joints_of_dataset
 
-    limit = duration("--within", within)
+    limit, force, as_json = duration("--within", within), ending.force, ending.as_json
     plant, unknown = plant_of(UNKNOWN, joints_of_dataset(logs)) if model_file == UNKNOWN else (None, ())
-    asked = options.asked_robot(model_file, logs, servo=servo or [], mount=mount or [], model=model,
-                                change=change or [], register=register or [], supply=supply, calibration=calibration,
-                                episodes=episode or [], unit=unit or [], package=package or [], plant=plant)
+    asked = options.asked_robot(model_file, logs, servos, recorded, plant)
 
     def done(names: Sequence[str]) -> tuple[ArmFit, dict[str, Any]]:
         targets = files.targets_of(out, names, force=force, inputs=[logs]) if out is not None else []
@@ -211,13 +200,13 @@ def fit(
 
     with as_options():  # of the servos at recorded joints, the only ones that are fitted
         stems = file_stems(mounts_of(asked.mounts, model_file, asked.plant, asked.motions)[0])
-    servos = [f"{stem}.toml" for stem in stems.values()]
+    written = [f"{stem}.toml" for stem in stems.values()]
     windows = files.joint_pages(WINDOWS, len(stems))
     if out is None:
         found, told = done([])
     else:
         with files.folder(out):
-            found, told = done([*servos, SUMMARY, ERRORS, *windows, PAGE])
+            found, told = done([*written, SUMMARY, ERRORS, *windows, PAGE])
     if as_json:
         emit_json(told)
     end_if_stopped(found, timed=within is not None)
@@ -282,20 +271,20 @@ def _robot(context: typer.Context) -> None:
     "--mount '*=-90deg' --motion wave.csv --out wave\n\n"
     "Example: servotwin robot run so101 --motion lerobot/svla_so101_pickplace --episode 3 --unit range "
     "--calibration follower.json --supply 12V:0.1ohm --out pick"))
+@with_records
 def run(
+    *,
     model_file: options.ModelArgument,
     motion: Annotated[Path, typer.Option(
         metavar="FILE", help="CSV file with a column time_s and one of each joint that moves (elbow_deg, elbow_rad, "
         "slider_mm), or the folder of a LeRobot dataset.", rich_help_panel=options.MOTION)],
     out: Annotated[Path, typer.Option(
         metavar="FOLDER", help="Folder for tables, pictures, video and page.", rich_help_panel=shared.OUTPUT)],
-    servo: options.ServoOption = None, mount: options.MountOption = None, model: options.ModelOption = None,
-    change: options.SetOption = None, register: options.RegisterOption = None, supply: options.SupplyOption = None,
+    servos: options.Servos,
     friction: options.FrictionOption = "refuse", contact: options.ContactOption = None,
-    package: options.PackageOption = None, calibration: options.CalibrationOption = None,
     episode: Annotated[int | None, typer.Option(
         metavar="NUMBER", help="Episode of the dataset (default: its first).", rich_help_panel=options.MOTION)] = None,
-    unit: options.UnitOption = None,
+    recorded: Annotated[options.Recorded, {"episode": LEFT_OUT}],
     hold: Annotated[str | None, typer.Option(
         metavar="HOW", help="What servos are told between samples: linear (default of tables) or previous (default of "
         "datasets, as LeRobot sends them).", rich_help_panel=options.MOTION)] = None,
@@ -316,20 +305,15 @@ def run(
         rich_help_panel=shared.OUTPUT)] = None,
     rate: Annotated[float, typer.Option(
         "--fps", metavar="HZ", help="Pictures of the video a second.", rich_help_panel=shared.OUTPUT)] = 25.0,
-    force: Annotated[bool, typer.Option(
-        "--force", help="Replace existing files.", rich_help_panel=shared.OUTPUT)] = False,
-    as_json: shared.JsonOption = False,
+    ending: shared.Ending,
 ) -> None:
     """Let a robot follow a motion, and say whether its servos are big enough."""
     from servotwin.cli import robot_report as files
     from servotwin.cli.robot_options import (
         as_options,
-        models_of,
-        mounts_of,
         overlap_of,
         packages_of,
         servos_at,
-        supply_of,
         units_of,
     )
     from servotwin.cli.robot_report import run_facts as facts
@@ -338,30 +322,31 @@ def run(
     from servotwin.robots.motion import is_dataset
 
     check_numbers(output_step=output_step, rate=rate, blend=blend)
-    plant, overlap = plant_of(model_file, packages_of(package or [])), overlap_of(contact)
+    plant, overlap = plant_of(model_file, packages_of(servos.package)), overlap_of(contact)
     joints = joint_names(plant.model)
     with as_options():
-        followed = _read(motion, joints, joint_ranges(plant.model), unit=units_of(unit or []), calibration=calibration,
-                         episode=episode)
-    chosen, left = servos_at(model_file, servo or [], plant, followed)
-    mounts = mounts_of(models_of(chosen, model, change or [], register or []), mount or [], joints)
-    bus = supply_of(supply)
-    if register:  # who says registers does not have them assumed
+        followed = _read(motion, joints, joint_ranges(plant.model), unit=units_of(recorded.unit),
+                         calibration=recorded.calibration, episode=episode)
+    chosen, left = servos_at(model_file, servos.servo, plant, followed)
+    mounts = servos.mounts(chosen, joints)
+    if servos.register:  # who says registers does not have them assumed
         followed = replace(followed, robot="")
     picture = check_drawing(plant.model, camera, video=video)
-    inputs = [Path(model_file), motion, *([] if calibration is None else [calibration])]
+    inputs = [Path(model_file), motion, *([] if recorded.calibration is None else [recorded.calibration])]
     with files.folder(out):
-        targets = files.targets_in(out, servos=len(mounts), picture=picture, video=video, force=force, inputs=inputs)
+        targets = files.targets_in(out, servos=len(mounts), picture=picture, video=video, force=ending.force,
+                                   inputs=inputs)
         with as_options():
-            done = run_motion(plant, mounts, followed, bus=bus, joint_friction=friction, timestep=timestep,
+            done = run_motion(plant, mounts, followed, bus=servos.bus, joint_friction=friction, timestep=timestep,
                               settle=settle, hold=hold or ("previous" if is_dataset(motion) else "linear"),
                               window=blend, overlap=overlap, progress=True)
             done = replace(done, said=(*done.said, *left))
             sized = sizing_of(done)
         found = facts(done, sized, model_file)
-        files.write_all(done, sized, targets, found, force=force, output_step=output_step, camera=camera, rate=rate)
+        files.write_all(done, sized, targets, found, force=ending.force, output_step=output_step, camera=camera,
+                        rate=rate)
     found["files"] = [str(target.path) for target in targets]
-    if as_json:
+    if ending.as_json:
         emit_json(found)
     else:
         _show_run(done, sized, found)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from servotwin.cli import shared_options as shared
+from servotwin.cli.records import LEFT_OUT, with_records
 from servotwin.cli.robot_options import ALL, Chosen, as_options, models_of, named_words, supply_of
 from servotwin.cli.terminal import emit_json, json_text, pairs, patience, show, table
 
@@ -29,7 +30,9 @@ if TYPE_CHECKING:
 _DRIVE, _WHEELS = "Waypoints", "Robot and servos"
 
 
+@with_records
 def mobile(
+    *,
     out: Annotated[Path, typer.Option(
         metavar="FOLDER", help="Folder for tables, pictures, video and page.", rich_help_panel=shared.OUTPUT)],
     task: Annotated[str, typer.Option(
@@ -62,9 +65,7 @@ def mobile(
         metavar="SECONDS", help="Time between rows of the tables.", rich_help_panel=shared.OUTPUT)] = 0.02,
     video: Annotated[bool, typer.Option(
         "--video/--no-video", help="Draw a video.", rich_help_panel=shared.OUTPUT)] = True,
-    force: Annotated[bool, typer.Option(
-        "--force", help="Replace existing files.", rich_help_panel=shared.OUTPUT)] = False,
-    as_json: shared.JsonOption = False,
+    ending: shared.Ending,
 ) -> None:
     """Let the mobile robot drive along waypoints."""
     from servotwin.cli import robot_report as files
@@ -80,13 +81,13 @@ def mobile(
     names = [*([] if ideal else [files.SERVOS]), written.PATH_TABLE, files.SUMMARY, written.PATHS,
              *files.drawn_names(picture=picture, video=video and picture), files.PAGE]
     with files.folder(out):
-        targets = files.targets_of(out, names, force=force)
+        targets = files.targets_of(out, names, force=ending.force)
         with as_options():
             run = _run(corners, servos, _wheel(servo), speed, lookahead, encoders, supply, ideal=ideal)
         found = written.mobile_facts(run, servo, encoders, unequal=unequal, ideal=ideal)
-        written.write(run, found, targets, output_step, force=force)
+        written.write(run, found, targets, output_step, force=ending.force)
     found["files"] = [str(target.path) for target in targets]
-    if as_json:
+    if ending.as_json:
         emit_json(found)
     else:
         show(f"mobile: {len(run.waypoints)} waypoints",
@@ -121,61 +122,51 @@ def _run(corners: Any, servos: Sequence[Model], nominal: Model, speed: float, lo
 _TASK, _ARM = "Task", "Arm and servos"
 _SERVO = "hitec-hs-755hb"
 
-TaskOption = Annotated[str, typer.Option(
-    metavar="TASK", help="What the tool does: circle, square or pick-and-place.", rich_help_panel=_TASK)]
-SizeOption = Annotated[str | None, typer.Option(
-    metavar="LENGTH", help="Radius of the circle, half of the side of the square, half of the way over, such as 40mm "
-    "(default).", rich_help_panel=_TASK)]
 SpeedOption = Annotated[float, typer.Option(
     metavar="M/S", help="Of the tool along its path.", rich_help_panel=_TASK)]
-ServoOption = Annotated[list[str] | None, typer.Option(
-    metavar="[JOINT=]ID", help=f"Servo of all joints, or of one; repeatable: catalog id, or path of a servo file "
-    f"(default: {_SERVO}).", rich_help_panel=_ARM)]
-ModelOption = Annotated[str | None, typer.Option(
-    metavar="MODEL", help="digital, pulse, pulse-inductive, bounded or averaged (default: by the kind of each servo).",
-    rich_help_panel=_ARM)]
-ControllerOption = Annotated[str, typer.Option(
-    metavar="NAME", help="What commands the servos: plain, feedforward, pid, computed-torque or "
-    "observer; the last three bypass the chips.", rich_help_panel=_ARM)]
-SetOption = Annotated[list[str] | None, typer.Option(
-    "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of all servos; repeatable; with a unit, or in SI "
-    "units.", rich_help_panel=_ARM)]
-SupplyOption = Annotated[str | None, typer.Option(
-    metavar=shared.SUPPLY_FORM, help=f"Supply that all servos share: {shared.SUPPLY_HELP} (default: each its own).",
-    rich_help_panel=_ARM)]
-PayloadOption = Annotated[str | None, typer.Option(
-    metavar="MASS", help="That the tool carries, such as 100g (default: none).", rich_help_panel=_ARM)]
-IdealOption = Annotated[bool, typer.Option(
-    "--ideal", help="With ideal actuators instead of servos.", rich_help_panel=_ARM)]
 OutOption = Annotated[Path, typer.Option(
     metavar="FOLDER", help="Folder for tables, pictures, video and page.", rich_help_panel=shared.OUTPUT)]
-StepOption = Annotated[float, typer.Option(
-    metavar="SECONDS", help="Time between rows of the tables.", rich_help_panel=shared.OUTPUT)]
-VideoOption = Annotated[bool, typer.Option(
-    "--video/--no-video", help="Draw a video.", rich_help_panel=shared.OUTPUT)]
-ForceOption = Annotated[bool, typer.Option(
-    "--force", help="Replace existing files.", rich_help_panel=shared.OUTPUT)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
-    """What the options of a command say, in its words."""
+    """The options that say what an arm does, and with which servos, as they were typed."""
 
-    out: Path
-    task: str
-    size: str | None
-    speed: float
-    servo: list[str]
-    model: str | None
-    controller: str
-    redundancy: str = "none"
-    ideal: bool
-    supply: str | None
-    change: list[str]
-    output_step: float
-    video: bool
-    force: bool
-    as_json: bool
+    out: OutOption
+    task: Annotated[str, typer.Option(
+        metavar="TASK", help="What the tool does: circle, square or pick-and-place.", rich_help_panel=_TASK)] = "circle"
+    size: Annotated[str | None, typer.Option(
+        metavar="LENGTH", help="Radius of the circle, half of the side of the square, half of the way over, such as "
+        "40mm (default).", rich_help_panel=_TASK)] = None
+    speed: SpeedOption = 0.08
+    servo: Annotated[Sequence[str], typer.Option(
+        metavar="[JOINT=]ID", help=f"Servo of all joints, or of one; repeatable: catalog id, or path of a servo file "
+        f"(default: {_SERVO}).", rich_help_panel=_ARM)] = ()
+    model: Annotated[str | None, typer.Option(
+        metavar="MODEL", help="digital, pulse, pulse-inductive, bounded or averaged (default: by the kind of each "
+        "servo).", rich_help_panel=_ARM)] = None
+    controller: Annotated[str, typer.Option(
+        metavar="NAME", help="What commands the servos: plain, feedforward, pid, computed-torque or "
+        "observer; the last three bypass the chips.", rich_help_panel=_ARM)] = "plain"
+    redundancy: Annotated[str, typer.Option(
+        metavar="CRITERION", help="What the third link is used for: none (joints move little), limits (far from the "
+        "joints' limits) or torque (little torque).", rich_help_panel=_ARM)] = "none"
+    payload: Annotated[str | None, typer.Option(
+        metavar="MASS", help="That the tool carries, such as 100g (default: none).", rich_help_panel=_ARM)] = None
+    ideal: Annotated[bool, typer.Option(
+        "--ideal", help="With ideal actuators instead of servos.", rich_help_panel=_ARM)] = False
+    supply: Annotated[str | None, typer.Option(
+        metavar=shared.SUPPLY_FORM, help=f"Supply that all servos share: {shared.SUPPLY_HELP} (default: each its own).",
+        rich_help_panel=_ARM)] = None
+    change: Annotated[Sequence[str], typer.Option(
+        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of all servos; repeatable; with a unit, or in SI "
+        "units.", rich_help_panel=_ARM)] = ()
+    output_step: Annotated[float, typer.Option(
+        metavar="SECONDS", help="Time between rows of the tables.", rich_help_panel=shared.OUTPUT)] = 0.01
+    video: Annotated[bool, typer.Option(
+        "--video/--no-video", help="Draw a video.", rich_help_panel=shared.OUTPUT)] = True
+    force: shared.ForceOption = False
+    as_json: shared.JsonOption = False
 
 
 class Ways(NamedTuple):
@@ -185,44 +176,29 @@ class Ways(NamedTuple):
     others: Mapping[str, JointPath]
 
 
+@with_records
 def scara(
-    out: OutOption, task: TaskOption = "circle", size: SizeOption = None, speed: SpeedOption = 0.08,
-    servo: ServoOption = None, model: ModelOption = None, controller: ControllerOption = "plain",
+    *, asked: Asked,
     third_link: Annotated[bool, typer.Option(
         "--third-link/--no-third-link", help="With the third link, which makes it redundant.",
         rich_help_panel=_ARM)] = True,
-    redundancy: Annotated[str, typer.Option(
-        metavar="CRITERION", help="What the third link is used for: none (joints move little), limits (far from the "
-        "joints' limits) or torque (little torque).", rich_help_panel=_ARM)] = "none",
-    payload: PayloadOption = None, ideal: IdealOption = False, supply: SupplyOption = None, change: SetOption = None,
-    output_step: StepOption = 0.01, video: VideoOption = True, force: ForceOption = False,
-    as_json: shared.JsonOption = False,
 ) -> None:
     """Let the SCARA robot do a task."""
     from servotwin.robots import scara as made
 
     with as_options():
-        arm = made(third_link=third_link, payload=mass(payload))
-    _do(arm, Asked(out=out, task=task, size=size, speed=speed, servo=servo or [], model=model, controller=controller,
-                   redundancy=redundancy, ideal=ideal, supply=supply, change=change or [], output_step=output_step,
-                   video=video, force=force, as_json=as_json))
+        arm = made(third_link=third_link, payload=mass(asked.payload))
+    _do(arm, asked)
 
 
-def two_link(
-    out: OutOption, task: TaskOption = "circle", size: SizeOption = None, speed: SpeedOption = 0.08,
-    servo: ServoOption = None, model: ModelOption = None, controller: ControllerOption = "plain",
-    payload: PayloadOption = None, ideal: IdealOption = False, supply: SupplyOption = None, change: SetOption = None,
-    output_step: StepOption = 0.01, video: VideoOption = True, force: ForceOption = False,
-    as_json: shared.JsonOption = False,
-) -> None:
+@with_records
+def two_link(*, asked: Annotated[Asked, {"redundancy": LEFT_OUT}]) -> None:
     """Let the two-link arm do a task."""
     from servotwin.robots import two_link as made
 
     with as_options():
-        arm = made(payload=mass(payload))
-    _do(arm, Asked(out=out, task=task, size=size, speed=speed, servo=servo or [], model=model, controller=controller,
-                   ideal=ideal, supply=supply, change=change or [], output_step=output_step, video=video, force=force,
-                   as_json=as_json))
+        arm = made(payload=mass(asked.payload))
+    _do(arm, asked)
 
 
 def add_to(robot: typer.Typer) -> None:
@@ -343,8 +319,9 @@ _TABLE, _SUMMARY, _PICTURE, _PAGE = "compare.csv", "summary.json", "conditions.p
 _WHAT = "What to compare"
 
 
+@with_records
 def compare(
-    out: OutOption,
+    *, out: OutOption,
     robot: Annotated[list[str] | None, typer.Option(
         metavar="ROBOT", help="scara or two-link; repeatable (default: both).", rich_help_panel=_WHAT)] = None,
     task: Annotated[list[str] | None, typer.Option(
@@ -356,7 +333,7 @@ def compare(
         rich_help_panel=_WHAT)] = "hitec-hs-755hb",
     bus_servo: Annotated[str, typer.Option(
         metavar="ID", help="Digital servo that it is compared with.", rich_help_panel=_WHAT)] = "feetech-sts3215-12v",
-    force: ForceOption = False, as_json: shared.JsonOption = False,
+    ending: shared.Ending,
 ) -> None:
     """Compare controllers on all tasks by all fidelities, and when it gets hard."""
     from servotwin.cli import robot_report as files
@@ -367,12 +344,12 @@ def compare(
     chosen = _cases(robot, task)
     comparison = Comparison(servo=servo_of(servo, []), bus_servo=servo_of(bus_servo, []), speed=speed)
     with files.folder(out):
-        targets = files.targets_of(out, [_TABLE, _SUMMARY, _PICTURE, _PAGE], force=force)
-        done = _outcomes(comparison, chosen, quiet=as_json)
+        targets = files.targets_of(out, [_TABLE, _SUMMARY, _PICTURE, _PAGE], force=ending.force)
+        done = _outcomes(comparison, chosen, quiet=ending.as_json)
         found = words.comparison_facts(comparison, done)
-        _write(done, found, targets, force=force)
+        _write(done, found, targets, force=ending.force)
     found["files"] = [str(target.path) for target in targets]
-    if as_json:
+    if ending.as_json:
         emit_json(found)
         return
     show("distance of the tool from where it should be, rms, by pulse servos, mean of all tasks",

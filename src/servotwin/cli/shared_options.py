@@ -1,7 +1,4 @@
-"""What the commands that run a servo ask for in the same words; the defaults stand in each command's signature.
-
-An option whose help differs from command to command (unit, model, load, seed ...) is declared by the command itself.
-"""
+"""What the commands that run a servo ask for in the same words: groups of options as records, and single options."""
 
 from __future__ import annotations
 
@@ -9,6 +6,7 @@ import contextlib
 import re
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple, Protocol
 
@@ -18,9 +16,11 @@ from servotwin.cli import interrupts
 from servotwin.errors import ParameterError
 
 if TYPE_CHECKING:
+    from servotwin.loads import Load
     from servotwin.models import Model
     from servotwin.parameters import Servo
     from servotwin.parameters.servo import Value
+    from servotwin.signals import Signal
 
 
 
@@ -328,57 +328,30 @@ def with_registers(servo: Servo, words: Sequence[str]) -> Servo:
         return REGISTER_FAMILIES[family](given.values, servo=servo) if given.values else servo
 
 
-# --- What the commands that run a servo ask for in the same words; the defaults stand in each command's ---------------
+# --- Options in the same words: groups as records, and single ones ----------------------------------------------------
 
 COMMAND, PLANT, OUTPUT = "Command (one of)", "Servo and load", "Run and output"  # panels of the help
+LOGS = "Logs and servo"
 
 ServoArgument = Annotated[str, typer.Argument(help="Catalog id, or path of a servo file (.toml).")]
-StepOption = Annotated[str | None, typer.Option(
-    metavar="BEFORE:AFTER", help="Step at time --at.", rich_help_panel=COMMAND)]
-RampOption = Annotated[str | None, typer.Option(
-    metavar="BEFORE:AFTER", help="Ramp that starts at --at and takes --over seconds.", rich_help_panel=COMMAND)]
-SineOption = Annotated[str | None, typer.Option(
-    metavar="MEAN:AMPLITUDE:HZ", help="Sine.", rich_help_panel=COMMAND)]
-ChirpOption = Annotated[str | None, typer.Option(
-    metavar="MEAN:AMPLITUDE:HZ:HZ", help="Sine whose frequency changes from the first to the second during the run.",
-    rich_help_panel=COMMAND)]
-PrbsOption = Annotated[str | None, typer.Option(
-    metavar="LOW:HIGH:SECONDS", help="Pseudo-random sequence of two values, with the bit time.",
-    rich_help_panel=COMMAND)]
-ConstantOption = Annotated[str | None, typer.Option(
-    metavar="VALUE", help="Constant value.", rich_help_panel=COMMAND)]
-PulsesOption = Annotated[Path | None, typer.Option(
-    metavar="FILE.csv", help="Individual pulses: columns time_s (rising edge), pulse_width_us.",
-    rich_help_panel=COMMAND)]
-CommandOption = Annotated[Path | None, typer.Option(
-    metavar="FILE.csv", help="Samples: columns time_s and pulse_width_us, command_angle_deg or command_voltage_V.",
-    rich_help_panel=COMMAND)]
-AtOption = Annotated[float | None, typer.Option(
-    metavar="SECONDS", help="Start time of a step or ramp (default 0.1).", rich_help_panel=COMMAND)]
-OverOption = Annotated[float | None, typer.Option(
-    metavar="SECONDS", help="Duration of a ramp.", rich_help_panel=COMMAND)]
-HoldOption = Annotated[str | None, typer.Option(
-    metavar="HOW", help="Between samples of --command: previous (default) or linear.",
-    rich_help_panel=COMMAND)]
-ColumnOption = Annotated[str | None, typer.Option(
-    metavar="NAME", help="Column of --command to use, if it has several commands.",
-    rich_help_panel=COMMAND)]
+SeedOption = Annotated[int, typer.Option(
+    metavar="NUMBER", help="Seed for the noise of the potentiometer.", rich_help_panel=PLANT)]
 DurationOption = Annotated[float, typer.Option(
     metavar="SECONDS", help="Time to simulate.", rich_help_panel=OUTPUT)]
-RegisterOption = Annotated[list[str] | None, typer.Option(
+RegisterOption = Annotated[Sequence[str], typer.Option(
     metavar="NAME=VALUE", help="Write a register of a bus servo (Feetech STS, Dynamixel), such as P_Coefficient=16, or "
     "a set: lerobot, lerobot-gripper; repeatable, or with commas.", rich_help_panel=PLANT)]
-LogRegisterOption = Annotated[list[str] | None, typer.Option(
+LogRegisterOption = Annotated[Sequence[str], typer.Option(
     "--register", metavar="NAME=VALUE", help="Registers that the bus servo had (Feetech STS, Dynamixel), such as "
     "P_Coefficient=16, or a set: lerobot, lerobot-gripper; repeatable, or with commas. Of datasets of an SO-100 or "
-    "SO-101 lerobot is assumed unless given.", rich_help_panel="Logs and servo")]
+    "SO-101 lerobot is assumed unless given.", rich_help_panel=LOGS)]
 SUPPLY_FORM = "VOLTS[:OHMS][:AMPERES]"
 SUPPLY_HELP = "usb (5 V, 0.5 A), or a voltage with resistance and limit of current, such as 12V:0.1ohm or 5V:0.5A"
 SupplyOption = Annotated[str | None, typer.Option(
     metavar=SUPPLY_FORM, help=f"Supply of the servo: {SUPPLY_HELP} (default: its own).", rich_help_panel=PLANT)]
 LogSupplyOption = Annotated[str | None, typer.Option(
     "--supply", metavar=SUPPLY_FORM, help=f"Supply that the servo had: {SUPPLY_HELP} (default: its own); a voltage "
-    "that a log has beside it comes before.", rich_help_panel="Logs and servo")]
+    "that a log has beside it comes before.", rich_help_panel=LOGS)]
 SchedulerOption = Annotated[str | None, typer.Option(
     metavar="ADDRESS", help="Run on the workers of a dask scheduler, such as tcp://host:8786.", rich_help_panel=OUTPUT)]
 _ACCURACY = typer.Option(
@@ -386,5 +359,224 @@ _ACCURACY = typer.Option(
     rich_help_panel=OUTPUT)
 AccuracyOption = Annotated[float, _ACCURACY]
 UsualAccuracyOption = Annotated[float | None, _ACCURACY]
+ForceOption = Annotated[bool, typer.Option("--force", help="Replace existing files.", rich_help_panel=OUTPUT)]
 JsonOption = Annotated[bool, typer.Option(
     "--json", help="Print the summary as JSON, in SI units.", rich_help_panel=OUTPUT)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ending:
+    """How a command ends: what it does with files that exist, and the form of what it prints."""
+
+    force: ForceOption = False
+    as_json: JsonOption = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plant:
+    """The options that say what a servo is and what hangs on it, as they were typed."""
+
+    model: Annotated[str | None, typer.Option(
+        metavar="MODEL", help="digital, pulse, pulse-inductive or bounded (default: by the kind of the servo).",
+        rich_help_panel=PLANT)] = None
+    load: Annotated[Sequence[str], typer.Option(
+        metavar="PART=VALUE", help="Load on the shaft, as in servotwin simulate.", rich_help_panel=PLANT)] = ()
+    change: Annotated[Sequence[str], typer.Option(
+        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter; repeatable.", rich_help_panel=PLANT)] = ()
+    register: RegisterOption = ()
+    supply: SupplyOption = None
+
+    def of(self, servo: str, among: Sequence[str] | None = None) -> Model:
+        """Return the model of a servo (see `model_of`)."""
+        return model_of(servo, self.model, self.change, among, self.register, self.supply)
+
+    def load_on(self, model: Model) -> Load:
+        """Return what hangs on a servo."""
+        from servotwin.cli.option_values import load_from
+
+        return load_from(self.load, model)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoggedServo:
+    """The options that say what the servo of a log was, as they were typed."""
+
+    change: Annotated[Sequence[str], typer.Option(
+        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable; with a unit, or "
+        "in SI units.", rich_help_panel=LOGS)] = ()
+    register: LogRegisterOption = ()
+    supply: LogSupplyOption = None
+
+
+_DEFAULT_UNIT = "deg"
+_DEFAULT_AT = 0.1  # s: late enough that a plot shows what was before
+_SHAPES = ("step", "ramp", "sine", "chirp", "prbs", "constant", "pulses", "command")
+# option -> shapes that it belongs to
+_BELONGS = {
+    "unit": ("step", "ramp", "sine", "chirp", "prbs", "constant"),
+    "at": ("step", "ramp"),
+    "over": ("ramp",),
+    "hold": ("command",),
+    "column": ("command",),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommandWords:
+    """The options that say what is commanded, as they were typed; None where they were not.
+
+    Parameters
+    ----------
+    step, ramp, sine, chirp, prbs, constant : str, optional
+        Numbers with colons between them.
+    pulses, command : Path, optional
+        CSV files.
+    unit : str, optional
+        Of the numbers; degrees unless given.
+    at, over : float, optional
+        When a step or ramp begins, and how long a ramp takes [s].
+    hold : str, optional
+        Between the samples of a file: "previous" or "linear".
+    column : str, optional
+        Which column of a file of samples, where it has several commands.
+
+    Examples
+    --------
+    >>> CommandWords(step="0:90").described(1.0)
+    'step 0 to 90 deg at 0.1 s'
+    """
+
+    step: Annotated[str | None, typer.Option(
+        metavar="BEFORE:AFTER", help="Step at time --at.", rich_help_panel=COMMAND)] = None
+    ramp: Annotated[str | None, typer.Option(
+        metavar="BEFORE:AFTER", help="Ramp that starts at --at and takes --over seconds.",
+        rich_help_panel=COMMAND)] = None
+    sine: Annotated[str | None, typer.Option(
+        metavar="MEAN:AMPLITUDE:HZ", help="Sine.", rich_help_panel=COMMAND)] = None
+    chirp: Annotated[str | None, typer.Option(
+        metavar="MEAN:AMPLITUDE:HZ:HZ", help="Sine whose frequency changes from the first to the second during the "
+        "run.", rich_help_panel=COMMAND)] = None
+    prbs: Annotated[str | None, typer.Option(
+        metavar="LOW:HIGH:SECONDS", help="Pseudo-random sequence of two values, with the bit time.",
+        rich_help_panel=COMMAND)] = None
+    constant: Annotated[str | None, typer.Option(
+        metavar="VALUE", help="Constant value.", rich_help_panel=COMMAND)] = None
+    pulses: Annotated[Path | None, typer.Option(
+        metavar="FILE.csv", help="Individual pulses: columns time_s (rising edge), pulse_width_us.",
+        rich_help_panel=COMMAND)] = None
+    command: Annotated[Path | None, typer.Option(
+        metavar="FILE.csv", help="Samples: columns time_s and pulse_width_us, command_angle_deg or command_voltage_V.",
+        rich_help_panel=COMMAND)] = None
+    unit: Annotated[str | None, typer.Option(
+        metavar="UNIT", help="Unit of the command: deg (default), rad, us, ms, s, V or mV.",
+        rich_help_panel=COMMAND)] = None
+    at: Annotated[float | None, typer.Option(
+        metavar="SECONDS", help="Start time of a step or ramp (default 0.1).", rich_help_panel=COMMAND)] = None
+    over: Annotated[float | None, typer.Option(
+        metavar="SECONDS", help="Duration of a ramp.", rich_help_panel=COMMAND)] = None
+    hold: Annotated[str | None, typer.Option(
+        metavar="HOW", help="Between samples of --command: previous (default) or linear.",
+        rich_help_panel=COMMAND)] = None
+    column: Annotated[str | None, typer.Option(
+        metavar="NAME", help="Column of --command to use, if it has several commands.", rich_help_panel=COMMAND)] = None
+
+    @property
+    def shape(self) -> str:
+        """The one shape that was asked for.
+
+        Raises
+        ------
+        CommandError
+            If none was, or several were, or an option does not belong to it.
+        """
+        from servotwin.errors import CommandError
+
+        given = [f.name for f in fields(self) if getattr(self, f.name) is not None]
+        shapes = [name for name in given if name in _SHAPES]
+        everything = ", ".join(f"--{name}" for name in _SHAPES)
+        if not shapes:
+            raise CommandError(f"no command is given; use one of {everything}")
+        if len(shapes) > 1:
+            raise CommandError("commands contradict", got=", ".join(f"--{name}" for name in shapes),
+                               allowed=f"one of {everything}")
+        for name, owners in _BELONGS.items():
+            if name in given and shapes[0] not in owners:
+                fitting = ", ".join(f"--{owner}" for owner in owners)
+                raise CommandError(f"--{name} goes with {fitting}, not with --{shapes[0]}")
+        if self.at is not None and self.at < 0.0:
+            raise CommandError(f"--at: got {self.at:g}, allowed: 0 s or later")
+        if shapes[0] == "ramp" and self.over is None:
+            raise CommandError("--ramp needs --over SECONDS, how long it takes")
+        return shapes[0]
+
+    @property
+    def inputs(self) -> list[Path]:
+        """Files that are read."""
+        return [path for path in (self.pulses, self.command) if path is not None]
+
+    def described(self, duration: float) -> str:
+        """Return the command in words; `duration` [s] is that of the run."""
+        unit = self.unit or _DEFAULT_UNIT
+        at = _DEFAULT_AT if self.at is None else self.at
+        values = [f"{x:zg}" for x in self._values()]
+        match self.shape:
+            case "step":
+                return f"step {values[0]} to {values[1]} {unit} at {at:g} s"
+            case "ramp":
+                return f"ramp {values[0]} to {values[1]} {unit} from {at:g} s on, over {self.over:g} s"
+            case "sine":
+                return f"sine {values[0]} ± {values[1]} {unit} at {values[2]} Hz"
+            case "chirp":
+                return f"chirp {values[0]} ± {values[1]} {unit} from {values[2]} to {values[3]} Hz in {duration:g} s"
+            case "prbs":
+                return f"random sequence of {values[0]} and {values[1]} {unit}, bits of {values[2]} s"
+            case "constant":
+                return f"constant {values[0]} {unit}"
+            case "pulses":
+                return f"pulses of {self.pulses}"
+        return f"samples of {self.command}, {self.hold or 'previous'}"
+
+    def signal(self, duration: float) -> Signal:
+        """Return the signal for a run of `duration` [s].
+
+        Raises
+        ------
+        CommandError
+            If a number or a file is not usable.
+        """
+        from servotwin import signals
+        from servotwin.cli.option_values import pulses_of
+
+        unit = self.unit or _DEFAULT_UNIT
+        at = _DEFAULT_AT if self.at is None else self.at
+        values = self._values()
+        match self.shape:
+            case "step":
+                return signals.step(values[0], values[1], at=at, unit=unit)
+            case "ramp":
+                return signals.ramp(values[0], values[1], at=at, over=self.over or 0.0, unit=unit)
+            case "sine":
+                return signals.sine(mean=values[0], amplitude=values[1], frequency=values[2], unit=unit)
+            case "chirp":
+                return signals.chirp(mean=values[0], amplitude=values[1], start_frequency=values[2],
+                                     end_frequency=values[3], duration=duration, unit=unit)
+            case "prbs":
+                return signals.prbs(values[0], values[1], bit_time=values[2], duration=duration, unit=unit)
+            case "constant":
+                return signals.constant(values[0], unit=unit)
+            case "pulses":
+                return pulses_of(Path(self.pulses or ""))
+        return signals.from_csv(Path(self.command or ""), column=self.column, hold=self.hold or "previous")
+
+    def _values(self) -> list[float]:
+        from servotwin.cli.option_values import numbers
+
+        forms = {
+            "step": ("BEFORE", "AFTER"), "ramp": ("BEFORE", "AFTER"), "constant": ("VALUE",),
+            "sine": ("MEAN", "AMPLITUDE", "HZ"), "chirp": ("MEAN", "AMPLITUDE", "HZ_START", "HZ_END"),
+            "prbs": ("LOW", "HIGH", "BIT_SECONDS"),
+        }
+        shape = self.shape
+        if shape not in forms:
+            return []
+        return numbers(f"--{shape}", getattr(self, shape), forms[shape], alone="numbers alone; --unit says the unit")

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.shared_options import model_of
+from servotwin.cli.records import with_records
 from servotwin.cli.terminal import emit_json, pairs, patience, show
 
 if TYPE_CHECKING:
-    from servotwin.cli.option_values import CommandWords
     from servotwin.cli.outputs import Target
     from servotwin.models import Model
     from servotwin.signals import Signal
@@ -25,40 +25,21 @@ _LONGEST_RANGED = 5.0  # s: beyond it the ranges of guesses would take too long
 _MOST_FRAMES = 1e6  # they take an hour, and each is kept for metrics and energy
 
 
+@with_records
 def simulate(
+    *,
     servo: shared.ServoArgument,
-    step: shared.StepOption = None,
-    ramp: shared.RampOption = None,
-    sine: shared.SineOption = None,
-    chirp: shared.ChirpOption = None,
-    prbs: shared.PrbsOption = None,
-    constant: shared.ConstantOption = None,
-    pulses: shared.PulsesOption = None,
-    command: shared.CommandOption = None,
-    unit: Annotated[str | None, typer.Option(
-        metavar="UNIT", help="Unit of the command: deg (default), rad, us, ms, s, V or mV.",
-        rich_help_panel=shared.COMMAND)] = None,
-    at: shared.AtOption = None,
-    over: shared.OverOption = None,
-    hold: shared.HoldOption = None,
-    column: shared.ColumnOption = None,
-    model: Annotated[str | None, typer.Option(
-        metavar="MODEL", help="digital, pulse, pulse-inductive, bounded, averaged, averaged-inductive, geared-motor or "
-        "dc-motor (default: by the kind of the servo, pulse or digital; bounded if its file has no chip).",
-        rich_help_panel=shared.PLANT)] = None,
-    load: Annotated[list[str] | None, typer.Option(
-        metavar="PART=VALUE", help="Load on the shaft, repeatable or with commas, in SI or with a unit: inertia=, "
-        "viscous=, torque=0.5kgf.cm, coulomb=; arm=0.5kg:10cm, horizontal in the middle of the travel; SI only: "
-        "pendulum=MASS:LENGTH or MASS:LENGTH:HANGING_DEG, spring=STIFFNESS or STIFFNESS:REST_DEG, "
-        "recorded=FILE.csv (columns time_s, torque_Nm).", rich_help_panel=shared.PLANT)] = None,
-    change: Annotated[list[str] | None, typer.Option(
-        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter, add one that the servo lacks, such as "
-        "supply.current_limit=1A; repeatable; with a unit, or in SI units.",
-        rich_help_panel=shared.PLANT)] = None,
-    register: shared.RegisterOption = None,
-    supply: shared.SupplyOption = None,
-    seed: Annotated[int, typer.Option(
-        metavar="NUMBER", help="Seed for the noise of the potentiometer.", rich_help_panel=shared.PLANT)] = 0,
+    words: shared.CommandWords,
+    plant: Annotated[shared.Plant, {
+        "model": "digital, pulse, pulse-inductive, bounded, averaged, averaged-inductive, geared-motor or dc-motor "
+        "(default: by the kind of the servo, pulse or digital; bounded if its file has no chip).",
+        "load": "Load on the shaft, repeatable or with commas, in SI or with a unit: inertia=, viscous=, "
+        "torque=0.5kgf.cm, coulomb=; arm=0.5kg:10cm, horizontal in the middle of the travel; SI only: "
+        "pendulum=MASS:LENGTH or MASS:LENGTH:HANGING_DEG, spring=STIFFNESS or STIFFNESS:REST_DEG, recorded=FILE.csv "
+        "(columns time_s, torque_Nm).",
+        "change": "Change a parameter, add one that the servo lacks, such as supply.current_limit=1A; repeatable; with "
+        "a unit, or in SI units."}],
+    seed: shared.SeedOption = 0,
     duration: shared.DurationOption = 1.5,
     output_step: Annotated[float | None, typer.Option(
         metavar="SECONDS", help="Time between output samples (default 0.001); does not change the solution.",
@@ -67,29 +48,23 @@ def simulate(
         metavar="FILE.csv", help="Write all signals.", rich_help_panel=shared.OUTPUT)] = None,
     plot: Annotated[Path | None, typer.Option(
         metavar="FILE", help="Draw the response: .png, .svg or .pdf.", rich_help_panel=shared.OUTPUT)] = None,
-    force: Annotated[bool, typer.Option(
-        "--force", help="Replace existing files.", rich_help_panel=shared.OUTPUT)] = False,
-    as_json: shared.JsonOption = False,
+    ending: shared.Ending,
 ) -> None:
     """Simulate one servo under one command and one load."""
     from servotwin.cli import option_values
-    from servotwin.cli.option_values import CommandWords
 
-    words = CommandWords(step=step, ramp=ramp, sine=sine, chirp=chirp, prbs=prbs, constant=constant, pulses=pulses,
-                         command=command, unit=unit, at=at, over=over, hold=hold, column=column)
-    targets = _checked_targets(out, plot, servo, words, load or [], force=force)
-    made = model_of(servo, model, change or [], register=register or [], supply=supply)
-    result = _run(made, words, load or [], duration, output_step, seed)
-    found = _write(result, targets, force=force)
+    targets = _checked_targets(out, plot, servo, words, plant.load, force=ending.force)
+    result = _run(plant.of(servo), words, plant, duration, output_step, seed)
+    found = _write(result, targets, force=ending.force)
     if duration <= _LONGEST_RANGED:
-        found |= _ranges(result, words.signal(duration), found, load or [], seed)
+        found |= _ranges(result, words.signal(duration), found, plant, seed)
     found |= {"remedies": _remedies(result), "command": words.described(duration),
-              "load": option_values.described(load or []), "files": [str(target.path) for target in targets]}
-    _report(found, as_json=as_json)
+              "load": option_values.described(plant.load), "files": [str(target.path) for target in targets]}
+    _report(found, as_json=ending.as_json)
 
 
-def _checked_targets(out: Path | None, plot: Path | None, servo: str, words: CommandWords, load: list[str], *,
-                     force: bool) -> list[Target]:
+def _checked_targets(out: Path | None, plot: Path | None, servo: str, words: shared.CommandWords, load: Sequence[str],
+                     *, force: bool) -> list[Target]:
     from servotwin.cli.option_values import recorded_files
     from servotwin.cli.outputs import Target, check_targets
 
@@ -102,10 +77,8 @@ def _checked_targets(out: Path | None, plot: Path | None, servo: str, words: Com
     return targets
 
 
-
-def _run(model: Model, words: CommandWords, load: list[str], duration: float, output_step: float | None,
+def _run(model: Model, words: shared.CommandWords, plant: shared.Plant, duration: float, output_step: float | None,
          seed: int) -> Result:
-    from servotwin.cli.option_values import load_from
     from servotwin.errors import InputError
     from servotwin.simulation import simulate as run
 
@@ -115,7 +88,7 @@ def _run(model: Model, words: CommandWords, load: list[str], duration: float, ou
         raise InputError("--output-step", got=output_step, allowed="a positive number of seconds")
     signal = words.signal(duration)
     _check_length(model, signal, duration)
-    result = run(model, signal, duration=duration, load=load_from(load, model), output_step=output_step, seed=seed,
+    result = run(model, signal, duration=duration, load=plant.load_on(model), output_step=output_step, seed=seed,
                  progress=True)
     return result.raise_if_failed()
 
@@ -160,9 +133,9 @@ def _remedies(result: Result) -> list[dict[str, Any]]:
     return [remedy._asdict() for remedy in found.remedies]
 
 
-def _ranges(result: Result, signal: Signal, found: dict[str, Any], load: list[str], seed: int) -> dict[str, Any]:
+def _ranges(result: Result, signal: Signal, found: dict[str, Any], plant: shared.Plant, seed: int
+            ) -> dict[str, Any]:
     """Return the ranges of what rests on guesses, and these."""
-    from servotwin.cli.option_values import load_from
     from servotwin.cli.summary import facts, figures
     from servotwin.datasheet.holding import guesses, spans, variants
     from servotwin.simulation import simulate as run
@@ -171,7 +144,7 @@ def _ranges(result: Result, signal: Signal, found: dict[str, Any], load: list[st
     with patience("simulating with guesses at the ends of their ranges"), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # said of the servo as it is
         for each in variants(result.model, rotor=True):
-            other = run(each, signal, duration=float(result.time[-1]), load=load_from(load, each), seed=seed,
+            other = run(each, signal, duration=float(result.time[-1]), load=plant.load_on(each), seed=seed,
                         output_times=[0.0, float(result.time[-1])])
             others.append(figures(facts(other)))
     own = figures(found)

@@ -7,6 +7,7 @@ import contextlib
 import logging
 import warnings
 from collections.abc import Iterator
+from dataclasses import asdict, dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.shared_options import model_of
+from servotwin.cli.records import LEFT_OUT, with_records
 from servotwin.cli.terminal import emit_json, patience, show
 from servotwin.errors import InputError, MissingExtraError
 
@@ -75,35 +76,40 @@ async def _greeted(address: str) -> None:
 _VARIED = "What varies"
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Lanes:
+    """The options of `servotwin.studies.sweep` that it has by the same names."""
+
+    lanes: Annotated[int | None, typer.Option(
+        metavar="NUMBER", help="Number of servos (default 1000, or all rows of --draws).",
+        rich_help_panel=_VARIED)] = None
+    sampling: Annotated[str, typer.Option(
+        metavar="HOW", help="latin-hypercube, sobol or random.", rich_help_panel=_VARIED)] = "latin-hypercube"
+    truncate: Annotated[bool, typer.Option(
+        "--truncate", help="Truncate distributions to the physical range.", rich_help_panel=_VARIED)] = False
+    seed: Annotated[int, typer.Option(
+        metavar="NUMBER", help="Seed for everything random.", rich_help_panel=_VARIED)] = 0
+    duration: shared.DurationOption = 1.5
+    output_step: Annotated[float, typer.Option(
+        metavar="SECONDS", help="Time between samples used for the metrics.", rich_help_panel=shared.OUTPUT)] = 0.01
+    file_format: Annotated[str, typer.Option(
+        "--format", metavar="FORMAT", help="Format of lanes: csv or parquet.", rich_help_panel=shared.OUTPUT)] = "csv"
+    resume: Annotated[bool, typer.Option(
+        "--resume", help="Continue the unfinished study in --out.", rich_help_panel=shared.OUTPUT)] = False
+
+
+@with_records
 def sweep(
+    *,
     servo: shared.ServoArgument,
-    step: shared.StepOption = None,
-    ramp: shared.RampOption = None,
-    sine: shared.SineOption = None,
-    chirp: shared.ChirpOption = None,
-    prbs: shared.PrbsOption = None,
-    constant: shared.ConstantOption = None,
-    pulses: shared.PulsesOption = None,
-    command: shared.CommandOption = None,
-    unit: Annotated[str | None, typer.Option(
-        metavar="UNIT", help="Unit of the command: deg (default), rad, us, ms, s, V or mV. An angle becomes a pulse "
-        "through each servo's own calibration; us, ms and s give all servos the same pulse.",
-        rich_help_panel=shared.COMMAND)] = None,
-    at: shared.AtOption = None,
-    over: shared.OverOption = None,
-    hold: shared.HoldOption = None,
-    column: shared.ColumnOption = None,
-    model: Annotated[str | None, typer.Option(
-        metavar="MODEL", help="digital, pulse, pulse-inductive or bounded (default: by the kind of the servo, pulse or "
-        "digital; bounded if its file has no chip).", rich_help_panel=shared.PLANT)] = None,
-    load: Annotated[list[str] | None, typer.Option(
-        metavar="PART=VALUE", help="Load on the shaft, as in servotwin simulate.",
-        rich_help_panel=shared.PLANT)] = None,
-    change: Annotated[list[str] | None, typer.Option(
-        "--set", metavar="GROUP.NAME=VALUE",
-        help="Change a nominal parameter, or add one that the servo lacks; repeatable; with a unit, or in SI units.",
-        rich_help_panel=shared.PLANT)] = None,
-    supply: shared.SupplyOption = None,
+    words: Annotated[shared.CommandWords, {
+        "unit": "Unit of the command: deg (default), rad, us, ms, s, V or mV. An angle becomes a pulse through each "
+        "servo's own calibration; us, ms and s give all servos the same pulse."}],
+    plant: Annotated[shared.Plant, {
+        "model": "digital, pulse, pulse-inductive or bounded (default: by the kind of the servo, pulse or digital; "
+        "bounded if its file has no chip).",
+        "change": "Change a nominal parameter, or add one that the servo lacks; repeatable; with a unit, or in SI "
+        "units.", "register": LEFT_OUT}],
     vary: Annotated[list[str] | None, typer.Option(
         metavar="NAME=DISTRIBUTION", help="Draw a parameter of the servo or load, repeatable: normal:10%, uniform:10%, "
         "uniform:4us..8us, normal:3ohm±0.3ohm, lognormal:10%, triangular:4us..6us..8us, choice:brake,coast. A single "
@@ -115,18 +121,7 @@ def sweep(
     draws: Annotated[Path | None, typer.Option(
         metavar="FILE", help="Take the draws from a table: .csv or .parquet, one column per dotted name, in SI units.",
         rich_help_panel=_VARIED)] = None,
-    lanes: Annotated[int | None, typer.Option(
-        metavar="NUMBER", help="Number of servos (default 1000, or all rows of --draws).",
-        rich_help_panel=_VARIED)] = None,
-    sampling: Annotated[str, typer.Option(
-        metavar="HOW", help="latin-hypercube, sobol or random.", rich_help_panel=_VARIED)] = "latin-hypercube",
-    truncate: Annotated[bool, typer.Option(
-        "--truncate", help="Truncate distributions to the physical range.", rich_help_panel=_VARIED)] = False,
-    seed: Annotated[int, typer.Option(
-        metavar="NUMBER", help="Seed for everything random.", rich_help_panel=_VARIED)] = 0,
-    duration: shared.DurationOption = 1.5,
-    output_step: Annotated[float, typer.Option(
-        metavar="SECONDS", help="Time between samples used for the metrics.", rich_help_panel=shared.OUTPUT)] = 0.01,
+    study: _Lanes,
     metric: Annotated[list[str] | None, typer.Option(
         metavar="NAME", help="Metric to show, the first one in the tornado, repeatable: overshoot, rise_time, "
         "settling_time, steady_error, slew_rate, peak_current, lowest_voltage, rms_error, peak_error, or end_ and a "
@@ -134,27 +129,18 @@ def sweep(
         rich_help_panel=shared.OUTPUT)] = None,
     out: Annotated[Path | None, typer.Option(
         metavar="FOLDER", help="Write all lanes, chunk by chunk.", rich_help_panel=shared.OUTPUT)] = None,
-    file_format: Annotated[str, typer.Option(
-        "--format", metavar="FORMAT", help="Format of lanes: csv or parquet.", rich_help_panel=shared.OUTPUT)] = "csv",
-    resume: Annotated[bool, typer.Option(
-        "--resume", help="Continue the unfinished study in --out.", rich_help_panel=shared.OUTPUT)] = False,
     plot: Annotated[bool, typer.Option(
         "--plot", help="Draw tornado.png in --out.", rich_help_panel=shared.OUTPUT)] = False,
     scheduler: shared.SchedulerOption = None,
     as_json: shared.JsonOption = False,
 ) -> None:
     """Draw the parameters of a servo, simulate all, and say what that does to a few metrics."""
-    from servotwin.cli.option_values import CommandWords
-
-    words = CommandWords(step=step, ramp=ramp, sine=sine, chirp=chirp, prbs=prbs, constant=constant, pulses=pulses,
-                         command=command, unit=unit, at=at, over=over, hold=hold, column=column)
-    _check_options(out, resume=resume, plot=plot, varies=bool(vary or from_file or draws))
-    nominal = model_of(servo, model, change or [], supply=supply)
-    study = _run(nominal, words, load or [], metric or [], {
-        "duration": duration, "vary": _varied(nominal, vary or [], from_file=from_file), "draws": _draws(draws),
-        "lanes": lanes, "seed": seed, "sampling": sampling, "truncate": truncate, "output_step": output_step,
-        "directory": out, "resume": resume, "file_format": file_format}, scheduler)
-    _report(study, nominal, metric or [], out, plot=plot, as_json=as_json)
+    _check_options(out, resume=study.resume, plot=plot, varies=bool(vary or from_file or draws))
+    nominal = plant.of(servo)
+    found = _run(nominal, words, plant, metric or [], {
+        "vary": _varied(nominal, vary or [], from_file=from_file), "draws": _draws(draws), "directory": out,
+        **asdict(study)}, scheduler)
+    _report(found, nominal, metric or [], out, plot=plot, as_json=as_json)
 
 
 def _check_options(out: Path | None, *, resume: bool, plot: bool, varies: bool) -> None:
@@ -192,10 +178,9 @@ def _draws(path: Path | None) -> dict[str, Any] | None:
     return None if path is None else dict(read_columns(path))
 
 
-def _run(model: Model, words: Any, load: list[str], metric: list[str], options: dict[str, Any],
+def _run(model: Model, words: shared.CommandWords, plant: shared.Plant, metric: list[str], options: dict[str, Any],
          scheduler: str | None) -> Study:
     from servotwin.cli.interrupts import last_words
-    from servotwin.cli.option_values import load_from
     from servotwin.errors import InputError
     from servotwin.studies import sweep as run
     from servotwin.studies.metrics import checked_metrics
@@ -207,7 +192,7 @@ def _run(model: Model, words: Any, load: list[str], metric: list[str], options: 
     signal = words.signal(duration)
     metrics = tuple(dict.fromkeys([*metric, *checked_metrics(None, model, signal, duration)]))
     with executor_at(scheduler) as executor, last_words(lambda: _how_to_go_on(options["directory"])):
-        return run(model, signal, load=load_from(load, model), metrics=metrics, executor=executor,
+        return run(model, signal, load=plant.load_on(model), metrics=metrics, executor=executor,
                    progress=True, **options)
 
 

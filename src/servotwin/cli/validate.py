@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,6 +11,7 @@ import typer
 
 from servotwin.cli import log
 from servotwin.cli import shared_options as shared
+from servotwin.cli.records import with_records
 from servotwin.cli.terminal import emit_json, patience, show, table
 from servotwin.logs.formats import reading_facts
 
@@ -27,7 +28,9 @@ _EXCEEDED = 1  # exit code
 _MOST_LOGS = 30
 
 
+@with_records
 def validate(
+    *,
     servo: shared.ServoArgument,
     logs: Annotated[list[Path], typer.Argument(
         metavar="LOGS", help=log.LOGS_HELP)],
@@ -35,47 +38,33 @@ def validate(
         metavar="MODEL", help="pulse, pulse-inductive, bounded or digital (default: the model of the file's fit, else "
         "that of the servo's kind).")]
     = None,
-    file_format: log.FormatOption = "auto",
-    columns: log.ColumnsOption = None,
-    joint: log.JointOption = None,
-    raw: log.RegistersOption = None,
-    rate: log.RateOption = None,
-    commanded: log.CommandedOption = None,
-    change: Annotated[list[str] | None, typer.Option(
-        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable; with a unit, or "
-        "in SI units.")] = None,
-    register: shared.LogRegisterOption = None,
-    supply: shared.LogSupplyOption = None,
+    reading: Annotated[log.Reading, {
+        "leave_out": "Time window to ignore, in all logs, or in one: LOG=START..STOP; repeatable."}],
+    logged: shared.LoggedServo,
     nuisance: Annotated[list[str] | None, typer.Option(
         metavar="NAME", help="Effects of the rig to fit to these logs: delay, log_delay, frame_phase, "
         "frame_period, control_phase, angle_offset, angle_sag, initial_state; repeatable or with commas (default: "
         "none; the others are as recorded by the fit in the servo file).")] = None,
     sensors: Annotated[list[str] | None, typer.Option(
         metavar="NAME", help="Measured signals to compare; repeatable or with commas.")] = None,
-    leave_out: Annotated[list[str] | None, typer.Option(
-        "--leave-out", metavar="START..STOP", help="Time window to ignore, in all logs, or in one: "
-        "LOG=START..STOP; repeatable.")] = None,
-    mend: log.MendOption = None,
     max_error: Annotated[list[str] | None, typer.Option(
         "--max-error", metavar="ERROR", help="Exit with code 1 if the rms error of a kind of motion is larger, such as "
         "3deg, or prbs=8deg for one kind; repeatable.")] = None,
     report: Annotated[Path | None, typer.Option(
-        metavar="FILE.html", help="Write a page with pictures.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.")] = False,
+        metavar="FILE.html", help="Write a page with pictures.", rich_help_panel=shared.OUTPUT)] = None,
+    ending: shared.Ending,
 ) -> None:
     """Compare a servo with logs, and say how far it is off."""
     from servotwin.cli.shared_options import servo_of
 
-    targets = _targets(report, [Path(servo), *logs], force=force)
-    changed = servo_of(servo, change or [], register or [], supply)
-    found = _run(changed, model, nuisance, sensors, mend, lambda nominal: log.read(
-        logs, file_format, columns, joint, leave_out or [], mend=mend, rate=rate, commanded=commanded, force=force,
-        quiet=as_json, registers=bool(register), raw=raw, model=nominal))
+    targets = _targets(report, [Path(servo), *logs], force=ending.force)
+    changed = servo_of(servo, logged.change, logged.register, logged.supply)
+    found = _run(changed, model, nuisance, sensors, reading.mend, lambda nominal: reading.logs(
+        logs, nominal, registers=bool(logged.register), force=ending.force, quiet=ending.as_json))
     limits = _limits(found, max_error or [])
-    files = _write(found, targets, force=force)
+    files = _write(found, targets, force=ending.force)
     above = exceeded(found, limits)
-    _report(found, above, limits, files, as_json=as_json)
+    _report(found, above, limits, files, as_json=ending.as_json)
     if above:
         raise typer.Exit(_EXCEEDED)
 
@@ -89,7 +78,7 @@ def _targets(report: Path | None, inputs: list[Path], *, force: bool) -> list[Ta
 
 
 def _run(servo: Servo, model: str | None, nuisance: list[str] | None, sensors: list[str] | None,
-         mend: list[str] | None, read: Callable[[Model], list[Log]]) -> Validation:
+         mend: Sequence[str], read: Callable[[Model], list[Log]]) -> Validation:
     from servotwin.cli import fit_report
     from servotwin.cli.shared_options import class_of
     from servotwin.identification.fitting.checks import checked_servo

@@ -18,6 +18,7 @@ _MOST_PORT = 65535
 
 
 def web(
+    *,
     servo: Annotated[str | None, typer.Argument(
         metavar="[SERVO]", help="Catalog id, or path of a servo file (.toml); the paper's servo, pulses beside their "
         "mean, unless given.")] = None,

@@ -2,28 +2,58 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from servotwin.cli import shared_options as shared
+from servotwin.cli.records import with_records
 from servotwin.cli.terminal import emit, emit_json
 from servotwin.errors import one_line
 
 if TYPE_CHECKING:
     from servotwin.wire import Bus
+    from servotwin.wire.arms import Asked
     from servotwin.wire.service import Service
 
 _MOST_PORT = 65535
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Servos:
+    """The options that say which servos are on the wire and how they are, as they were typed."""
+
+    servo: Annotated[Sequence[str], typer.Option(
+        metavar="ID=SERVO", help="A servo on the wire, such as 1=feetech-sts3215-12v; repeatable. It replaces the "
+        "arm's of that ID.")] = ()
+    supply: Annotated[str | None, typer.Option(
+        metavar=shared.SUPPLY_FORM, help=f"Supply that all share: {shared.SUPPLY_HELP} (default: an ideal one a "
+        "voltage).")] = None
+    register: shared.RegisterOption = ()
+    lock: Annotated[str, typer.Option(
+        metavar="HOW", help="A write to the EEPROM while Lock is 1: keep (until power-off), or drop.")] = "keep"
+    firmware: Annotated[str | None, typer.Option(
+        metavar="MAJOR.MINOR", help="Version that the servos tell (default 3.10; Dynamixel 45).")] = None
+    body: Annotated[bool, typer.Option(
+        "--body/--no-body", help="Hang so101's servos at its links (robots extra), or let the shafts be free.")] = True
+
+    def asked(self, arm: str | None, faults: Any, seed: int) -> Asked:
+        """Return what is asked for of the servos of an arm."""
+        from servotwin.wire.arms import Asked
+
+        return Asked(arm=arm, servos=_servos(self.servo), supply=self.supply, registers=tuple(self.register),
+                     lock=self.lock, firmware=_version(self.firmware), faults=faults, body=self.body, seed=seed)
+
+
+@with_records
 def wire(
+    *,
     arm: Annotated[str | None, typer.Argument(
         metavar="[ARM]", help="so101 or koch, or path of an arm file (.toml); none: the servos of --servo.")] = None,
-    servo: Annotated[list[str] | None, typer.Option(
-        metavar="ID=SERVO", help="A servo on the wire, such as 1=feetech-sts3215-12v; repeatable. It replaces the "
-        "arm's of that ID.")] = None,
+    servos: _Servos,
     link: Annotated[Path | None, typer.Option(
         metavar="PATH", help="Link to the port, such as /tmp/so101; it appears when the servos are ready.")] = None,
     keep: Annotated[Path | None, typer.Option(
@@ -31,10 +61,6 @@ def wire(
     tcp: Annotated[str | None, typer.Option(
         metavar="[HOST:]PORT", help="A TCP port instead of a pseudo-terminal, for pyserial's socket://; 0 for any that "
         "is free, at this computer alone unless HOST is given.")] = None,
-    supply: Annotated[str | None, typer.Option(
-        metavar=shared.SUPPLY_FORM, help=f"Supply that all share: {shared.SUPPLY_HELP} (default: an ideal one a "
-        "voltage).")] = None,
-    register: shared.RegisterOption = None,
     hand: Annotated[Path | None, typer.Option(
         metavar="FILE.csv", help="What a hand does to limp servos: columns time_s and, by joint or ID, angles in "
         "degrees, such as shoulder_pan_deg; it begins anew at its end.")] = None,
@@ -43,26 +69,18 @@ def wire(
         "them.")] = None,
     faults: Annotated[Path | None, typer.Option(
         metavar="FILE.toml", help="What is wrong with the wire: a table named fault, with a kind, for each.")] = None,
-    lock: Annotated[str, typer.Option(
-        metavar="HOW", help="A write to the EEPROM while Lock is 1: keep (until power-off), or drop.")] = "keep",
-    firmware: Annotated[str | None, typer.Option(
-        metavar="MAJOR.MINOR", help="Version that the servos tell (default 3.10; Dynamixel 45).")] = None,
-    body: Annotated[bool, typer.Option(
-        "--body/--no-body", help="Hang so101's servos at its links (robots extra), or let the shafts be free.")] = True,
     duration: Annotated[float | None, typer.Option(
         metavar="SECONDS", help="End by itself after this time.")] = None,
     seed: Annotated[int, typer.Option(metavar="NUMBER", help="Seed of all noise and faults.")] = 0,
     as_json: shared.JsonOption = False,
 ) -> None:
     """Serve the port until Ctrl-C."""
-    from servotwin.wire.arms import Asked, arm_bus, hand_of
+    from servotwin.wire.arms import arm_bus, hand_of
     from servotwin.wire.bus import read_faults
 
     _check(duration)
-    asked = Asked(arm=arm, servos=_servos(servo or []), supply=supply, registers=tuple(register or ()), lock=lock,
-                  firmware=_version(firmware), faults=read_faults(faults, seed) if faults else None, body=body,
-                  seed=seed)
-    bus, names = arm_bus(asked, registers=_written)
+    wrong = read_faults(faults, seed) if faults else None
+    bus, names = arm_bus(servos.asked(arm, wrong, seed), registers=_written)
     logs = bus.record(record) if record is not None else None
     _serve(bus, names, tcp=_tcp(tcp), link=link, keep=keep, each=hand_of(hand, bus, names) if hand else None,
            duration=duration, as_json=as_json, logs=logs)
@@ -115,7 +133,7 @@ def _tell(bus: Bus, names: dict[int, str], service: Service, link: Path | None, 
         emit("the speed that a program sets is not seen here: servos answer at every one")
 
 
-def _servos(words: list[str]) -> dict[int, str]:
+def _servos(words: Sequence[str]) -> dict[int, str]:
     from servotwin.errors import InputError
 
     found: dict[int, str] = {}
