@@ -153,9 +153,22 @@ def commands(command, path=()):
 
 @pytest.mark.long(but="doctor")
 @pytest.mark.parametrize("words", commands(get_command(app)), ids=" ".join)
-def test_no_word_of_a_help_is_cut_at_80_columns(words, capsys, monkeypatch):
+def test_help_is_short_at_80_columns_and_all_of_it_is_behind_help_all(words, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     assert main([*words, "--help"]) == 0
     told = capsys.readouterr().out
     assert "Usage" in told
     assert "…" not in told
+    assert len(told.splitlines()) <= 50
+    command = get_command(app)
+    for word in words:
+        command = command.commands[word]
+    options = {name for each in command.params for name in each.opts if name.startswith("--")}
+    usual = {f"--{name}" for name in getattr(command.callback, "usual", ())}
+    if not usual:
+        assert options <= set(re.findall(r"--[a-z0-9-]+", told))
+        return
+    assert usual <= options
+    assert set(re.findall(r"^[│|] (?:\*  |   )?(--[a-z0-9-]+)", told, re.MULTILINE)) == usual | {"--help", "--help-all"}
+    assert main([*words, "--help-all"]) == 0
+    assert options <= set(re.findall(r"--[a-z0-9-]+", capsys.readouterr().out))

@@ -110,7 +110,7 @@ def test_usb_is_a_supply_wherever_one_is_said(cli, which):
     told = facts(which("--lift", "10g", "--arm", "5cm", "--supply", "usb", "--among", "towerpro-sg90", "--json").data)
     assert told["towerpro-sg90"]["most_torque"] == pytest.approx(stall, rel=1e-9)
     for command in ("linear", "sweep", "fit", "validate"):
-        assert "--supply" in cli(command, "--help").out
+        assert "--supply" in cli(command, "--help-all").out
 
 
 @pytest.mark.long

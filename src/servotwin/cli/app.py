@@ -18,6 +18,7 @@ from servotwin.cli.log import EPILOG as LOG_EPILOG
 from servotwin.cli.log import HELP as LOG_HELP
 from servotwin.cli.log import log
 from servotwin.cli.paper_command import paper
+from servotwin.cli.records import Commands
 from servotwin.cli.robot import robot
 from servotwin.cli.simulate import simulate
 from servotwin.cli.sweep import sweep
@@ -26,7 +27,7 @@ from servotwin.cli.validate import validate
 from servotwin.cli.web import web
 from servotwin.cli.wire import wire
 
-app = typer.Typer(
+app = Commands(
     name="servotwin", add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog="Example: servotwin simulate hitec-hs-755hb --step 0:180 --plot run.png",

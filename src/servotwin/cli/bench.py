@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import LEFT_OUT, with_records
+from servotwin.cli.records import LEFT_OUT, Commands, usual, with_records
 from servotwin.cli.terminal import emit, emit_help, emit_json, json_text, pairs, patience, show, table, typed
 
 if TYPE_CHECKING:
@@ -205,6 +205,7 @@ _SET = {"reference": "Put a voltage at A3, below the reference; what does the me
 _EXAMPLE = {"reference": "1.213V", "supply": "6.02V", "shunt": "0.35A"}
 
 
+@usual("port", "wiring", "meter", "range", "voltage", "current-limit", "servo", "out", "force", "json")
 @with_records
 def calibrate(
     *,
@@ -463,6 +464,7 @@ def marker(
          "  Print it at 100 % on plain paper and measure the bar: it is 50 mm long.")
 
 
+@usual("log", "instant", "led", "slow", "zero", "out", "force", "json")
 @with_records
 def video(
     *,
@@ -581,6 +583,7 @@ _FIDELITIES = ("pulse", "pulse-inductive", "digital")
 _SLICE = 0.1  # s
 
 
+@usual("port", "bus", "experiment", "range", "voltage", "current-limit", "out", "force", "json")
 @with_records
 def record(
     *,
@@ -628,6 +631,7 @@ def record(
     _report(done, out, servo, job, as_json=ending.as_json)
 
 
+@usual("experiment", "range", "voltage", "current-limit", "duration", "wiring", "out", "pty", "force", "json")
 @with_records
 def rehearse(
     *,
@@ -740,7 +744,7 @@ def _report(found: Sequence[Recorded], out: Path, servo: str, job: Job, *, as_js
 # --- `servotwin bench`: a real servo on a board, or the firmware of the board in emulation, and what they -------------
 
 
-bench = typer.Typer(
+bench = Commands(
     help="Record logs of a real servo, or rehearse it with an emulated board.",
     epilog="Example: servotwin bench rehearse hitec-hs-755hb --range 1000us:2000us --voltage 6V --current-limit 2A "
            "--out rehearsal")

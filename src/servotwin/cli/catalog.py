@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import with_records
+from servotwin.cli.records import Commands, usual, with_records
 from servotwin.cli.robot_options import ContactOption, PackageOption
 from servotwin.cli.terminal import emit_help, emit_json, pairs, patience, show, table, with_span
 
@@ -163,6 +163,7 @@ class _Bounds:
     register: shared.RegisterOption = ()
 
 
+@usual("lift", "arm", "motion", "robot", "voltage", "limit", "prices", "why", "json")
 @with_records
 def which(
     *,
@@ -437,6 +438,7 @@ class _Whole:
     note: Annotated[str, _of("TEXT", "Remark for human readers.")] = ""
 
 
+@usual("torque", "speed", "stall-current", "at", "name", "travel", "pulse-range", "mass", "csv", "out", "force", "json")
 @with_records
 def from_sheet(
     *,
@@ -694,7 +696,7 @@ _TELLING = ("impossible", "sources disagree", "digital", "bus", "currents unknow
             "running current unknown")  # what a list has room for
 _Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
-catalog = typer.Typer(
+catalog = Commands(
     help="List and show the servos that come with servotwin; make and check servo files.",
     epilog="Example: servotwin catalog show hitec-hs-755hb")
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import LEFT_OUT, with_records
+from servotwin.cli.records import LEFT_OUT, usual, with_records
 from servotwin.cli.terminal import emit_json, pairs, patience, show, table
 
 if TYPE_CHECKING:
@@ -24,6 +24,7 @@ _ZERO_CELSIUS = 273.15
 _ASKED = "What to compute"
 
 
+@usual("voltage", "lift", "arm", "load", "set", "quick", "out", "plot", "force", "json")
 @with_records
 def curves(
     *,

@@ -15,7 +15,7 @@ import typer
 
 from servotwin.cli import shared_options as shared
 from servotwin.cli.log import Reading
-from servotwin.cli.records import LEFT_OUT, with_records
+from servotwin.cli.records import LEFT_OUT, usual, with_records
 from servotwin.cli.terminal import emit_json, pairs, patience, show, table
 from servotwin.logs.formats import MENDS
 
@@ -300,6 +300,7 @@ _LONGEST = 60.0  # s, without a log: every cause asks for a run of as much
 _MODELS = ("digital", "pulse", "pulse-inductive", "bounded")
 
 
+@usual("step", "load", "set", "supply", "board", "json")
 @with_records
 def doctor(
     *,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import with_records
+from servotwin.cli.records import Commands, usual, with_records
 from servotwin.cli.terminal import emit_help, emit_json, pairs, patience, show
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ _Plant = Annotated[shared.Plant, {
     "servo).",
     "load": "Load, such as inertia=1e-3 or pendulum=0.1:0.12; repeatable, or with commas."}]
 
-export = typer.Typer(
+export = Commands(
     help="Write a servo as a program that needs no Python.",
     epilog="Example: servotwin export c hitec-hs-755hb --out firmware")
 
@@ -32,6 +32,7 @@ def _export(context: typer.Context) -> None:
         emit_help(context)
 
 
+@usual("out", "name", "model", "load", "set", "supply", "parameters", "dtype", "force", "json")
 @with_records
 def c(
     *,
@@ -82,6 +83,7 @@ export.command("c", help="Write a servo as C99: a header and a source, without a
                       "Example: servotwin export c feetech-sts3215-12v --load inertia=1e-3 --out arm --name elbow")(c)
 
 
+@usual("out", "fmi", "model", "load", "set", "supply", "sources", "force", "json")
 @with_records
 def fmu(
     *,

@@ -12,7 +12,7 @@ import typer
 
 from servotwin.cli import log
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import with_records
+from servotwin.cli.records import usual, with_records
 from servotwin.cli.shared_options import best_kept, end_if_stopped
 from servotwin.cli.terminal import emit_json, pairs, patience, show, table
 from servotwin.logs.formats import reading_facts
@@ -230,6 +230,7 @@ class _Laws:
         return partial(friction_ladder, servo=servo, model=kind, free=search.free) if self.ladder else None
 
 
+@usual("servo", "table", "free", "advise", "out", "report", "force", "json")
 @with_records
 def fit(
     *,

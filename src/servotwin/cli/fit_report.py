@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -27,6 +27,7 @@ from servotwin.identification.report.pictures import (
     tables_of,
 )
 from servotwin.logs.formats import MENDS
+from servotwin.look.report import facts_of
 from servotwin.studies.kinds import Distribution, Normal, Offset, Relative, Uniform, distribution_of
 from servotwin.units.quantities import number_and_unit, quantity
 
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from servotwin.bench import TableCalibration
     from servotwin.identification import Advice, Fit, Ladder, Log
     from servotwin.identification.fitting.fit import ErrorTable, Trace
-    from servotwin.identification.fitting.yielding import Yielded
     from servotwin.models import Model
     from servotwin.parameters import Quantity, Servo
 
@@ -136,54 +136,53 @@ def facts(fit: Fit, files: Sequence[str]) -> dict[str, Any]:
         "upper": float(found[name].upper), "method": found[name].method, "prior_share": fit.prior_share.get(name),
         "before": nominal_of(fit, name)}
         for name in fit.names}
-    return {
+    registers = None if fit.registers is None else {**fit.registers.facts, "values": fit.register_values}
+    moved = {} if fit.verdict is None else {
+        name: {"half_widths": widths, "by": by} for name, (widths, by) in fit.verdict.moved.items()}
+    return facts_of({
         "servo": fit.servo.name, "model": type(fit.model).__name__, "logs": len(fit.traces),
         "held_out": [trace.log.name for trace in fit.traces if trace.held_out], "level": fit.level,
-        "estimates": estimates, "covariance": {"names": list(fit.names), "rows": fit.covariance.tolist()},
-        "undetermined": [{
-            "parameters": list(item.parameters), "direction": list(item.direction),
-            "combinations": list(item.combinations), "remedies": list(item.remedies), "words": str(item)}
-            for item in fit.unidentifiable],
-        "registers": None if fit.registers is None else {
-            **fit.registers.facts, "values": [one._asdict() for one in fit.register_values]},
-        "foreseen": [vars(one) | {"words": str(one)} for one in fit.foreseen],
-        "assumptions": [{**asdict(one), "moves": dict(one.moves), "beside": dict(one.beside)}
-                        for one in fit.assumptions],
-        "at_bound": list(fit.at_bound), "yielded": [_yielded(one) for one in fit.yielded],
+        "estimates": estimates, "covariance": {"names": fit.names, "rows": fit.covariance},
+        "undetermined": fit.unidentifiable, "registers": registers, "foreseen": fit.foreseen,
+        "assumptions": fit.assumptions, "at_bound": fit.at_bound, "yielded": fit.yielded, "widened": fit.widened,
         "errors": {which.replace(" ", "_"): error_facts(held) for which, held in tables_of(fit).items()},
-        "noise": {name: float(value) for name, value in fit.noise.items()}, "warnings": list(fit.warnings),
-        "verdict": None if fit.verdict is None else {
-            "sentence": fit.verdict.sentence, "holds": fit.verdict.holds, "ratio": fit.verdict.ratio,
-            "noise": dict(fit.verdict.noise), "autocorrelation": fit.verdict.autocorrelation,
-            "odds": dict(fit.verdict.odds), "outliers": fit.verdict.outliers, "word": fit.verdict.word,
-            "rival": None if fit.verdict.rival is None else vars(fit.verdict.rival),
-            "command_lag": fit.verdict.command_lag,
-            "cross_correlation": None if fit.verdict.command is None else {
-                name: getattr(fit.verdict.command, name).tolist() for name in ("lag", "value", "band")},
-            "causes": [{"name": cause.name, "sentence": cause.sentence, "before": cause.before, "after": cause.after,
-                        "remedy": cause.remedy} for cause in fit.verdict.causes]},
-        "starts": [{"cost": float(start.cost), "converged": bool(start.converged)} for start in fit.starts],
+        "noise": fit.noise, "warnings": fit.warnings, "verdict": fit.verdict, "moved": moved, "starts": fit.starts,
         "data": fit.servo.fit.get("data"), "seconds": fit.seconds, "interrupted": fit.interrupted,
-        "unknown": list(fit.unknown),
-        "set": was_set(fit.model), "files": list(files),
-    }
+        "unknown": fit.unknown, "set": was_set(fit.model), "files": files,
+    }, _shown())
 
 
-def _yielded(one: Yielded) -> dict[str, Any]:
-    return {"parameter": one.name, "unit": one.unit, "file": one.file, "file_std": one.file_std, "logs": one.logs,
-            "logs_std": one.logs_std, "logs_lower": one.logs_lower, "logs_upper": one.logs_upper, "apart": one.apart,
-            "of_file": one.of_file, "others": list(one.others), "words": str(one)}
+def _shown() -> dict[type, str]:
+    """Return what is shown of the parts of a fit."""
+    from servotwin.identification.fitting.advise import Advice, Experiment
+    from servotwin.identification.fitting.fit import LogError, Start
+    from servotwin.identification.fitting.ladder import Ladder, Rung
+    from servotwin.identification.fitting.noise import CrossCorrelation
+    from servotwin.identification.fitting.uncertainty import Unidentifiable
+    from servotwin.identification.fitting.verdict import Verdict
+    from servotwin.identification.fitting.yielding import Foreseen, Widened, Yielded
+
+    return {
+        Verdict: "sentence holds ratio noise autocorrelation odds outliers word rival command_lag "
+                 "cross_correlation=command causes",
+        CrossCorrelation: "lag value band",
+        Unidentifiable: "parameters direction combinations remedies words=str",
+        Foreseen: "name alone prior reason words=str",
+        Yielded: "parameter=name unit file file_std logs logs_std logs_lower logs_upper apart of_file others words=str",
+        Widened: "parameter=name unit file file_std logs apart std of_file words=str",
+        Start: "cost converged",
+        LogError: "log motion conditions rms largest samples fit_percent",
+        Ladder: "chosen reason error choices rungs",
+        Rung: "name training holdout criterion overfits estimates=fit.estimates",
+        Advice: "now alone widest experiments",
+        Experiment: "motion load voltage sensors widths alone widest"}
 
 
 def error_facts(held: ErrorTable) -> dict[str, Any]:
     """Return errors as plain data (SI): in all, by every label, and of each log."""
-    return {
+    return facts_of({
         "all": held.total(), "by": {label: held.by(label) for label in held.labels()},
-        "fit_percent": held.total(fit_percent),
-        "logs": {model: [{"log": e.log, "motion": e.motion, "conditions": dict(e.conditions), "rms": e.rms,
-                          "largest": e.largest, "samples": e.samples, "fit_percent": e.fit_percent}
-                         for e in held.errors[model]]
-                 for model in held.models}}
+        "fit_percent": held.total(fit_percent), "logs": {model: held.errors[model] for model in held.models}}, _shown())
 
 
 def ladder_table(ladder: Ladder) -> list[RenderableType]:
@@ -213,10 +212,7 @@ def _told(ladder: Ladder, factor: float, unit: str) -> list[str]:
 
 def ladder_facts(ladder: Ladder) -> dict[str, Any]:
     """Return a friction ladder as plain data."""
-    return {"chosen": ladder.chosen, "reason": ladder.reason, "error": ladder.error,
-            "choices": list(ladder.choices), "rungs": [
-        {"name": rung.name, "training": rung.training, "holdout": rung.holdout, "criterion": rung.criterion,
-         "overfits": rung.overfits, "estimates": dict(rung.fit.estimates)} for rung in ladder.rungs]}
+    return facts_of(ladder, _shown())
 
 
 def advice_table(advice: Advice) -> list[RenderableType]:
@@ -239,9 +235,7 @@ def _widths(widths: Mapping[str, float], names: Sequence[str]) -> tuple[str, ...
 
 def advice_facts(advice: Advice) -> dict[str, Any]:
     """Return advice as plain data; widths are relative."""
-    return {"now": dict(advice.now), "alone": dict(advice.alone), "widest": advice.widest, "experiments": [
-        {"motion": one.motion, "load": one.load, "voltage": one.voltage, "sensors": list(one.sensors),
-         "widths": dict(one.widths), "alone": dict(one.alone), "widest": one.widest} for one in advice.experiments]}
+    return facts_of(advice, _shown())
 
 
 def _width(share: float) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import with_records
+from servotwin.cli.records import usual, with_records
 from servotwin.cli.terminal import emit_json, pairs, patience, show, table
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ _ENDINGS = {"--out": (".html", ".htm"), "--plot": (".png", ".svg", ".pdf"), "--c
 _VIEW, _TUNE = "What to compute", "Which gain"
 
 
+@usual("amplitude", "frame", "tune", "phase-margin", "overshoot", "load", "set", "out", "plot", "force", "json")
 @with_records
 def linear(
     *,

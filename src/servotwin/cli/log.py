@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import LEFT_OUT, with_records
+from servotwin.cli.records import LEFT_OUT, usual, with_records
 from servotwin.cli.terminal import emit_json, patience, show, table
 from servotwin.errors import one_line
 from servotwin.logs.formats import FORMATS, LOG_FORMATS, MENDS, read_alike
@@ -185,6 +185,7 @@ EPILOG = ("Example: servotwin log run.csv --mend torn,reset --out mended.csv --p
           'Example: servotwin log lift0.txt --columns "1:ms 2:deg 3:A" --commanded 153deg@0s')
 
 
+@usual("columns", "rate", "out", "plot", "force", "json")
 @with_records
 def log(
     *,

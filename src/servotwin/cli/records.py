@@ -1,4 +1,4 @@
-"""Options as records: a command takes a group of options as one dataclass, whose fields are the options."""
+"""Options as records: a command takes a group of options as one dataclass, whose fields are the options; its help."""
 
 from __future__ import annotations
 
@@ -9,7 +9,11 @@ from collections.abc import Callable, Mapping
 from functools import wraps
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
+import typer
+from typer.core import TyperCommand
 from typer.models import OptionInfo
+
+from servotwin.cli.terminal import emit_help
 
 Command = Callable[..., None]
 LEFT_OUT = None  # an option of a record that a command does not have
@@ -103,3 +107,70 @@ def _with_help(hint: Any, text: str | None) -> Any:
         if isinstance(each, OptionInfo):
             each.help = text
     return Annotated[(plain, *changed)]
+
+
+# --- `--help` with what is needed most, `--help-all` with all of it ---------------------------------------------------
+
+_ALL = "--help-all"
+
+
+def usual(*names: str) -> Callable[[Command], Command]:
+    """Return what makes `--help` of a command show these options alone; its `--help-all` shows all of them.
+
+    Parameters
+    ----------
+    *names : str
+        As the options are typed, without dashes.
+    """
+    def marked(command: Command) -> Command:
+        signature = inspect.signature(command)
+        more = inspect.Parameter("help_all", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=Annotated[
+            bool, typer.Option(_ALL, is_eager=True, callback=_show_all,
+                               help="Show all options and exit.")])
+
+        @wraps(command)
+        def brief(*, help_all: bool, **given: Any) -> None:
+            command(**given)
+
+        made: Any = brief
+        del made.__wrapped__
+        made.__signature__ = signature.replace(parameters=[*signature.parameters.values(), more])
+        made.__annotations__ = {each.name: each.annotation for each in made.__signature__.parameters.values()}
+        made.usual = names
+        return brief
+
+    return marked
+
+
+def _show_all(context: typer.Context, wanted: bool) -> None:
+    if wanted:
+        context.meta[_ALL] = True
+        emit_help(context)
+        raise typer.Exit
+
+
+class Brief(TyperCommand):
+    """A command whose `--help` shows what is `usual` of it."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help."""
+        names = getattr(self.callback, "usual", ())
+        shown = {f"--{name}" for name in names} | {"--help", _ALL}
+        left_out: list[Any] = [each for each in self.get_params(ctx) if names and _ALL not in ctx.meta
+                    and each.param_type_name == "option" and not shown & set(each.opts)]
+        for option in left_out:
+            option.hidden = True
+        try:
+            super().format_help(ctx, formatter)
+        finally:
+            for option in left_out:
+                option.hidden = False
+
+
+class Commands(typer.Typer):
+    """Commands of one kind, `Brief` ones."""
+
+    def command(self, name: str | None = None, **options: Any  # type: ignore[override]
+                ) -> Callable[[Command], Command]:
+        """Return what adds a command."""
+        return super().command(name, cls=Brief, **options)

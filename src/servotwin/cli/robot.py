@@ -13,7 +13,7 @@ import typer
 
 from servotwin.cli import robot_options as options
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import LEFT_OUT, with_records
+from servotwin.cli.records import LEFT_OUT, Commands, usual, with_records
 from servotwin.cli.robot_tasks import add_to, compare, mobile
 from servotwin.cli.terminal import emit_help, emit_json, json_text, pairs, patience, show, table
 from servotwin.text import file_stems
@@ -36,6 +36,7 @@ OutOption = Annotated[Path | None, typer.Option(
     metavar="FOLDER", help="Folder for page, pictures and numbers (default: none).", rich_help_panel=shared.OUTPUT)]
 
 
+@usual("servo", "calibration", "episode", "unit", "out", "force", "json")
 @with_records
 def validate(
     *, model_file: options.ModelArgument, dataset: DatasetArgument, servos: options.Servos,
@@ -152,6 +153,7 @@ def _write(found: RobotValidation, told: dict[str, Any], targets: Sequence[Targe
 _FIT = "Fit"
 
 
+@usual("servo", "calibration", "episode", "unit", "out", "force", "json")
 @with_records
 def fit(
     *, model_file: options.ModelArgument, logs: DatasetArgument, servos: options.Servos, recorded: options.Recorded,
@@ -253,7 +255,7 @@ def _write_fit(found: ArmFit, told: dict[str, Any], targets: Sequence[Target], s
 _MOST_NOTES = 6  # that are told
 _RATES = (1.0, 120.0)  # pictures a second
 
-robot = typer.Typer(
+robot = Commands(
     help="Let a robot with servos at its joints follow a motion.",
     epilog="Example: servotwin robot run so101 --motion wave.csv --out wave")
 
@@ -271,6 +273,7 @@ def _robot(context: typer.Context) -> None:
     "--mount '*=-90deg' --motion wave.csv --out wave\n\n"
     "Example: servotwin robot run so101 --motion lerobot/svla_so101_pickplace --episode 3 --unit range "
     "--calibration follower.json --supply 12V:0.1ohm --out pick"))
+@usual("motion", "servo", "out", "video", "force", "json")
 @with_records
 def run(
     *,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import LEFT_OUT, with_records
+from servotwin.cli.records import LEFT_OUT, usual, with_records
 from servotwin.cli.robot_options import ALL, Chosen, as_options, models_of, named_words, supply_of
 from servotwin.cli.terminal import emit_json, json_text, pairs, patience, show, table
 
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 _DRIVE, _WHEELS = "Waypoints", "Robot and servos"
 
 
+@usual("task", "waypoints", "speed", "servo", "unequal", "encoders", "out", "video", "force", "json")
 @with_records
 def mobile(
     *,
@@ -176,6 +177,7 @@ class Ways(NamedTuple):
     others: Mapping[str, JointPath]
 
 
+@usual("task", "servo", "controller", "third-link", "redundancy", "out", "force", "json")
 @with_records
 def scara(
     *, asked: Asked,
@@ -191,6 +193,7 @@ def scara(
     _do(arm, asked)
 
 
+@usual("task", "size", "servo", "controller", "payload", "supply", "out", "video", "force", "json")
 @with_records
 def two_link(*, asked: Annotated[Asked, {"redundancy": LEFT_OUT}]) -> None:
     """Let the two-link arm do a task."""

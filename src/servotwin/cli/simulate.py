@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import with_records
+from servotwin.cli.records import usual, with_records
 from servotwin.cli.terminal import emit_json, pairs, patience, show
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ _LONGEST_RANGED = 5.0  # s: beyond it the ranges of guesses would take too long
 _MOST_FRAMES = 1e6  # they take an hour, and each is kept for metrics and energy
 
 
+@usual("step", "sine", "load", "set", "duration", "out", "plot", "force", "json")
 @with_records
 def simulate(
     *,

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import LEFT_OUT, with_records
+from servotwin.cli.records import LEFT_OUT, usual, with_records
 from servotwin.cli.terminal import emit_json, patience, show
 from servotwin.errors import InputError, MissingExtraError
 
@@ -98,6 +98,7 @@ class _Lanes:
         "--resume", help="Continue the unfinished study in --out.", rich_help_panel=shared.OUTPUT)] = False
 
 
+@usual("step", "load", "vary", "lanes", "metric", "out", "plot", "json")
 @with_records
 def sweep(
     *,

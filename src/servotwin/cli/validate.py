@@ -11,7 +11,7 @@ import typer
 
 from servotwin.cli import log
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import with_records
+from servotwin.cli.records import usual, with_records
 from servotwin.cli.terminal import emit_json, patience, show, table
 from servotwin.logs.formats import reading_facts
 
@@ -28,6 +28,7 @@ _EXCEEDED = 1  # exit code
 _MOST_LOGS = 30
 
 
+@usual("model", "columns", "set", "supply", "max-error", "report", "force", "json")
 @with_records
 def validate(
     *,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from servotwin.cli import shared_options as shared
+from servotwin.cli.records import usual, with_records
 from servotwin.cli.terminal import emit, emit_json
 
 if TYPE_CHECKING:
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 _MOST_PORT = 65535
 
 
+@usual("port", "host", "class", "lesson", "scene", "export")
+@with_records
 def web(
     *,
     servo: Annotated[str | None, typer.Argument(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import with_records
+from servotwin.cli.records import usual, with_records
 from servotwin.cli.terminal import emit, emit_json
 from servotwin.errors import one_line
 
@@ -48,6 +48,7 @@ class _Servos:
                      lock=self.lock, firmware=_version(self.firmware), faults=faults, body=self.body, seed=seed)
 
 
+@usual("servo", "link", "keep", "tcp", "record", "duration", "json")
 @with_records
 def wire(
     *,

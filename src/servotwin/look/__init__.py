@@ -12,10 +12,10 @@ from servotwin.look.page import (
     label_of,
     number,
     picture,
-    plain,
     readable,
     table,
     unit_for,
+    untagged,
     with_error,
 )
 from servotwin.look.style import (
@@ -56,11 +56,11 @@ __all__ = [
     "on_page",
     "pages",
     "picture",
-    "plain",
     "plain_decades",
     "readable",
     "table",
     "to_bytes",
     "unit_for",
+    "untagged",
     "with_error",
 ]

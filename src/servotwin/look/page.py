@@ -76,15 +76,15 @@ def picture(image: bytes | str, words: str, *, style: str = "", kind: str = "", 
     """Return a picture inside the page itself: one file, and no names that could collide."""
     data = base64.b64encode(image.encode() if isinstance(image, str) else image).decode("ascii")
     attributes = (f' class="{kind}"' if kind else "") + (f' style="{style}"' if style else "")
-    return f'<img{attributes} alt="{escape(plain(words))}" src="data:{media};base64,{data}">'
+    return f'<img{attributes} alt="{escape(untagged(words))}" src="data:{media};base64,{data}">'
 
 
-def plain(text: str) -> str:
+def untagged(text: str) -> str:
     """Return HTML without its tags, for places that take words only.
 
     Examples
     --------
-    >>> plain("V<sub>i</sub> &lt; 2")
+    >>> untagged("V<sub>i</sub> &lt; 2")
     'Vi < 2'
     """
     return html.unescape(re.sub(r"<[^>]*>", "", text))

@@ -11,7 +11,7 @@ import numpy as np
 
 from servotwin import __version__, plotting
 from servotwin.errors import MissingExtraError
-from servotwin.look import document, escape, fixed, number, picture, plain, table
+from servotwin.look import document, escape, fixed, number, picture, table, untagged
 from servotwin.models import PulseServo
 from servotwin.paper import linear, tables
 from servotwin.paper.figures import Drawing, Picture
@@ -585,7 +585,7 @@ def _figures(names: Sequence[str], images: Images) -> str:
 
 
 def _figure(made: Drawing, *, after: str = "", wide: bool = False) -> str:
-    image = picture(made.files["png"], f"{made.title}. {plain(made.caption)}", kind="drawing", media="image/png",
+    image = picture(made.files["png"], f"{made.title}. {untagged(made.caption)}", kind="drawing", media="image/png",
                     style=f"--w:{96.0 * made.width:.0f}px" if wide else "")
     kind = ' class="wide"' if wide else ""
     return (f'<figure{kind} id="{made.name}"><div>{image}</div>\n{after}<figcaption><b>{made.title}.</b> '

@@ -481,7 +481,7 @@ def _servo(name: str) -> dict[str, Any]:
 def _refused(model: Model) -> dict[str, str]:
     """Return what is said of commands that a model does not take, by their units."""
     found = {}
-    for unit in {*SIGNAL_UNITS} - {*bounds_of(model)}:
+    for unit in sorted({*SIGNAL_UNITS} - {*bounds_of(model)}):
         try:
             model.command(command_signal({"shape": "hold", "unit": unit, "value": 1.0}, 0.0))
         except ServotwinError as error:
