@@ -51,7 +51,7 @@ def simulate(cli):
     return lambda *words: cli("simulate", SERVO, *words)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def child_environment():
     """For a process of its own: the package is found wherever the tests found it."""
     import os

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from servotwin import __version__
+from servotwin import __version__, plugins
 from servotwin.cli.bench import bench
 from servotwin.cli.catalog import catalog
 from servotwin.cli.curves import curves
@@ -93,3 +93,9 @@ app.add_typer(catalog, name="catalog")
 app.add_typer(robot, name="robot")
 app.add_typer(export, name="export")
 app.add_typer(bench, name="bench")
+_OWN = {str(each.name) for each in app.registered_commands} | {str(each.name) for each in app.registered_groups}
+for name, command in plugins.loaded("commands", _OWN).items():
+    if isinstance(command, typer.Typer):
+        app.add_typer(command, name=name)
+    else:
+        app.command(name)(command)

@@ -8,6 +8,8 @@ from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+from servotwin import plugins
+
 if TYPE_CHECKING:
     from servotwin.logs.columns import Column
     from servotwin.logs.log import Log
@@ -140,8 +142,8 @@ class LogFormat(NamedTuple):
         What the functions of its module are given: the path of a table, path and content of a JSON file, or the path
         of a dataset of several files.
     module : str
-        Of `servotwin.logs`. It has `logs_of`, which gives the logs, and unless it is for tables `recognises`, which
-        says of a content, or of the path of a dataset, whether it is in this format.
+        Of `servotwin.logs`, or with dots of any package. It has `logs_of`, which gives the logs, and unless it is for
+        tables `recognises`, which says of a content, or of the path of a dataset, whether it is in this format.
     """
 
     what: str
@@ -151,7 +153,7 @@ class LogFormat(NamedTuple):
     @property
     def room(self) -> ModuleType:
         """The module, loaded when it is asked for."""
-        return import_module(f"servotwin.logs.{self.module}")
+        return import_module(self.module if "." in self.module else f"servotwin.logs.{self.module}")
 
 
 # one line here makes a format known
@@ -161,7 +163,12 @@ LOG_FORMATS = {
     "miuzei": LogFormat("runs of the Miuzei data (JSON)", "json", "miuzei"),
     "lerobot": LogFormat("LeRobot datasets", "dataset", "lerobot"),
 }
-FORMATS = ("auto", *LOG_FORMATS)  # what may be asked for
+FORMATS = ("auto", *LOG_FORMATS)  # what may be asked for without a plug-in
+
+
+def log_formats() -> dict[str, LogFormat]:
+    """Return all formats by name: those of `LOG_FORMATS`, and of plug-ins."""
+    return LOG_FORMATS | plugins.loaded("log_formats", LOG_FORMATS)
 
 
 def formats_that_hold(what: str) -> dict[str, LogFormat]:
@@ -172,4 +179,4 @@ def formats_that_hold(what: str) -> dict[str, LogFormat]:
     >>> list(formats_that_hold("json"))
     ['bam', 'miuzei']
     """
-    return {name: one for name, one in LOG_FORMATS.items() if one.holds == what}
+    return {name: one for name, one in log_formats().items() if one.holds == what}

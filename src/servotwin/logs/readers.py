@@ -9,7 +9,7 @@ from typing import Any
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.logs.column_words import SAID
 from servotwin.logs.columns import Column, si_unit_of
-from servotwin.logs.formats import FORMATS, LOG_FORMATS, formats_that_hold
+from servotwin.logs.formats import FORMATS, formats_that_hold, log_formats
 from servotwin.logs.log import Log
 from servotwin.logs.mends import checked_mends
 from servotwin.logs.register_columns import OPTION
@@ -139,8 +139,8 @@ def read_logs(path: str | Path, format: str = "auto", *, sidecar: str | Path | N
     path : str or Path
         A table, whose sidecar says more; a JSON file of a known format; a folder of such files; or a dataset.
     format : str
-        A name of `LOG_FORMATS`, or "auto", which tells by the content; JSON files of a folder that are no logs are
-        then passed over.
+        A name of `LOG_FORMATS` or of a plug-in, or "auto", which tells by the content; JSON files of a folder that are
+        no logs are then passed over.
     sidecar : str or Path, optional
         What holds for all CSV files, in place of a `logs.json` in their folder.
     columns : str or mapping, optional
@@ -179,8 +179,8 @@ def read_logs(path: str | Path, format: str = "auto", *, sidecar: str | Path | N
     >>> [log.name for log in read_logs(folder)]
     ['a', 'b']
     """
-    if format not in FORMATS:
-        raise UnknownNameError("format of logs", str(format), FORMATS)
+    if format not in FORMATS and format not in log_formats():
+        raise UnknownNameError("format of logs", str(format), ("auto", *log_formats()))
     path, mends = Path(path), checked_mends(mend)
     for name, dataset in formats_that_hold("dataset").items():
         if format == name or (format == "auto" and dataset.room.recognises(path)):
@@ -227,20 +227,20 @@ def _files(folder: Path, format: str) -> list[Path]:
     beside = {file.stem for file in tables}
     others = [file for file in files if file.suffix.lower() == ".json" and file.name != FOLDER_FILE
               and file.stem not in beside]
-    asked = ("table", "json") if format == "auto" else (LOG_FORMATS[format].holds,)
+    asked = ("table", "json") if format == "auto" else (log_formats()[format].holds,)
     return sorted((tables if "table" in asked else []) + (others if "json" in asked else []))
 
 
 def _logs(file: Path, format: str, given: Mapping[str, Any], *, alone: bool) -> list[Log]:
     name = "csv" if format == "auto" and not _is_json(file) else format
-    if name != "auto" and LOG_FORMATS[name].holds == "table":
-        return list(LOG_FORMATS[name].room.logs_of(file, **given))
+    if name != "auto" and log_formats()[name].holds == "table":
+        return list(log_formats()[name].room.logs_of(file, **given))
     for said in ("columns", "registers"):
         if alone and isinstance(given[said], str | Mapping):
             raise InputError(f"--{said} for {file}", got="JSON", allowed="tables; JSON says what it holds")
     content: Any = read_json(file)
     if name != "auto":
-        return list(LOG_FORMATS[name].room.logs_of(file, content))
+        return list(log_formats()[name].room.logs_of(file, content))
     if isinstance(content, dict) and content.get("format") == FORMAT:
         if not alone:
             return []

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import os
+import warnings
 from dataclasses import dataclass, field
+from functools import cache
 from importlib import resources
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin import plugins
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.parameters.servo import Servo
 from servotwin.parameters.servo_file import read_servo_file
@@ -118,19 +121,28 @@ def supply_numbers(text: str, what: str) -> dict[str, float]:
 
 # --- The catalog: servo files that come with the package, and how a servo is found ------------------------------------
 
-def _servo_files() -> Path:
-    return Path(str(resources.files("servotwin.parameters"))) / "catalog"
+@cache
+def _servo_files() -> dict[str, Path]:
+    """Return the servo files of the catalog by id: those of the package, and of plug-ins."""
+    own = Path(str(resources.files("servotwin.parameters"))) / "catalog"
+    found = {path.stem: path for path in own.glob("*.toml")}
+    for package in plugins.loaded("servos").values():
+        added = {path.stem: path for path in Path(str(resources.files(package))).glob("*.toml")}
+        for name in added.keys() & found.keys():
+            warnings.warn(f"{added[name]} is left out: the catalog has {name} already", UserWarning, stacklevel=2)
+        found = added | found
+    return found
 
 
 def catalog_names() -> tuple[str, ...]:
-    """Return the ids of all servos in the catalog, sorted.
+    """Return the ids of all servos in the catalog, sorted: those of the package, and of plug-ins.
 
     Examples
     --------
     >>> "hitec-hs-755hb" in catalog_names()
     True
     """
-    return tuple(sorted(path.stem for path in _servo_files().glob("*.toml")))
+    return tuple(sorted(_servo_files()))
 
 
 def load_servo(name: str | Path) -> Servo:
@@ -167,4 +179,4 @@ def load_servo(name: str | Path) -> Servo:
             return read_servo_file(Path(text))
         raise UnknownNameError("servo", text, catalog_names(),
                                allowed="an id that `servotwin catalog list` shows, or a servo file")
-    return read_servo_file(_servo_files() / f"{text}.toml", name=f"catalog/{text}.toml")
+    return read_servo_file(_servo_files()[text], name=f"catalog/{text}.toml")

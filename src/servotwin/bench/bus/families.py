@@ -9,8 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
+from servotwin import plugins
 from servotwin.errors import BenchError
 from servotwin.parameters.registers.dynamixel_one import AX_MODELS, AX_REGISTERS, MX_MODELS, MX_REGISTERS, OneModel
 from servotwin.parameters.registers.dynamixel_x import FULL, SPEED, X_MODELS, XModel
@@ -255,7 +257,17 @@ def _models() -> dict[tuple[str, int], BusModel]:
 
 
 MODELS = _models()
-"""By protocol and model number; numbers as LeRobot and Robotis list them."""
+"""By protocol and model number, without those of plug-ins; numbers as LeRobot and Robotis list them."""
+
+
+@cache
+def known_models() -> dict[tuple[str, int], BusModel]:
+    """Return all models by protocol and model number: `MODELS`, and those of plug-ins."""
+    added = {(family.protocol, model.number): BusModel(model.number, model.name, family)
+             for pairs in plugins.loaded("bus_models").values() for model, family in pairs()}
+    return added | MODELS
+
+
 MODEL_NUMBER_AT = {"feetech": 3, "dynamixel-2": 0, "dynamixel-1": 0}
 """Address of the model number, of two bytes, by protocol."""
 

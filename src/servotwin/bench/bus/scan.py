@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from servotwin.bench.backends.backend import Backend
 from servotwin.bench.backends.serial_port import SerialBackend
-from servotwin.bench.bus.families import MODEL_NUMBER_AT, MODELS, BusModel
+from servotwin.bench.bus.families import MODEL_NUMBER_AT, BusModel, known_models
 from servotwin.bench.bus.sdk_wire import PATIENCE, BusWire, SdkWire, dynamixel_wire, feetech_wire
 from servotwin.errors import BenchError, InputError, UnknownNameError
 
@@ -112,7 +112,7 @@ def identified(wire: BusWire, protocol: str, servo: int) -> BusModel:
         If it does not answer, or is a model that is not known.
     """
     number = int.from_bytes(wire.read(servo, MODEL_NUMBER_AT[protocol], 2).data, "little")
-    model = MODELS.get((protocol, number))
+    model = known_models().get((protocol, number))
     if model is None:
         raise BenchError(f"servo {servo} at {wire.name}", f"its model number {number} is none that can be recorded")
     return model
@@ -120,7 +120,7 @@ def identified(wire: BusWire, protocol: str, servo: int) -> BusModel:
 
 def _twos(backend: Backend, baud: int) -> list[FoundServo]:
     wire = dynamixel_wire(backend, baud=baud)
-    return [FoundServo(one, "dynamixel-2", number, MODELS.get(("dynamixel-2", number)), baud)
+    return [FoundServo(one, "dynamixel-2", number, known_models().get(("dynamixel-2", number)), baud)
             for one, number in wire.ping(range(253)).items()]
 
 
@@ -132,9 +132,10 @@ def _others(backend: Backend, baud: int, ids: Sequence[int], patience: float) ->
         head = wire.read(one, 0, _HEAD).data
         fits = [name for name, place in _ID_AT.items() if head[place] == one]
         numbers = {name: int.from_bytes(head[MODEL_NUMBER_AT[name]:][:2], "little") for name in fits}
-        known = [name for name in fits if (name, numbers[name]) in MODELS]
+        known = [name for name in fits if (name, numbers[name]) in known_models()]
         if not fits:
             continue
         protocol = (known or fits)[0]
-        made.append(FoundServo(one, protocol, numbers[protocol], MODELS.get((protocol, numbers[protocol])), baud))
+        model = known_models().get((protocol, numbers[protocol]))
+        made.append(FoundServo(one, protocol, numbers[protocol], model, baud))
     return made
