@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from servotwin import plotting, units
 from servotwin.cli.summary import buzz_facts, remedy_words, rest_words
 from servotwin.cli.terminal import with_span
+from servotwin.cli.which_words import lift_facts
 from servotwin.datasheet.holding import Span
 from servotwin.look import document, escape, picture, table, to_bytes
 from servotwin.parameters import printed_points
@@ -429,20 +430,6 @@ def _curve(curve: SpeedCurve, torque: float | None) -> dict[str, Any]:
     return found | {name: getattr(curve, name).tolist() for name in (
         "speed", "torque", "current", "power", "efficiency")}
 
-
-def lift_facts(lift: Lift) -> dict[str, Any]:
-    """Return what a lift comes to in SI, ready for JSON."""
-    found: dict[str, Any] = {
-        "mass": lift.mass, "arm": lift.arm, "torque": lift.torque, "most_torque": lift.most_torque,
-        "lifts": lift.lifts, "margin": lift.margin, "blocked": lift.blocked, "time_60": lift.swing.time,
-        "mean_current": lift.swing.mean_current, "holding": lift.held._asdict()}
-    if lift.warming is not None:
-        warming = lift.warming
-        found["warming"] = {
-            "duration": warming.duration, "winding_temperature": warming.now.winding,
-            "housing_temperature": warming.now.housing, "holds": warming.warm.stands,
-            "limit_time": warming.limit_time, "thermal": dataclasses.asdict(warming.masses)}
-    return found
 
 
 # --- The page of one or more computed sheets: HTML that needs nothing but itself --------------------------------------

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +12,17 @@ import typer
 from servotwin.cli import robot_options as options
 from servotwin.cli import shared_options as shared
 from servotwin.cli.records import LEFT_OUT, Commands, usual, with_records
+from servotwin.cli.robot_options import (
+    ERRORS,
+    PAGE,
+    SUMMARY,
+    WINDOWS,
+    check_drawing,
+    check_numbers,
+    degrees,
+    validation_head,
+    validation_rows,
+)
 from servotwin.cli.robot_tasks import add_to, compare, mobile
 from servotwin.cli.terminal import emit_help, emit_json, json_text, pairs, patience, show, table
 from servotwin.text import file_stems
@@ -27,7 +36,7 @@ if TYPE_CHECKING:
 
 # --- `servotwin robot validate`: how far a simulated robot is from the real one ---------------------------------------
 
-SUMMARY, WINDOWS, ERRORS, PAGE = "summary.json", "windows.png", "errors.png", "index.html"
+
 
 DatasetArgument = Annotated[Path, typer.Argument(
     metavar="DATASET", help="Folder of a LeRobot dataset, or CSV file with a time and an action and a state of each "
@@ -90,37 +99,14 @@ def facts(found: RobotValidation, robot: str, said: Sequence[str]) -> dict[str, 
         "notes": list(dict.fromkeys((*said, *found.said)))}
 
 
-def degrees(value: float) -> str:
-    """Return an angle [rad] in degrees, a dash where there is none."""
-    return "-" if math.isnan(value) else f"{math.degrees(value):z.2f}"
-
-
-def rows(found: RobotValidation) -> list[list[str]]:
-    """Return a row for each joint: errors by kind of motion, and those of rivals [deg]."""
-    from servotwin.robots.replay import ALL, KINDS, SERVOS
-
-    made = []
-    for joint in found.joints:
-        own = found.errors[SERVOS][joint]
-        made.append([joint, *(degrees(own[kind].rms) for kind in KINDS), degrees(own[ALL].largest),
-                     *(degrees(kinds[joint][ALL].rms) for name, kinds in found.errors.items() if name != SERVOS)])
-    return made
-
-
-def head(found: RobotValidation) -> list[str]:
-    """Return what stands above the rows."""
-    from servotwin.robots.replay import KINDS, SERVOS
-
-    return ["joint", *KINDS, "at most", *(name for name in found.errors if name != SERVOS)]
-
 
 def _show(found: RobotValidation, told: dict[str, Any]) -> None:
     from servotwin.robots.replay import SERVOS
 
     worst = found.windows[0]
     late = ", ".join(f"{name} {1e3 * value:.0f} ms" for name, value in found.latency.items())
-    servos, rivals = [row[:6] for row in rows(found)], [[row[0], *row[6:]] for row in rows(found)]
-    titles = head(found)
+    servos, rivals = [row[:6] for row in validation_rows(found)], [[row[0], *row[6:]] for row in validation_rows(found)]
+    titles = validation_head(found)
     show(f"{told['robot']} beside {', '.join(told['episodes'][:3])}{' ...' if len(told['episodes']) > 3 else ''}: "
          f"simulated less measured joints, rms {degrees(found.rms(SERVOS))} deg", "",
          table(titles[:6], servos), "", "the same with other actuators, rms (deg)",
@@ -253,7 +239,8 @@ def _write_fit(found: ArmFit, told: dict[str, Any], targets: Sequence[Target], s
 # --- `servotwin robot`: robots whose joints are servos ----------------------------------------------------------------
 
 _MOST_NOTES = 6  # that are told
-_RATES = (1.0, 120.0)  # pictures a second
+
+
 
 robot = Commands(
     help="Let a robot with servos at its joints follow a motion.",
@@ -355,17 +342,6 @@ def run(
         _show_run(done, sized, found)
 
 
-def check_numbers(*, output_step: float, rate: float, blend: float | None) -> None:
-    """Raise InputError unless numbers of options are possible."""
-    from servotwin.errors import InputError
-    from servotwin.units import is_finite
-
-    for option, value in (("--output-step", output_step), ("--blend", 1.0 if blend is None else blend)):
-        if not (is_finite(value) and value > 0.0):
-            raise InputError(option, got=value, allowed="a positive number of seconds")
-    if not _RATES[0] <= rate <= _RATES[1]:
-        raise InputError("--fps", got=rate, allowed=f"{_RATES[0]:g} to {_RATES[1]:g} pictures a second")
-
 
 def _read(path: Path, joints: dict[str, str], ranges: dict[str, tuple[float, float]], **options: Any) -> Motion:
     from servotwin.robots import read_motion
@@ -373,22 +349,6 @@ def _read(path: Path, joints: dict[str, str], ranges: dict[str, tuple[float, flo
     with patience(f"reading {path}"):
         return read_motion(path, joints, ranges=ranges, **options)
 
-
-def check_drawing(plant: Any, camera: str | None, *, video: bool) -> bool:
-    """Return whether the robot can be drawn; raise if it cannot and a video is wanted."""
-    from servotwin.look.opencv import load_opencv
-    from servotwin.robots.camera import Camera, NoDrawingError
-
-    if video:
-        load_opencv()
-    try:
-        with Camera(plant, 16, 16, camera):
-            return True
-    except NoDrawingError as error:
-        if video:
-            raise NoDrawingError(f"{error}; --no-video does without") from None
-        warnings.warn(f"robot.png is left out: {error}", stacklevel=2)
-        return False
 
 
 def _show_run(done: RobotRun, sized: dict[str, Sizing], found: dict[str, Any]) -> None:

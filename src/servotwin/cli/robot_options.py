@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import math
+import warnings
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +18,7 @@ from servotwin.errors import InputError, UnknownNameError
 if TYPE_CHECKING:
     from servotwin.models import Model
     from servotwin.parameters import Supply
-    from servotwin.robots import Motion, Mount
+    from servotwin.robots import Motion, Mount, RobotValidation
     from servotwin.robots.model_file import Plant
 
 
@@ -406,3 +408,60 @@ def asked_robot(model_file: str, dataset: Path, servos: Servos, recorded: Record
     own = sorted({name for each in chosen.values() for name in each.registers}) if not servos.register else []
     said = (f"registers assumed as LeRobot writes them for {model_file} (sets {', '.join(own)})",) if own else ()
     return Asked(plant=found.model, mounts=mounts, bus=servos.bus, motions=motions, said=(*found.said, *said, *left))
+
+_RATES = (1.0, 120.0)  # pictures a second
+
+
+def check_numbers(*, output_step: float, rate: float, blend: float | None) -> None:
+    """Raise InputError unless numbers of options are possible."""
+    from servotwin.errors import InputError
+    from servotwin.units import is_finite
+
+    for option, value in (("--output-step", output_step), ("--blend", 1.0 if blend is None else blend)):
+        if not (is_finite(value) and value > 0.0):
+            raise InputError(option, got=value, allowed="a positive number of seconds")
+    if not _RATES[0] <= rate <= _RATES[1]:
+        raise InputError("--fps", got=rate, allowed=f"{_RATES[0]:g} to {_RATES[1]:g} pictures a second")
+
+
+def check_drawing(plant: Any, camera: str | None, *, video: bool) -> bool:
+    """Return whether the robot can be drawn; raise if it cannot and a video is wanted."""
+    from servotwin.look.opencv import load_opencv
+    from servotwin.robots.camera import Camera, NoDrawingError
+
+    if video:
+        load_opencv()
+    try:
+        with Camera(plant, 16, 16, camera):
+            return True
+    except NoDrawingError as error:
+        if video:
+            raise NoDrawingError(f"{error}; --no-video does without") from None
+        warnings.warn(f"robot.png is left out: {error}", stacklevel=2)
+        return False
+
+SUMMARY, WINDOWS, ERRORS, PAGE = "summary.json", "windows.png", "errors.png", "index.html"
+
+
+def degrees(value: float) -> str:
+    """Return an angle [rad] in degrees, a dash where there is none."""
+    return "-" if math.isnan(value) else f"{math.degrees(value):z.2f}"
+
+
+def validation_rows(found: RobotValidation) -> list[list[str]]:
+    """Return a row for each joint: errors by kind of motion, and those of rivals [deg]."""
+    from servotwin.robots.replay import ALL, KINDS, SERVOS
+
+    made = []
+    for joint in found.joints:
+        own = found.errors[SERVOS][joint]
+        made.append([joint, *(degrees(own[kind].rms) for kind in KINDS), degrees(own[ALL].largest),
+                     *(degrees(kinds[joint][ALL].rms) for name, kinds in found.errors.items() if name != SERVOS)])
+    return made
+
+
+def validation_head(found: RobotValidation) -> list[str]:
+    """Return what stands above the rows."""
+    from servotwin.robots.replay import KINDS, SERVOS
+
+    return ["joint", *KINDS, "at most", *(name for name in found.errors if name != SERVOS)]

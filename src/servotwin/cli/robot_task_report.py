@@ -6,13 +6,13 @@ import csv
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from servotwin import plotting
 from servotwin.cli import robot_report as files
-from servotwin.cli.robot import ERRORS, WINDOWS, degrees, head, rows
+from servotwin.cli.robot_options import ERRORS, WINDOWS, degrees, validation_head, validation_rows
 from servotwin.cli.robot_report import STYLE, figure, figures, film, joint_pages
 from servotwin.cli.robot_report import run_facts as facts
 from servotwin.cli.terminal import json_text, patience
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from servotwin.cli.outputs import Target
-    from servotwin.cli.robot_tasks import Ways
     from servotwin.robots import RobotValidation, Sizing, WaypointRun
     from servotwin.robots.arm import Arm
     from servotwin.robots.camera import Trail
@@ -401,8 +400,8 @@ def validation_page(found: RobotValidation, told: dict[str, Any]) -> str:
             f"{degrees(found.rms())}° rms off the measured ones.")
     cards = "".join(f"<li><b>{degrees(found.rms(name))}°</b>{escape(name)}</li>" for name in found.errors)
     notes = "".join(f"<li>{escape(text)}</li>" for text in told["notes"])
-    drawn = table([escape(cell) for cell in head(found)],
-                  [[escape(cell.replace("-", "−") if cell == "-" else cell) for cell in row] for row in rows(found)],
+    drawn = table([escape(cell) for cell in validation_head(found)],
+                  [[escape("−" if cell == "-" else cell) for cell in row] for row in validation_rows(found)],
                   caption="Simulated less measured angle, rms (°); at most: the largest single one of the servos")
     late = ", ".join(f"{escape(name)} {1e3 * value:.0f} ms" for name, value in found.latency.items())
     return document(title, (
@@ -639,3 +638,11 @@ def _thinned(points: Array, step: float) -> Array:
         if not kept or np.linalg.norm(point - kept[-1]) > step:
             kept.append(point)
     return np.array([*kept, points[-1]]) if kept else np.zeros((0, 3))
+
+
+
+class Ways(NamedTuple):
+    """How the joints of an arm may move for one path of its tool: as asked for, and by other criteria."""
+
+    joints: JointPath
+    others: Mapping[str, JointPath]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,12 +16,13 @@ from servotwin.cli.terminal import emit_json, json_text, pairs, patience, show, 
 
 if TYPE_CHECKING:
     from servotwin.cli.outputs import Target
+    from servotwin.cli.robot_task_report import Ways
     from servotwin.models import Model
     from servotwin.robots import WaypointRun
     from servotwin.robots.arm import Arm
     from servotwin.robots.controllers import Steering
     from servotwin.robots.task_run import Comparison, Outcome
-    from servotwin.robots.tasks import Criterion, JointPath, ToolPath
+    from servotwin.robots.tasks import Criterion, ToolPath
 
 
 
@@ -71,8 +72,7 @@ def mobile(
     """Let the mobile robot drive along waypoints."""
     from servotwin.cli import robot_report as files
     from servotwin.cli import robot_task_report as written
-    from servotwin.cli.robot import check_drawing, check_numbers
-    from servotwin.cli.robot_options import as_options
+    from servotwin.cli.robot_options import as_options, check_drawing, check_numbers
     from servotwin.robots import robot_model
 
     check_numbers(output_step=output_step, rate=written.MOBILE_RATE, blend=None)
@@ -170,12 +170,6 @@ class Asked:
     as_json: shared.JsonOption = False
 
 
-class Ways(NamedTuple):
-    """How the joints of an arm may move for one path of its tool: as asked for, and by other criteria."""
-
-    joints: JointPath
-    others: Mapping[str, JointPath]
-
 
 @usual("task", "servo", "controller", "third-link", "redundancy", "out", "force", "json")
 @with_records
@@ -219,7 +213,7 @@ def _do(arm: Arm, asked: Asked) -> None:
     """Do a task, write its files and tell of it."""
     from servotwin.cli import robot_report as files
     from servotwin.cli import robot_task_report as written
-    from servotwin.cli.robot import check_drawing, check_numbers
+    from servotwin.cli.robot_options import check_drawing, check_numbers
 
     check_numbers(output_step=asked.output_step, rate=written.TASK_RATE, blend=None)
     criterion, steering = _criterion(arm, asked.redundancy), _steering(asked.controller)
@@ -232,7 +226,7 @@ def _do(arm: Arm, asked: Asked) -> None:
             force=asked.force)
         with patience("inverse kinematics"):
             joints = criterion.solve(arm, path)
-            ways = Ways(joints, written.other_ways(arm, path, criterion, joints))
+            ways = written.Ways(joints, written.other_ways(arm, path, criterion, joints))
         if asked.ideal:
             found = _ideal(ways, targets, asked)
         else:

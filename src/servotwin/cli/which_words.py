@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -17,9 +18,9 @@ from servotwin.units.quantities import quantity
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from servotwin.datasheet import Lift
     from servotwin.datasheet.choice import AtRest, Candidate
     from servotwin.datasheet.holding import Span
-    from servotwin.datasheet.warming import Lift
     from servotwin.physics._typing import Real
     from servotwin.robots.choice import Tried
 
@@ -256,7 +257,6 @@ def candidate_facts(each: Judged) -> dict[str, Any]:
                     "stated": operating_voltages(made.servo) is not None},
         "notes": [*made.notes, *remarks(each)], "reasons": [reason._asdict() for reason in made.reasons]}
     if rest is not None:
-        from servotwin.cli.curves_report import lift_facts
 
         found |= {"smallest_move": rest.smallest_move, "smallest_move_span": rest.move_span,
                   "at_rest": None if rest.rest is None else rest.rest._asdict(),
@@ -268,4 +268,20 @@ def candidate_facts(each: Judged) -> dict[str, Any]:
             "margin": sized.margin, "verdict": sized.verdict, "rms_error": tried.run.tracking[joint].rms,
             "largest_error": tried.run.tracking[joint].largest, "peak_current": tried.peak(joint),
         } for joint, sized in tried.sizing.items()}
+    return found
+
+
+
+def lift_facts(lift: Lift) -> dict[str, Any]:
+    """Return what a lift comes to in SI, ready for JSON."""
+    found: dict[str, Any] = {
+        "mass": lift.mass, "arm": lift.arm, "torque": lift.torque, "most_torque": lift.most_torque,
+        "lifts": lift.lifts, "margin": lift.margin, "blocked": lift.blocked, "time_60": lift.swing.time,
+        "mean_current": lift.swing.mean_current, "holding": lift.held._asdict()}
+    if lift.warming is not None:
+        warming = lift.warming
+        found["warming"] = {
+            "duration": warming.duration, "winding_temperature": warming.now.winding,
+            "housing_temperature": warming.now.housing, "holds": warming.warm.stands,
+            "limit_time": warming.limit_time, "thermal": dataclasses.asdict(warming.masses)}
     return found

@@ -14,7 +14,6 @@ from servotwin.errors import InputError, UnknownNameError
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
-    from servotwin.bench.recording.recorder import Limits
     from servotwin.logs import Log
 
 
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
 # --- An experiment: what a servo is told, piece by piece, before it is known through which wire -----------------------
 
 KINDS = {"pulse_width": "s", "angle": "rad"}  # kind of command -> its SI unit
+_ROUNDING = 1e-9  # of a range
 
 
 @dataclass(frozen=True)
@@ -240,7 +240,7 @@ def experiments(names: str, limits: Limits, *, duration: float = 10.0, frame_per
 
     Examples
     --------
-    >>> from servotwin.bench.recording.recorder import Limits
+    >>> from servotwin.bench.recording.experiment import Limits
     >>> limits = Limits(kind="pulse_width", low=1e-3, high=2e-3, voltage=6.0, current=1.0)
     >>> [one.motion for one in experiments("steps,hold", limits, duration=2.0)]
     ['step', 'hold']
@@ -299,3 +299,75 @@ def _curve(motion: str, limits: Limits, frame_period: float, duration: float,
 def _pulses_only(name: str, limits: Limits) -> None:
     if limits.kind != "pulse_width":
         raise InputError(f"experiment {name!r}", got="a servo on a bus", allowed="one that takes pulses")
+
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """Range, voltage and current of a run.
+
+    Parameters
+    ----------
+    kind : {"pulse_width", "angle"}
+        What is commanded.
+    low, high : float
+        Commands that are allowed (SI), low below high.
+    voltage : float
+        Of the supply, as it is set [V].
+    current : float
+        Mean supply current over 0.25 s that ends the run [A].
+
+    Raises
+    ------
+    InputError
+        If a number makes no sense.
+
+    Examples
+    --------
+    >>> Limits(kind="pulse_width", low=1e-3, high=2e-3, voltage=6.0, current=1.0).middle
+    0.0015
+    """
+
+    kind: str
+    low: float
+    high: float
+    voltage: float
+    current: float
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise InputError("kind of limits", got=self.kind, allowed=", ".join(KINDS))
+        for name in ("low", "high", "voltage", "current"):
+            if not is_finite(getattr(self, name)):
+                raise InputError(f"limits: {name}", got=getattr(self, name), allowed="a finite number (SI)")
+        if not self.low < self.high:
+            raise InputError("limits: range", got=f"{self.low:g} to {self.high:g}", allowed="low below high")
+        if self.kind == "pulse_width" and not 0.0 < self.low:
+            raise InputError("limits: low", got=self.low, allowed="a positive pulse width [s]")
+        for name in ("voltage", "current"):
+            if getattr(self, name) <= 0.0:
+                raise InputError(f"limits: {name}", got=getattr(self, name), allowed="a positive number")
+
+    @property
+    def middle(self) -> float:
+        """Of the range (SI)."""
+        return 0.5 * (self.low + self.high)
+
+    def at(self, share: float) -> float:
+        """Return the command at a share of the range, 0 to 1 (SI)."""
+        return self.low + share * (self.high - self.low)
+
+    def check(self, experiment: Experiment) -> None:
+        """Refuse an experiment that goes beyond the range.
+
+        Raises
+        ------
+        InputError
+        """
+        if experiment.kind != self.kind:
+            raise InputError(f"experiment {experiment.name!r}", got=f"commands of {experiment.kind}", allowed=self.kind)
+        slack = _ROUNDING * (self.high - self.low)
+        if experiment.lowest < self.low - slack or experiment.highest > self.high + slack:
+            raise InputError(f"experiment {experiment.name!r}: range",
+                             got=f"{experiment.lowest:g} to {experiment.highest:g} {KINDS[self.kind]}",
+                             allowed=f"{self.low:g} to {self.high:g} {KINDS[self.kind]}")

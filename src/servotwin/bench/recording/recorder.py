@@ -12,10 +12,9 @@ from functools import partial
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Protocol, TypeVar
 
-from servotwin.bench.recording.experiment import KINDS, Experiment
-from servotwin.errors import BenchError, InputError, OutputError, OutputExistsError
+from servotwin.bench.recording.experiment import Experiment, Limits
+from servotwin.errors import BenchError, OutputError, OutputExistsError
 from servotwin.logs.sidecar import FORMAT, sidecar_path, write_json
-from servotwin.units import is_finite
 
 if TYPE_CHECKING:
     from servotwin.bench.bus import Bus
@@ -23,78 +22,7 @@ if TYPE_CHECKING:
 # --- What a servo may be asked for on a bench; said before anything moves ---------------------------------------------
 
 _WINDOW = 0.25  # s over which the current is averaged: a start draws the stall current for some tens of ms
-_ROUNDING = 1e-9
 
-
-@dataclass(frozen=True, kw_only=True)
-class Limits:
-    """Range, voltage and current of a run.
-
-    Parameters
-    ----------
-    kind : {"pulse_width", "angle"}
-        What is commanded.
-    low, high : float
-        Commands that are allowed (SI), low below high.
-    voltage : float
-        Of the supply, as it is set [V].
-    current : float
-        Mean supply current over 0.25 s that ends the run [A].
-
-    Raises
-    ------
-    InputError
-        If a number makes no sense.
-
-    Examples
-    --------
-    >>> Limits(kind="pulse_width", low=1e-3, high=2e-3, voltage=6.0, current=1.0).middle
-    0.0015
-    """
-
-    kind: str
-    low: float
-    high: float
-    voltage: float
-    current: float
-
-    def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise InputError("kind of limits", got=self.kind, allowed=", ".join(KINDS))
-        for name in ("low", "high", "voltage", "current"):
-            if not is_finite(getattr(self, name)):
-                raise InputError(f"limits: {name}", got=getattr(self, name), allowed="a finite number (SI)")
-        if not self.low < self.high:
-            raise InputError("limits: range", got=f"{self.low:g} to {self.high:g}", allowed="low below high")
-        if self.kind == "pulse_width" and not 0.0 < self.low:
-            raise InputError("limits: low", got=self.low, allowed="a positive pulse width [s]")
-        for name in ("voltage", "current"):
-            if getattr(self, name) <= 0.0:
-                raise InputError(f"limits: {name}", got=getattr(self, name), allowed="a positive number")
-
-    @property
-    def middle(self) -> float:
-        """Of the range (SI)."""
-        return 0.5 * (self.low + self.high)
-
-    def at(self, share: float) -> float:
-        """Return the command at a share of the range, 0 to 1 (SI)."""
-        return self.low + share * (self.high - self.low)
-
-    def check(self, experiment: Experiment) -> None:
-        """Refuse an experiment that goes beyond the range.
-
-        Raises
-        ------
-        InputError
-        """
-        if experiment.kind != self.kind:
-            raise InputError(f"experiment {experiment.name!r}", got=f"commands of {experiment.kind}", allowed=self.kind)
-        slack = _ROUNDING * (self.high - self.low)
-        if experiment.lowest < self.low - slack or experiment.highest > self.high + slack:
-            raise InputError(f"experiment {experiment.name!r}: range",
-                             got=f"{experiment.lowest:g} to {experiment.highest:g} {KINDS[self.kind]}",
-                             allowed=f"{self.low:g} to {self.high:g} {KINDS[self.kind]}")
 
 
 class CurrentGuard:

@@ -30,7 +30,7 @@ from servotwin.units import is_finite
 from servotwin.web.live.actions import Action, checked
 from servotwin.web.live.rules import LONGEST
 from servotwin.web.live.scene import MOST_ACTIONS, Scene, family_of, with_registers
-from servotwin.web.live.station import Endless, Row, Seen, Station
+from servotwin.web.live.station import Endless, FrameEdge, Row, Seen, Station
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -102,11 +102,6 @@ def hung(models: Sequence[Model], load: Load, supply: Mapping[str, float]) -> tu
 
 # --- What sends the pulses: a frame clock whose rate may change, and frames that get lost -----------------------------
 
-class FrameEdge(NamedTuple):
-    """The beginning of a frame: when [s], and whether its pulse is sent."""
-
-    time: float
-    sent: bool
 
 
 class Transmitter:

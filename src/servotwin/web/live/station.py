@@ -37,7 +37,6 @@ from servotwin.web.live.actions import ControlCircuit, command_signal
 if TYPE_CHECKING:
     from servotwin.loads import Load
     from servotwin.models import Model
-    from servotwin.web.live.live_bench import FrameEdge
 
 
 
@@ -397,3 +396,11 @@ class Change(NamedTuple):
     state: State
     command: Taken
     model: Model
+
+
+
+class FrameEdge(NamedTuple):
+    """The beginning of a frame: when [s], and whether its pulse is sent."""
+
+    time: float
+    sent: bool
