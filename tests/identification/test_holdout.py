@@ -9,7 +9,8 @@ import pytest
 import servotwin as st
 from servotwin.errors import InputError
 from servotwin.identification import ErrorTable, Log, LogError
-from servotwin.identification.fitting.fit import log_error, pooled, split
+from servotwin.identification.fitting.fit import split
+from servotwin.identification.fitting.traces import log_error, pooled
 
 
 def logs(**counts):

@@ -10,7 +10,8 @@ import servotwin as st
 from identification.synthetic_logs import TRUTH, noisy, run
 from servotwin.errors import InputError
 from servotwin.identification import RUNGS, friction_ladder
-from servotwin.identification.fitting.ladder import Rung, choice_of, told_of, with_criterion
+from servotwin.identification.fitting.fit import Rung
+from servotwin.identification.fitting.ladder import choice_of, told_of, with_criterion
 
 FREE = ["motor.armature_resistance", "output_inertia", "electronics.stretcher_gain"]
 PLAIN = {"starts": 1, "priors": None, "nuisance": ("delay", "angle_offset", "initial_state")}

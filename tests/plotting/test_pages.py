@@ -15,7 +15,7 @@ from servotwin import plotting
 from servotwin.cli import linear_report
 from servotwin.datasheet import Bandwidth, Loop
 from servotwin.errors import InputError
-from servotwin.identification.fitting.fit import ErrorTable, LogError
+from servotwin.identification.fitting.traces import ErrorTable, LogError
 from servotwin.identification.report import page as report_page
 from servotwin.identification.report import pictures as report_pictures
 from servotwin.logs import Log

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 
-
 # --- Numbers of a calibration in words --------------------------------------------------------------------------------
 
 def plus_minus(value: float, error: float) -> str:

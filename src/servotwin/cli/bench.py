@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 
-
 # --- What the commands of the bench ask for in the same words, and what those words mean ------------------------------
 
 BENCH, RUN, SAID = "Bench", "Experiment", "What the log says"

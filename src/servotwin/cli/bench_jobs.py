@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from servotwin.bench.recording.recorder import Watch as Watching
 
 
-
 # --- A plot in the terminal while a log is recorded -------------------------------------------------------------------
 
 _SHOWN = 6.0  # s of the run

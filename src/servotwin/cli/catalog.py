@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from servotwin.robots.model_file import Plant
 
 
-
 # --- `servotwin catalog registers` ------------------------------------------------------------------------------------
 
 def registers(

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from servotwin.physics._typing import Real
 
 
-
 # --- The loop of a digital servo at rest, in words and as facts for JSON ----------------------------------------------
 
 _ZERO_CELSIUS = 273.15
@@ -429,7 +428,6 @@ def _curve(curve: SpeedCurve, torque: float | None) -> dict[str, Any]:
         found["at_load"] = curve.at(torque)._asdict()
     return found | {name: getattr(curve, name).tolist() for name in (
         "speed", "torque", "current", "power", "efficiency")}
-
 
 
 # --- The page of one or more computed sheets: HTML that needs nothing but itself --------------------------------------

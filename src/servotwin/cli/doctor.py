@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 
-
 # --- A diagnosis as rows of text, and as facts for JSON ---------------------------------------------------------------
 
 _COMMANDS = {"wide": "in a step of 60 deg", "small": "in a step of 3 deg", "given": "in the run"}

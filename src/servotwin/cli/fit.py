@@ -24,11 +24,6 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 
-
-# --- What a table of weights with currents, speeds or sags says of a servo, in words and as JSON ----------------------
-
-
-
 # --- `servotwin fit`: the parameters of a servo, from its logs or from a bench table ----------------------------------
 
 _TABLES = (".csv", ".txt", ".tsv", ".dat")

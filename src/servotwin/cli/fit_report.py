@@ -13,9 +13,9 @@ from servotwin.cli.summary import was_set
 from servotwin.cli.terminal import emit_json, pairs, show, table
 from servotwin.errors import InputError, ServotwinError, UnknownNameError
 from servotwin.identification.fitting.checks import MENDED
-from servotwin.identification.fitting.fit import fit_percent
 from servotwin.identification.fitting.free import Space, nominal
 from servotwin.identification.fitting.stopping import Within
+from servotwin.identification.fitting.traces import fit_percent
 from servotwin.identification.report.pictures import (
     MODELS,
     dimension_of_free,
@@ -37,10 +37,9 @@ if TYPE_CHECKING:
     from servotwin.bench import LoadCalibration, TableCalibration
     from servotwin.bench.load_columns import LiftRecord
     from servotwin.identification import Advice, Fit, Ladder, Log
-    from servotwin.identification.fitting.fit import ErrorTable, Trace
+    from servotwin.identification.fitting.traces import ErrorTable, Trace
     from servotwin.models import Model
     from servotwin.parameters import Quantity, Servo
-
 
 
 # --- A fit in tables, and as facts for JSON ---------------------------------------------------------------------------
@@ -156,9 +155,9 @@ def facts(fit: Fit, files: Sequence[str]) -> dict[str, Any]:
 def _shown() -> dict[type, str]:
     """Return what is shown of the parts of a fit."""
     from servotwin.identification.fitting.advise import Advice, Experiment
-    from servotwin.identification.fitting.fit import LogError, Start
-    from servotwin.identification.fitting.ladder import Ladder, Rung
+    from servotwin.identification.fitting.fit import Ladder, Rung, Start
     from servotwin.identification.fitting.noise import CrossCorrelation
+    from servotwin.identification.fitting.traces import LogError
     from servotwin.identification.fitting.uncertainty import Unidentifiable
     from servotwin.identification.fitting.verdict import Verdict
     from servotwin.identification.fitting.yielding import Foreseen, Widened, Yielded
@@ -667,7 +666,6 @@ def limits_of(words: Sequence[str], angle: bool) -> Mapping[str | None, float]:
             raise InputError("--max-error", got=word, allowed="a positive number with a unit, such as 3deg")
         found[name.strip() or None] = value
     return found
-
 
 
 def calibrate_of_loads(path: Path, servo: Servo | None, arm: str | None, columns: Sequence[str]

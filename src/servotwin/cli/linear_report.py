@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 
-
 # --- What `servotwin linear` asks for and says, in words --------------------------------------------------------------
 
 _AMPLITUDES = ("1deg", "5deg", "20deg")

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 
-
 # --- Logs read for a command ------------------------------------------------------------------------------------------
 
 _MOST_REMARKS = 5

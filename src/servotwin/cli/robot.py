@@ -33,9 +33,7 @@ if TYPE_CHECKING:
     from servotwin.robots import Motion, RobotRun, RobotValidation, Sizing
 
 
-
 # --- `servotwin robot validate`: how far a simulated robot is from the real one ---------------------------------------
-
 
 
 DatasetArgument = Annotated[Path, typer.Argument(
@@ -97,7 +95,6 @@ def facts(found: RobotValidation, robot: str, said: Sequence[str]) -> dict[str, 
         "worst": [{**window._asdict(), "episode": found.replays[window.replay].run.motion.source}
                   for window in found.windows],
         "notes": list(dict.fromkeys((*said, *found.said)))}
-
 
 
 def _show(found: RobotValidation, told: dict[str, Any]) -> None:
@@ -241,7 +238,6 @@ def _write_fit(found: ArmFit, told: dict[str, Any], targets: Sequence[Target], s
 _MOST_NOTES = 6  # that are told
 
 
-
 robot = Commands(
     help="Let a robot with servos at its joints follow a motion.",
     epilog="Example: servotwin robot run so101 --motion wave.csv --out wave")
@@ -342,13 +338,11 @@ def run(
         _show_run(done, sized, found)
 
 
-
 def _read(path: Path, joints: dict[str, str], ranges: dict[str, tuple[float, float]], **options: Any) -> Motion:
     from servotwin.robots import read_motion
 
     with patience(f"reading {path}"):
         return read_motion(path, joints, ranges=ranges, **options)
-
 
 
 def _show_run(done: RobotRun, sized: dict[str, Sizing], found: dict[str, Any]) -> None:

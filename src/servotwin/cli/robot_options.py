@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from servotwin.robots.model_file import Plant
 
 
-
 # --- Servos, mounts and supplies of a robot out of the words of its options -------------------------------------------
 
 ALL = "*"

@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-
 # --- What the page of an arm says of its task: contour error, and the use of a redundant joint ------------------------
 
 def task_section(found: Mapping[str, Any], ways: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -638,7 +637,6 @@ def _thinned(points: Array, step: float) -> Array:
         if not kept or np.linalg.norm(point - kept[-1]) > step:
             kept.append(point)
     return np.array([*kept, points[-1]]) if kept else np.zeros((0, 3))
-
 
 
 class Ways(NamedTuple):

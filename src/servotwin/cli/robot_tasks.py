@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from servotwin.robots.tasks import Criterion, ToolPath
 
 
-
 # --- `servotwin robot mobile`: the robot on wheels drives along waypoints, by odometry --------------------------------
 
 _DRIVE, _WHEELS = "Waypoints", "Robot and servos"
@@ -168,7 +167,6 @@ class Asked:
         "--video/--no-video", help="Draw a video.", rich_help_panel=shared.OUTPUT)] = True
     force: shared.ForceOption = False
     as_json: shared.JsonOption = False
-
 
 
 @usual("task", "servo", "controller", "third-link", "redundancy", "out", "force", "json")

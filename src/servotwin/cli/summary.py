@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from servotwin.studies import Study
 
 
-
 # --- How a servo drives at rest, and what would stop it, as rows of text and as facts for JSON ------------------------
 
 _NUMBERS = {

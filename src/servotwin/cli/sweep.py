@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from servotwin.studies import Study
 
 
-
 # --- The workers of a dask scheduler, as an executor ------------------------------------------------------------------
 
 _PATIENCE = 5.0  # s until a scheduler has answered

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from servotwin.datasheet.holding import Span
 
 
-
 # --- Tables and texts as lines of a terminal of any width -------------------------------------------------------------
 
 # A table that is too wide wraps the words of its widest columns. Where that takes more lines, or a word does not fit,

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from servotwin.cli.outputs import Target
     from servotwin.identification import Log
-    from servotwin.identification.fitting.validate import Validation
+    from servotwin.identification.fitting.fit import Validation
     from servotwin.models import Model
     from servotwin.parameters import Servo
 

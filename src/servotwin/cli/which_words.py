@@ -271,7 +271,6 @@ def candidate_facts(each: Judged) -> dict[str, Any]:
     return found
 
 
-
 def lift_facts(lift: Lift) -> dict[str, Any]:
     """Return what a lift comes to in SI, ready for JSON."""
     found: dict[str, Any] = {

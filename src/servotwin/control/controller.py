@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from servotwin.parameters import Servo
 
 
-
 # --- What a controller is ---------------------------------------------------------------------------------------------
 
 Measured = Mapping[str, Any]

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from servotwin.loads import Load, Part
 
 
-
 # --- The inverse servo: which torque, voltage or command goes with a motion. These are a controller's own -------------
 
 FRICTION_SLOPE = 10.0  # s/rad at the motor, where the servo gives none; assumed, as in the catalog

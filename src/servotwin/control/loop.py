@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-
 # --- Whether a loop is stable, seen before it runs --------------------------------------------------------------------
 
 _AWAY = 1e-3  # rad and rad/s from rest, where no sign is about to change

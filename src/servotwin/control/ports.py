@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-
 # --- How a command gets to a simulated servo --------------------------------------------------------------------------
 
 @dataclass(frozen=True, kw_only=True)

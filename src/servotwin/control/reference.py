@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-
 # --- How far along a straight way from 0 to 1 one is, within limits: phases of polynomials ----------------------------
 
 # Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots, 2008, chapters 2 and 3.

@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from servotwin.simulation import Rest
 
 
-
 # --- Which servo: what each of some does with a task and within limits, and every reason why one does not -------------
 
 class Reason(NamedTuple):

@@ -46,7 +46,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-
 # --- A servo at full drive: what it turns, draws and lifts while its bridge does not pause ----------------------------
 
 _LONGEST_SWING = 30.0  # s; what takes longer creeps

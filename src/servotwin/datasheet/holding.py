@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from servotwin.simulation import Rest, Result
 
 
-
 # --- The same servo at another supply voltage, or warm ----------------------------------------------------------------
 
 _Model = TypeVar("_Model", bound="Model")

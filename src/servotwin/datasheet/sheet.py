@@ -45,7 +45,6 @@ if TYPE_CHECKING:
     from servotwin.parameters import Servo
 
 
-
 # --- What a sheet prints beside what the servo made of it does when it is simulated, figure by figure -----------------
 
 _MOST_OFF = 0.15  # of a printed figure: what is further off is flagged

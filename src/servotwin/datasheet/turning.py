@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from servotwin.parameters import Servo
 
 
-
 # --- The rotor beside the sheet: how long a servo takes to speed up, and whether that can be true ---------------------
 
 def time_constant_of(servo: Servo) -> float | None:

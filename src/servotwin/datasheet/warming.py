@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from servotwin.parameters import Servo
 
 
-
 # --- How warm a servo gets: the two thermal masses of its file, or ones assumed by its mass ---------------------------
 
 MAGNET_COEFFICIENT = -0.0015  # 1/K, assumed: -0.1 to -0.2 % per kelvin

@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from servotwin.signals import Signal
 
 
-
 # --- `diagnose`: which symptoms a servo shows, and which of its numbers makes them ------------------------------------
 
 _WIDE, _SMALL = math.radians(60.0), math.radians(3.0)

@@ -74,7 +74,6 @@ if TYPE_CHECKING:
     from servotwin.loads import Load
 
 
-
 # --- The header of an exported servo: structs, what calls return, functions -------------------------------------------
 
 HEADER = Template('''/* $title

@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 
-
 # --- The variables of an FMU: what a co-simulation sets and reads of a servo, with units, bounds and ------------------
 
 TIME, COMMAND, TORQUE, ANGLE, FRAMES_BEGIN, FIRST_SIGNAL, FIRST_PARAMETER = 0, 1, 2, 3, 4, 10, 100

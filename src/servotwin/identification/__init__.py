@@ -9,22 +9,21 @@ if TYPE_CHECKING:
     from servotwin.identification.fitting.advise import Advice, Experiment, advise
     from servotwin.identification.fitting.case import LogPart, Point
     from servotwin.identification.fitting.checks import findings
-    from servotwin.identification.fitting.fit import ErrorTable, Fit, Interval, LogError, Start, Trace
+    from servotwin.identification.fitting.fit import Fit, Ladder, Rung, Start, Validation
     from servotwin.identification.fitting.forecast import Forecast
     from servotwin.identification.fitting.free import LUMPED, FreeParameter, Space
     from servotwin.identification.fitting.identify import identify
     from servotwin.identification.fitting.ladder import (
         RUNGS,
-        Ladder,
-        Rung,
         Structure,
         as_structure,
         compare_structures,
         friction_ladder,
     )
     from servotwin.identification.fitting.suspicions.look import Finding
+    from servotwin.identification.fitting.traces import ErrorTable, Interval, LogError, Trace
     from servotwin.identification.fitting.uncertainty import Uncertainty, Unidentifiable
-    from servotwin.identification.fitting.validate import Validation, validate
+    from servotwin.identification.fitting.validate import validate
     from servotwin.identification.fitting.verdict import Cause, Verdict
     from servotwin.identification.fitting.yielding import Yielded
     from servotwin.identification.sheets.motor_range import (
@@ -70,15 +69,16 @@ _HOMES = {
     "identification.fitting.advise": ("Advice", "Experiment", "advise"),
     "identification.fitting.case": ("LogPart", "Point"),
     "identification.fitting.checks": ("findings",),
-    "identification.fitting.fit": ("ErrorTable", "Fit", "Interval", "LogError", "Start", "Trace"),
+    "identification.fitting.fit": ("Fit", "Ladder", "Rung", "Start", "Validation"),
     "identification.fitting.forecast": ("Forecast",),
     "identification.fitting.free": ("LUMPED", "FreeParameter", "Space"),
     "identification.fitting.identify": ("identify",),
     "identification.fitting.ladder": (
-        "RUNGS", "Ladder", "Rung", "Structure", "as_structure", "compare_structures", "friction_ladder"),
+        "RUNGS", "Structure", "as_structure", "compare_structures", "friction_ladder"),
     "identification.fitting.suspicions.look": ("Finding",),
     "identification.fitting.uncertainty": ("Uncertainty", "Unidentifiable"),
-    "identification.fitting.validate": ("Validation", "validate"),
+    "identification.fitting.traces": ("ErrorTable", "Interval", "LogError", "Trace"),
+    "identification.fitting.validate": ("validate",),
     "identification.fitting.verdict": ("Cause", "Verdict"),
     "identification.fitting.yielding": ("Yielded",),
     "identification.sheets.motor_range": (

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 
-
 # --- What `frequency_response` gives back: a complex gain for every amplitude and frequency ---------------------------
 
 Array = NDArray[np.float64]

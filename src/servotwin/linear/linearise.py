@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 
-
 # --- Harmonic balance of a mean-voltage servo -------------------------------------------------------------------------
 
 # The output is taken for a sine, q = q_0 + a sin θ. What friction, springs and pendulums do then has a mean and a first

@@ -29,9 +29,7 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 
-
 # --- What every loop that decides now and then can tell of itself -----------------------------------------------------
-
 
 
 class Law(Protocol):
@@ -56,7 +54,6 @@ class Law(Protocol):
 
 
 # --- A linear system over a time in which its input does not change ---------------------------------------------------
-
 
 
 class Step(NamedTuple):

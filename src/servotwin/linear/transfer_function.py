@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from servotwin.loads import Load, Part
 
 
-
 # --- The plant behind the drive, dry friction and play apart, as matrices of a linear system --------------------------
 
 Complex = NDArray[np.complex128]

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     _Tuned = DigitalServo | PulseServo | PulseServoInductive
 
 
-
 # --- The gains that a servo can be given ------------------------------------------------------------------------------
 
 _TRIED = 60  # P gains for each D, evenly by their logarithm

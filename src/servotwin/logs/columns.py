@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Container
 
 
-
 # --- Dates and times of day as time stamps ----------------------------------------------------------------------------
 
 _ISO = re.compile(r"(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d(?::\d\d(?:[.,]\d{1,9})?)?)(Z|[+-]\d\d:?\d\d)?", re.IGNORECASE)

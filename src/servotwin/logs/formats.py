@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from servotwin.logs.log import Log
 
 
-
 # --- What a reader mends in a file when it is asked to, by name -------------------------------------------------------
 
 TORN, RESET, DROP, SPREAD, CLOCK16, THOUSANDS = (

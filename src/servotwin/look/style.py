@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-
 # --- Pictures of more than one of them can show: pages, as even as possible -------------------------------------------
 
 Item = TypeVar("Item")

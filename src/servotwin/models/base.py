@@ -36,7 +36,6 @@ KINDS = {"command_voltage": "voltage", "command_angle": "angle", "pulse_width": 
 """The kind of command that a signal stands for."""
 
 
-
 class Place(NamedTuple):
     """A state: its signal name, its name in `state.modes.Vector`, and the factor from there to the signal."""
 

@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     Images = Mapping[str, Drawing]
 
 
-
 # --- The robots of Figures 28 to 30, each at one short task: pictures, tables and words for the report ----------------
 
 FIGURES = "<!-- figures -->"

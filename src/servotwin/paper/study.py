@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from servotwin.simulation import Result, StepMetrics
 
 
-
 # --- The vibration of the paper's first implementation: servo and control circuit on one soft supply, and -------------
 
 SOFT, STIFF = 0.5, 0.02  # ohm; assumed. Four alkaline AA cells have about 0.9, a laboratory supply and its leads 0.02

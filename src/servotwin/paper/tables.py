@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from servotwin.parameters import Quantity
 
 
-
 # --- Where the paper needs a correction and where its own data disagree, each with the number that shows it -----------
 
 _MOVED = 1542.0  # µs: the pulse width of the 90° row, one step of the generator longer

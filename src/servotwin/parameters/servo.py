@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from servotwin.parameters.groups import Plausible
 
 
-
 # --- A parameter with what is known about it: where it comes from, and how sure it is ---------------------------------
 
 SET_BY_USER = "set by the user"

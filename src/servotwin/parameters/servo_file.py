@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     import tomlkit
 
 
-
 # --- The table [sheet] of a servo file: the figures that a maker prints, each with unit and source --------------------
 
 ELSE = "also_at"

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-
 # --- A small kit for block diagrams: blocks, summing points, arrows, labels in math text ------------------------------
 
 _INK = COLOURS["black"]

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from servotwin.linear import SampledServo
 
 
-
 # --- The torque of a digital servo over the error that stands ---------------------------------------------------------
 
 LOOPS_A_PAGE = len(LINES) - 2

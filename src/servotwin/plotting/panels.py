@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-
 # --- Curves and points in one panel, and trains of pulses -------------------------------------------------------------
 
 _BELOW = 1.5  # levels between two trains of pulses

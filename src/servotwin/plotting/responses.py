@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from servotwin.studies import Bar, Tornado
 
 
-
 # --- Signals of a result over time, in stacked panels -----------------------------------------------------------------
 
 class Shown(NamedTuple):

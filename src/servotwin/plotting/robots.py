@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from servotwin.datasheet import SpeedCurve
 
 
-
 # --- Where a robot on wheels has driven, and where it believed that it did --------------------------------------------
 
 PATHS_A_PAGE = 4

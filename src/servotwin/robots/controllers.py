@@ -231,7 +231,6 @@ class Delayed:
 # --- Which controller a robot's servos have: plain commands, or one that knows them and the arm that they -------------
 
 
-
 class RigidBody:
     """Load torques at the shafts of servos, by inverse dynamics of the arm that a controller believes in.
 

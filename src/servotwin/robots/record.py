@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-
 # --- How often MuJoCo's solver iterates where motor and output of a servo move apart ----------------------------------
 
 # There the joint's armature is the output's alone, a few g cm², so that what touches the ground is nearly massless. A

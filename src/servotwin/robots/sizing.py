@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from servotwin.robots.run import RobotRun
 
 
-
 # --- How warm the servos of a robot get, in a motion and where it goes on for ever ------------------------------------
 
 Array = NDArray[np.float64]

@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from servotwin.robots.record import Record
 
 
-
 # --- Wheels on servos that turn endlessly, and where a robot believes that they have taken it -------------------------
 
 NEUTRAL = 1.5  # rad: where the potentiometer of a rebuilt servo stands, near the middle of its range; assumed

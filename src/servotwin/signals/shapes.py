@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 
-
 # --- The shapes that a command can have; each returns a `Signal` ------------------------------------------------------
 
 _TURN = 2.0 * math.pi

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from servotwin.physics.pieces import Pieces
 
 
-
 # --- Samples without a value: no pulses are sent there ----------------------------------------------------------------
 
 def filled(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from servotwin.studies.plan import Plan
 
 
-
 # --- Run the chunks of a plan wherever an executor takes them, and put what comes back into one table -----------------
 
 Columns = dict[str, NDArray[Any]]

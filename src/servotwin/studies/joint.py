@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 
-
 # --- Numbers that are fixed together: what is drawn in their place, and how they follow from it -----------------------
 
 Column = NDArray[Any]

@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from servotwin.studies.plan import Plan
 
 
-
 # --- The folder of a study: what defines it, a file for each finished chunk, and what came out ------------------------
 
 Column = NDArray[Any]

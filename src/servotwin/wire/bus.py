@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from servotwin.wire.service import Service
 
 
-
 # --- What is wrong with a wire ----------------------------------------------------------------------------------------
 
 KINDS = {

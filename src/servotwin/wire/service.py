@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from servotwin.wire.bus import Bus
 
 
-
 # --- Where a program finds the wire: a pseudo-terminal, or a TCP port -------------------------------------------------
 
 _MOST = 65536  # bytes of one read

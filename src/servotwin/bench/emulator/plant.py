@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from servotwin.simulation import Result
 
 
-
 # --- What hangs on the pins of a board: a simulated servo, driven by the edges of its pulses --------------------------
 
 _NEVER = 1e9  # s

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from servotwin.logs import Log
 
 
-
 # --- An experiment: what a servo is told, piece by piece, before it is known through which wire -----------------------
 
 KINDS = {"pulse_width": "s", "angle": "rad"}  # kind of command -> its SI unit
@@ -299,7 +298,6 @@ def _curve(motion: str, limits: Limits, frame_period: float, duration: float,
 def _pulses_only(name: str, limits: Limits) -> None:
     if limits.kind != "pulse_width":
         raise InputError(f"experiment {name!r}", got="a servo on a bus", allowed="one that takes pulses")
-
 
 
 @dataclass(frozen=True, kw_only=True)

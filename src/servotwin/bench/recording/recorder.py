@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 _WINDOW = 0.25  # s over which the current is averaged: a start draws the stall current for some tens of ms
 
 
-
 class CurrentGuard:
     """Watches the supply current of a run.
 

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-
 # --- The instant that a clip and a log have in common: a light that goes on, or the first motion ----------------------
 
 LED, JUMP, NONE = "led", "jump", "none"

@@ -9,18 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.fitting.case import STEP, LogPart, Point
 from servotwin.identification.fitting.forecast import Forecast
-
-if TYPE_CHECKING:
-    from servotwin.identification.fitting.fit import Fit
-
-
 
 # --- How far residuals scatter, told so that a few outliers change it little ------------------------------------------
 
@@ -428,13 +423,3 @@ class Begin(NamedTuple):
     own: tuple[Array, ...] = ()
     exactly: bool = True
     others: tuple[Mapping[str, float], ...] = ()
-
-    @classmethod
-    def after(cls, fit: Fit, *, exactly: bool = True) -> Begin:
-        """Return the beginning at the end of a fit: its rig, while its servo is given apart.
-
-        When pulses come is found anew: a law that lacks something takes other commands for the right ones.
-        """
-        if fit.phased:
-            return cls(exactly=exactly)
-        return cls(1, {name: fit.estimates[name] for name in fit.scales}, fit.own, exactly)

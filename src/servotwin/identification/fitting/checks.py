@@ -27,8 +27,7 @@ from servotwin.simulation.progress import duration_left, lines, on_terminal
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
-    from servotwin.identification.fitting.comparison import ErrorTables
-    from servotwin.identification.fitting.yielding import Widened, Yielded
+    pass
 
 
 # --- The arguments of `identify`, checked before anything runs, and what a reader has to know afterwards --------------
@@ -39,7 +38,6 @@ _LOOP_GAIN = "firmware.proportional_gain"
 _FITTED = ("output_angle", "feedback_voltage", "armature_current", "supply_current")
 _TOO_FAST = 4.0  # times the speed without load
 _PATIENCE = 1.0  # s before time left is told
-_OVERFITTED = 1.6  # error of new logs over that of the fitted ones
 
 
 def checked_logs(logs: Any) -> tuple[Log, ...]:
@@ -229,20 +227,6 @@ def checked_count(what: str, number: Any, *, least: int) -> int:
     if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < least:
         raise InputError(what, got=number, allowed=f"a whole number of at least {least}")
     return int(number)
-
-
-def warnings_of(yielded: Sequence[Yielded | Widened], tables: ErrorTables) -> tuple[str, ...]:
-    """Return what a reader has to know of a fit, a line each."""
-    found = [str(one) for one in yielded]
-    if tables.holdout and tables.training:
-        model = tables.holdout.models[0]
-        new, old = tables.holdout.by(), tables.training.by()
-        for motion in new:
-            if motion in old and new[motion][model] > _OVERFITTED * old[motion][model]:
-                ratio = new[motion][model] / old[motion][model]
-                found.append(f"{motion}: logs that were held out are off {ratio:.2g} times as far as fitted ones: they "
-                             "show what those do not, or those are too few for so many numbers")
-    return tuple(found)
 
 
 @contextmanager

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +11,12 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError
 from servotwin.identification.fitting.arrow import Begin, Loss, by_sensor
 from servotwin.identification.fitting.case import DELAY_SCALE, STEP, LogPart, Point, latency, widest
-from servotwin.identification.fitting.fit import ErrorTable, LogError, Trace, log_error
 from servotwin.identification.fitting.forecast import Forecast, LogLanes
 from servotwin.identification.fitting.free import LUMPED, Space
 from servotwin.identification.fitting.phases import PulseChoice, Scan, settled
 from servotwin.identification.fitting.slew_lag import fit_slew_lag
 from servotwin.identification.fitting.task import Task
+from servotwin.identification.fitting.traces import ErrorTable, ErrorTables, LogError, Trace, log_error
 from servotwin.logs.log import ANGLES, Log
 from servotwin.models import Model
 from servotwin.parameters import Servo
@@ -111,15 +110,6 @@ _BEYOND_M1 = ("breakaway_ratio", "stribeck_speed", "stribeck_exponent", "load_fr
               "load_friction_motor", "load_friction_external", "load_friction_motor_stribeck",
               "load_friction_external_stribeck", "load_friction_motor_quad", "load_friction_external_quad")
 _VISCOUS = "motor.motor_viscous_friction"
-
-
-@dataclass(frozen=True)
-class ErrorTables:
-    """Errors of the fitted servo and of the models beside it, and what delay, slew and lag leave, log by log."""
-
-    training: ErrorTable
-    holdout: ErrorTable
-    slew: Mapping[int, Array]
 
 
 def compare(task: Task, held_out: Sequence[int], traces: Sequence[Trace], servo: Servo,

@@ -41,13 +41,13 @@ from servotwin.identification.fitting.case import (
 )
 from servotwin.identification.fitting.checks import BY_ITSELF, explained, first_looks, mended
 from servotwin.identification.fitting.clocks import delay_range, phase_errors, ticking, unsure_commands
-from servotwin.identification.fitting.comparison import BESIDE, SLEW, ErrorTables, compare, trace_of, with_pulses_of
+from servotwin.identification.fitting.comparison import BESIDE, SLEW, compare, trace_of, with_pulses_of
 from servotwin.identification.fitting.diagnosis import diagnose
 from servotwin.identification.fitting.diagnosis.drifts import counted_stamps
 from servotwin.identification.fitting.fit import (
+    LINEARISED_TIMES,
     Fit,
     Start,
-    Trace,
     identified_servo,
     split,
     stopped,
@@ -61,6 +61,7 @@ from servotwin.identification.fitting.phases import credible, settled
 from servotwin.identification.fitting.registers import RegisterSearch, as_logs_say, register_search
 from servotwin.identification.fitting.stopping import Course, Within
 from servotwin.identification.fitting.task import HUBER, Task
+from servotwin.identification.fitting.traces import ErrorTables, Trace
 from servotwin.identification.fitting.uncertainty import (
     Counts,
     Rows,
@@ -94,6 +95,7 @@ from servotwin.identification.fitting.yielding import (
     settle,
     sizes_at,
     vague,
+    warnings_of,
     widened,
     with_remedies,
     yielded,
@@ -385,8 +387,7 @@ def _series(trace: Trace) -> SensorSeries:
 
 # --- Intervals of a fit that was stopped ------------------------------------------------------------------------------
 
-LINEARISED_TIMES = 3.0
-"""Times as wide as where the problem is straight, assumed: among kinks those of a finished fit are up to so wide."""
+
 LINEARISED = ("intervals (those here are of the problem made straight at the best so far, "
               f"{LINEARISED_TIMES:g} times as wide)")
 """What is not known, where there are such."""
@@ -804,7 +805,7 @@ def _fit(task: Task, found: Outcome, doubts: Doubts, dropped: tuple[Yielded, ...
         holdout=tables.holdout, training=tables.training, traces=traces,
         starts=tuple(Start(outcome.cost, outcome.converged) for outcome in ended),
         noise={name: forecast.noise[name] for name in forecast.sensors}, cost=found.cost, space=space, best=x,
-        warnings=(*task.remarks, *task.unsure, *checks.warnings_of((*dropped, *wide), tables),
+        warnings=(*task.remarks, *task.unsure, *warnings_of((*dropped, *wide), tables),
                   *_explained(task, dropped)),
         doubt=doubt, ends=dict(reaching), scales={n: scales[n] for n in forecast.extra}, yielded=dropped, widened=wide,
         prior_share=doubts.prior_share, allowed=doubts.allowed, spans=doubts.spans, own=found.point.own,

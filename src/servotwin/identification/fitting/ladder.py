@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,11 +21,12 @@ from servotwin.errors import InputError
 from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.arrow import Begin, Loss
 from servotwin.identification.fitting.case import LogPart
-from servotwin.identification.fitting.fit import Fit, LogError, Trace, pooled
+from servotwin.identification.fitting.fit import Fit, Ladder, Rung, begin_after
 from servotwin.identification.fitting.free import LUMPED, nominal, stated
 from servotwin.identification.fitting.identify import identify
 from servotwin.identification.fitting.phases import widening
 from servotwin.identification.fitting.stopping import Within
+from servotwin.identification.fitting.traces import LogError, Trace, pooled
 from servotwin.loads import Flexible, Load
 from servotwin.logs.log import Log
 from servotwin.models import DigitalServo, PulseServo, PulseServoInductive
@@ -107,69 +108,6 @@ def _of(trace: Trace) -> Array:
 # --- Which of several fits to the same logs the data pay for ----------------------------------------------------------
 
 _FEWEST = 3  # held out logs, whose scatter is believed
-
-
-@dataclass(frozen=True)
-class Rung:
-    """One friction law, or one structure.
-
-    Parameters
-    ----------
-    name : str
-        "M1" to "M6", or such as "digital, diode, M1".
-    fit : Fit
-    training, holdout : float
-        Rms error over all samples [rad]; nan without logs that were held out.
-    criterion : float
-        Bayesian information criterion of the fitted logs, with their residuals counted as often as those of the rung
-        that leaves least are independent; smaller is better.
-    """
-
-    name: str
-    fit: Fit
-    training: float
-    holdout: float
-    criterion: float
-
-    @property
-    def overfits(self) -> bool:
-        """Whether it is much better on the logs that it was fitted to than on others."""
-        return self.holdout > 1.3 * self.training
-
-
-@dataclass(frozen=True)
-class Ladder:
-    """All rungs, and the one that is chosen.
-
-    Parameters
-    ----------
-    rungs : tuple of Rung
-    chosen : str
-    reason : str
-    error : float
-        Rms error on logs that had no say in the choice [rad], smaller ones being luck: the logs that were held out are
-        halved, each half chooses a rung, and the other half tells its error. Where the criterion chose, that of all
-        logs that were held out; nan with fewer than two.
-    choices : tuple of str
-        The rungs that the halves chose: two that differ are a close call.
-    """
-
-    rungs: tuple[Rung, ...]
-    chosen: str
-    reason: str
-    error: float = math.nan
-    choices: tuple[str, ...] = ()
-
-    @property
-    def fit(self) -> Fit:
-        """That of the chosen rung."""
-        return self[self.chosen].fit
-
-    def __getitem__(self, name: str) -> Rung:
-        for rung in self.rungs:
-            if rung.name == name:
-                return rung
-        raise InputError("rung", got=name, allowed=", ".join(rung.name for rung in self.rungs))
 
 
 def ladder_of(rungs: Sequence[Rung], select: str) -> Ladder:
@@ -414,7 +352,7 @@ class _Climb(NamedTuple):
         fitted = []
         bases: Sequence[Rung | None] = _bases(name, self.found) or [None]
         for base in bases:
-            begin = Begin(self.options.get("starts", _STARTS)) if base is None else Begin.after(base.fit)
+            begin = Begin(self.options.get("starts", _STARTS)) if base is None else begin_after(base.fit)
             servo = _start(self.servo if base is None else base.fit.servo, name, self.servo)
             fit = self._fit(name, servo, begin._replace(exactly=exactly), tell, intervals=exactly)
             fitted.append(rung_of(name, fit))
@@ -431,7 +369,7 @@ class _Climb(NamedTuple):
             ended.add(name)
             place = next(k for k, rung in enumerate(self.found) if rung.name == name)
             rough = self.found[place].fit
-            fit = self._fit(name, rough.servo, Begin.after(rough), tell, intervals=True)
+            fit = self._fit(name, rough.servo, begin_after(rough), tell, intervals=True)
             self.found[place] = rung_of(name, fit)
             if fit.interrupted:
                 break
@@ -446,7 +384,7 @@ class _Climb(NamedTuple):
             extra = _parts(chosen.name)[1]
             given = {EXTRAS[extra]: self.servo.get(EXTRAS[extra])} if extra and not _parts(rung.name)[1] else {}
             servo = _start(chosen.fit.servo.replace(given), rung.name, self.servo)
-            fit = self._fit(rung.name, servo, Begin.after(chosen.fit, exactly=False), tell, intervals=False)
+            fit = self._fit(rung.name, servo, begin_after(chosen.fit, exactly=False), tell, intervals=False)
             if fit.interrupted:
                 break
             place = next(k for k, one in enumerate(self.found) if one.name == rung.name)

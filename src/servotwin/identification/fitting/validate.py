@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -36,11 +35,12 @@ from servotwin.identification.fitting.case import (
 from servotwin.identification.fitting.checks import explained, first_looks
 from servotwin.identification.fitting.clocks import first_offset
 from servotwin.identification.fitting.comparison import trace_of, with_pulses_of
-from servotwin.identification.fitting.fit import ErrorTable, Trace
+from servotwin.identification.fitting.fit import Validation
 from servotwin.identification.fitting.forecast import Forecast, Running
 from servotwin.identification.fitting.free import Space
-from servotwin.identification.fitting.registers import RegisterSearch, as_logs_say, register_search
+from servotwin.identification.fitting.registers import as_logs_say, register_search
 from servotwin.identification.fitting.task import HUBER, Task
+from servotwin.identification.fitting.traces import ErrorTable, Trace
 from servotwin.logs.log import Log
 from servotwin.models import MODELS, Model
 from servotwin.models.engine.memory import ACCURACY
@@ -192,58 +192,6 @@ Progress = bool | Callable[[float, str], object]
 _FINE = 1e-3  # rad, of an error: of less nobody asks
 _FAR_LESS = 0.5  # of an error: what is said
 _ANY = ("motor.armature_resistance", "motor.rotor_inertia", "motor.torque_constant", "gear.gear_reduction")
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Validation:
-    """How far a servo is off some logs.
-
-    Parameters
-    ----------
-    servo : Servo
-    model : Model
-    errors : ErrorTable
-        By log, of this one model.
-    traces : tuple of Trace
-        Every log beside the simulation.
-    nuisance : mapping of str to float
-        Delay [s], angle offset [rad] and sag [rad/V] that were used.
-    fitted : tuple of str
-        Which nuisances were fitted to these logs; the others come from the servo file's record of its fit, or are 0.
-    noise : mapping of str to float
-        How far the residuals of each sensor scatter, robust (SI).
-    warnings : tuple of str
-        What is probably wrong with the logs, a line each.
-    registers : RegisterSearch, optional
-        Of a bus servo: what stands in registers that logs did not record.
-    """
-
-    servo: Servo
-    model: Model
-    errors: ErrorTable = field(repr=False)
-    traces: tuple[Trace, ...] = field(repr=False)
-    nuisance: Mapping[str, float]
-    fitted: tuple[str, ...]
-    noise: Mapping[str, float]
-    warnings: tuple[str, ...] = ()
-    registers: RegisterSearch | None = field(default=None, repr=False)
-
-    @property
-    def total(self) -> float:
-        """Rms error over all samples of all logs [rad, or V where feedback voltages were measured]."""
-        return self.errors.total()[type(self.model).__name__]
-
-    def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write an HTML page: errors, measured over simulated, residuals.
-
-        Raises
-        ------
-        OutputExistsError, OutputError
-            If the file exists and `overwrite` is false, or it cannot be written.
-        """
-        from servotwin.identification.report.page import write_validation
-
-        return write_validation(self, Path(path), overwrite=overwrite)
 
 
 def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] | None = None, *,

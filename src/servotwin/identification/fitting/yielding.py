@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,9 @@ from servotwin.identification.fitting.uncertainty import (
 )
 from servotwin.loads import Inertia, Pendulum
 from servotwin.logs.log import Log
+
+if TYPE_CHECKING:
+    from servotwin.identification.fitting.traces import ErrorTables
 
 # --- How surely a fit knows each number: intervals, what the logs leave open, and how much of it is prior -------------
 
@@ -752,3 +755,19 @@ def _reason(task: Task, cases: list[Case], name: str) -> str:
     if name in _INERTIAS and J and R and K and step > (settles := J * R / K**2):
         return f"samples are {1e3 * step:.3g} ms apart, the motor settles in {1e3 * settles:.2g} ms"
     return ""
+
+_OVERFITTED = 1.6  # error of new logs over that of the fitted ones
+
+
+def warnings_of(yielded: Sequence[Yielded | Widened], tables: ErrorTables) -> tuple[str, ...]:
+    """Return what a reader has to know of a fit, a line each."""
+    found = [str(one) for one in yielded]
+    if tables.holdout and tables.training:
+        model = tables.holdout.models[0]
+        new, old = tables.holdout.by(), tables.training.by()
+        for motion in new:
+            if motion in old and new[motion][model] > _OVERFITTED * old[motion][model]:
+                ratio = new[motion][model] / old[motion][model]
+                found.append(f"{motion}: logs that were held out are off {ratio:.2g} times as far as fitted ones: they "
+                             "show what those do not, or those are too few for so many numbers")
+    return tuple(found)

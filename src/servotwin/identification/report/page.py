@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from servotwin.identification.fitting.fit import fit_percent
-from servotwin.identification.fitting.identify import LINEARISED_TIMES
+from servotwin.identification.fitting.fit import LINEARISED_TIMES
+from servotwin.identification.fitting.traces import fit_percent
 from servotwin.identification.report import pictures as report_pictures
 from servotwin.identification.report.pictures import (
     MODELS,
@@ -43,12 +43,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from servotwin.identification.arms.arm_fit import ArmFit
-    from servotwin.identification.fitting.fit import ErrorTable, Fit, Trace
-    from servotwin.identification.fitting.ladder import Ladder
+    from servotwin.identification.fitting.fit import Fit, Ladder, Validation
     from servotwin.identification.fitting.noise import CrossCorrelation
-    from servotwin.identification.fitting.validate import Validation
+    from servotwin.identification.fitting.traces import ErrorTable, Trace
     from servotwin.robots import RobotValidation
-
 
 
 # --- The tables of a fit's report -------------------------------------------------------------------------------------

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin import units
-from servotwin.identification.fitting.fit import fit_percent
 from servotwin.identification.fitting.free import LUMPED, nominal
 from servotwin.identification.fitting.noise import SensorSeries, cross_correlation
+from servotwin.identification.fitting.traces import fit_percent
 from servotwin.identification.fitting.verdict import FALSE_ALARM
 from servotwin.look import (
     COLOURS,
@@ -34,8 +34,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from servotwin.identification.fitting.fit import ErrorTable, Fit, Interval, Trace
+    from servotwin.identification.fitting.fit import Fit
     from servotwin.identification.fitting.noise import CrossCorrelation
+    from servotwin.identification.fitting.traces import ErrorTable, Interval, Trace
 
 
 # --- The numbers of a fit as people read them -------------------------------------------------------------------------

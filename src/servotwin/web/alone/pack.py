@@ -73,7 +73,6 @@ if TYPE_CHECKING:
     from servotwin.parameters import Servo
 
 
-
 # --- Between what a page may tell a servo commands, by the names of the parameters that say so ------------------------
 
 _DEGREES = 180.0 / math.pi

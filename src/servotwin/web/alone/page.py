@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from servotwin.web.live import Scene
 
 
-
 # --- The kernel of the page: what servos at a bench do, as WebAssembly made from the engine's text --------------------
 
 _INCLUDE = Path(__file__).parent / "include"

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from servotwin.web.live.scene import Scene
 
 
-
 # --- The registers of a bus servo as the page shows them: the maker's names, what they hold, what may be --------------
 
 def register_facts(servo: Servo) -> list[dict[str, Any]] | None:

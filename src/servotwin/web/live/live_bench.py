@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from servotwin.parameters import Servo
 
 
-
 # --- Servos of a bench that hang on one supply: its voltage joins them ------------------------------------------------
 
 class SharedSupply:
@@ -101,7 +100,6 @@ def hung(models: Sequence[Model], load: Load, supply: Mapping[str, float]) -> tu
 
 
 # --- What sends the pulses: a frame clock whose rate may change, and frames that get lost -----------------------------
-
 
 
 class Transmitter:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from servotwin.identification.fitting.fit import Trace
-from servotwin.identification.fitting.validate import Validation, validate
+from servotwin.identification.fitting.fit import Validation
+from servotwin.identification.fitting.traces import Trace
+from servotwin.identification.fitting.validate import validate
 from servotwin.identification.report.pictures import rig_text, sensor_shown
 from servotwin.loads import Load
 from servotwin.logs import Log

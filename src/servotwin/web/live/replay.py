@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-
 # --- A scene once more, from t = 0 to its end: the numbers of a page, without the page --------------------------------
 
 _MOST_POINTS = 2e6

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from servotwin.parameters import Servo
 
 
-
 # --- TOML of plain values on one line each: what a scene is written in ------------------------------------------------
 
 def toml_value(value: Any) -> str:

@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 
-
 # --- What a servo is told: a command, which a servo of pulses hears once a frame --------------------------------------
 
 _NEVER = 1e9  # s
@@ -396,7 +395,6 @@ class Change(NamedTuple):
     state: State
     command: Taken
     model: Model
-
 
 
 class FrameEdge(NamedTuple):

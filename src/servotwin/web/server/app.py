@@ -43,7 +43,6 @@ if TYPE_CHECKING:
     from servotwin.web.live import Scene
 
 
-
 # --- The files of the page, read once: whatever is asked for, no path reaches the disk --------------------------------
 
 PAGE = Path(__file__).parent.parent / "page"

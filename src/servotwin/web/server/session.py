@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from servotwin.web.server.visitor import Outbox
 
 
-
 # --- How a bench is let go on: in stretches that are short enough that others have their turn -------------------------
 
 BUDGET = 0.010  # s of computing in a turn

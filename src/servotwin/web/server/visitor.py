@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from servotwin.web.server.session import Room
 
 
-
 # --- What goes to one browser: the latest push, and short messages in order; a slow one misses pushes -----------------
 
 _MOST_TEXTS = 256  # that wait: who takes none of them is gone

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from servotwin.web.live import Push
 
 
-
 # --- How much one visitor may ask for ---------------------------------------------------------------------------------
 
 MOST_VISITORS = 8

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from servotwin.identification.fitting.case import Point, has_pulses, joined
 from servotwin.identification.fitting.diagnosis.bench import Gain, Spent, Told, TrialBench, Watched, gain, teaching
-from servotwin.identification.fitting.fit import Trace
 from servotwin.identification.fitting.free import Space, nominal
+from servotwin.identification.fitting.traces import Trace
 from servotwin.identification.fitting.verdict import Cause, shown
 from servotwin.logs.log import Log
 from servotwin.models import DigitalServo

@@ -38,9 +38,9 @@ from servotwin.identification.fitting.diagnosis.drifts import (
     lost_pulses,
     warming,
 )
-from servotwin.identification.fitting.fit import Trace
 from servotwin.identification.fitting.free import LUMPED, nominal
 from servotwin.identification.fitting.task import Task
+from servotwin.identification.fitting.traces import Trace
 from servotwin.identification.fitting.uncertainty import rows_of
 from servotwin.identification.fitting.verdict import Cause, Verdict, shown
 from servotwin.loads import Load

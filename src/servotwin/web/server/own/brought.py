@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from servotwin.web.server.session import Room
 
 
-
 # --- Fits of one visitor: begun, told how far, ended, and taken over to the bench -------------------------------------
 
 LONGEST = 600.0
