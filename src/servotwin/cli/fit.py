@@ -15,7 +15,6 @@ from servotwin.cli import shared_options as shared
 from servotwin.cli.records import usual, with_records
 from servotwin.cli.shared_options import best_kept, end_if_stopped
 from servotwin.cli.terminal import emit_json, patience, show
-from servotwin.logs.formats import reading_facts
 
 if TYPE_CHECKING:
     from servotwin.cli.outputs import Target
@@ -345,6 +344,7 @@ def _show_advice(advice: Advice, *, as_json: bool) -> None:
 
 def _report(found: _Found, files: list[str], *, as_json: bool) -> None:
     from servotwin.cli import fit_report
+    from servotwin.logs.log import reading_facts
 
     if as_json:
         more: dict[str, Any] = {"reading": reading_facts([trace.log for trace in found.fit.traces])}

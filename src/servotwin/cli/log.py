@@ -14,7 +14,7 @@ from servotwin.cli import shared_options as shared
 from servotwin.cli.records import LEFT_OUT, usual, with_records
 from servotwin.cli.terminal import emit_json, patience, show, table
 from servotwin.errors import one_line
-from servotwin.logs.formats import FORMATS, LOG_FORMATS, MENDS, read_alike
+from servotwin.logs.formats import FORMATS, LOG_FORMATS, MENDS
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -153,6 +153,8 @@ def columns_said(columns: Sequence[str] | None, rate: str | None, commanded: str
 
 def _parts(logs: Sequence[Log]) -> list[RenderableType]:
     """Return a table of the columns that were guessed or said just now, and what was passed over."""
+    from servotwin.logs.log import read_alike
+
     groups = read_alike(logs)
     shown = [some for some in groups if some[0].reading is not None
              and any(one.known not in _QUIET for one in some[0].reading.columns)]

@@ -439,6 +439,9 @@ def check_drawing(plant: Any, camera: str | None, *, video: bool) -> bool:
         warnings.warn(f"robot.png is left out: {error}", stacklevel=2)
         return False
 
+
+# --- What `servotwin robot validate` writes and says ------------------------------------------------------------------
+
 SUMMARY, WINDOWS, ERRORS, PAGE = "summary.json", "windows.png", "errors.png", "index.html"
 
 

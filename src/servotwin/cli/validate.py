@@ -13,7 +13,6 @@ from servotwin.cli import log
 from servotwin.cli import shared_options as shared
 from servotwin.cli.records import usual, with_records
 from servotwin.cli.terminal import emit_json, patience, show, table
-from servotwin.logs.formats import reading_facts
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -131,6 +130,7 @@ def _write(found: Validation, targets: list[Target], *, force: bool) -> list[str
 def _report(found: Validation, above: Mapping[str, float], limits: Mapping[str | None, float], files: list[str], *,
             as_json: bool) -> None:
     from servotwin.cli import fit_report
+    from servotwin.logs.log import reading_facts
 
     if as_json:
         emit_json({

@@ -5,8 +5,20 @@
 A positive external torque pushes the shaft towards −q (docs/theory).
 """
 
-from servotwin.loads.load import Load, Part, as_load
-from servotwin.loads.parts import Constant, Coulomb, Flexible, Free, Inertia, Pendulum, Recorded, Spring, Viscous
+from servotwin.loads.load import (
+    Constant,
+    Coulomb,
+    Flexible,
+    Free,
+    Inertia,
+    Load,
+    Part,
+    Pendulum,
+    Recorded,
+    Spring,
+    Viscous,
+    as_load,
+)
 
 __all__ = [
     "Constant", "Coulomb", "Flexible", "Free", "Inertia", "Load", "Part", "Pendulum", "Recorded", "Spring", "Viscous",

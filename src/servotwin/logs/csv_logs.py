@@ -32,7 +32,7 @@ from servotwin.logs.columns import (
     si_unit_of,
     switch_value,
 )
-from servotwin.logs.formats import DROP, SPREAD, TORN, ReadColumn, Reading
+from servotwin.logs.formats import DROP, SPREAD, TORN, Layout, ReadColumn, Reading
 from servotwin.logs.log import ANGLES, Log
 from servotwin.logs.log_checks import check_said, checked_definition, defined_commands, is_defined
 from servotwin.logs.mends import (
@@ -133,12 +133,6 @@ _SIGNALS = {names.PULSE: "pulse_width", names.COMMAND_ANGLE: "command_angle", na
 _OPTIONAL = (names.SUPPLY_CURRENT, names.ARMATURE_CURRENT, names.VOLTAGE, names.SPEED)
 _COMMAND_OF = {"time": "pulse_width", "angle": "command_angle", "voltage": "command_voltage"}
 
-
-class Layout(NamedTuple):
-    """The columns of a table: by signal, and as they are shown."""
-
-    columns: dict[str, Column]
-    shown: tuple[ReadColumn, ...]
 
 
 class _Candidate(NamedTuple):

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from servotwin import plugins
+from servotwin.logs.columns import Column
 
 if TYPE_CHECKING:
     from servotwin.logs.columns import Column
-    from servotwin.logs.log import Log
 
 
 # --- What a reader mends in a file when it is asked to, by name -------------------------------------------------------
@@ -100,33 +100,6 @@ class Reading:
         return (*self.remarks, *unread)
 
 
-def read_alike(logs: Sequence[Log]) -> list[list[Log]]:
-    """Return logs in groups whose columns were read in the same way; those without a reading are left out."""
-    groups: dict[Any, list[Log]] = {}
-    for log in logs:
-        if log.reading is not None:
-            groups.setdefault(log.reading.columns, []).append(log)
-    return list(groups.values())
-
-
-def reading_facts(logs: Sequence[Log]) -> list[dict[str, Any]]:
-    """Return how logs were read, as plain data: one entry for each way.
-
-    Examples
-    --------
-    >>> from servotwin.logs import Log
-    >>> log = Log(name="run", time=[0.0, 1.0, 2.0], command=[0.0, 1.0, 1.0], command_kind="angle",
-    ...           measured={"output_angle": [0.0, 0.5, 1.0]},
-    ...           reading=Reading(columns=(ReadColumn("ms", "time", "ms", "guessed from its name"),)))
-    >>> reading_facts([log])[0]["columns"]
-    [{'column': 'ms', 'signal': 'time', 'unit': 'ms', 'known': 'guessed from its name'}]
-    """
-    return [{"logs": [log.name for log in some],
-             "columns": [{"column": one.column, "signal": one.signal, "unit": one.unit, "known": one.known}
-                         for one in some[0].reading.columns if some[0].reading is not None],
-             "remarks": [remark for log in some if log.reading is not None for remark in log.reading.remarks]}
-            for some in read_alike(logs) if some[0].reading is not None]
-
 
 # --- The formats of logs ----------------------------------------------------------------------------------------------
 
@@ -179,3 +152,11 @@ def formats_that_hold(what: str) -> dict[str, LogFormat]:
     ['bam', 'miuzei']
     """
     return {name: one for name, one in log_formats().items() if one.holds == what}
+
+
+
+class Layout(NamedTuple):
+    """The columns of a table: by signal, and as they are shown."""
+
+    columns: dict[str, Column]
+    shown: tuple[ReadColumn, ...]

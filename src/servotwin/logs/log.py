@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -259,3 +259,32 @@ class Log:
 
 def _rebuild(state: dict[str, Any]) -> Log:
     return Log(**state)
+
+
+
+def read_alike(logs: Sequence[Log]) -> list[list[Log]]:
+    """Return logs in groups whose columns were read in the same way; those without a reading are left out."""
+    groups: dict[Any, list[Log]] = {}
+    for log in logs:
+        if log.reading is not None:
+            groups.setdefault(log.reading.columns, []).append(log)
+    return list(groups.values())
+
+
+def reading_facts(logs: Sequence[Log]) -> list[dict[str, Any]]:
+    """Return how logs were read, as plain data: one entry for each way.
+
+    Examples
+    --------
+    >>> from servotwin.logs import Log, ReadColumn, Reading
+    >>> log = Log(name="run", time=[0.0, 1.0, 2.0], command=[0.0, 1.0, 1.0], command_kind="angle",
+    ...           measured={"output_angle": [0.0, 0.5, 1.0]},
+    ...           reading=Reading(columns=(ReadColumn("ms", "time", "ms", "guessed from its name"),)))
+    >>> reading_facts([log])[0]["columns"]
+    [{'column': 'ms', 'signal': 'time', 'unit': 'ms', 'known': 'guessed from its name'}]
+    """
+    return [{"logs": [log.name for log in some],
+             "columns": [{"column": one.column, "signal": one.signal, "unit": one.unit, "known": one.known}
+                         for one in some[0].reading.columns if some[0].reading is not None],
+             "remarks": [remark for log in some if log.reading is not None for remark in log.reading.remarks]}
+            for some in read_alike(logs) if some[0].reading is not None]

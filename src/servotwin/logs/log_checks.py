@@ -24,7 +24,7 @@ from servotwin.units.words import unit_word
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from servotwin.logs.csv_logs import Layout
+    from servotwin.logs.formats import Layout
     from servotwin.tables import TextTable
 
 # --- What a log has to fulfil; every failure is one line that names the log and the column ----------------------------

@@ -20,7 +20,7 @@ from servotwin.tables import TextTable, said_lines
 from servotwin.tables.reading import MISSING, grouped_in, without_groups
 
 if TYPE_CHECKING:
-    from servotwin.logs.csv_logs import Layout
+    from servotwin.logs.formats import Layout
 
 # --- What can be mended in a table before it is a log: the words of `--mend`, and rows that are no rows ---------------
 

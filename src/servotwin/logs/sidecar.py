@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from servotwin import units
 from servotwin.errors import InputError, LoadError, UnknownNameError
 from servotwin.loads import Flexible, Load, Pendulum, Recorded, Spring
-from servotwin.loads.parts import STANDARD_GRAVITY
+from servotwin.loads.load import STANDARD_GRAVITY
 from servotwin.logs.columns import COMMANDS, NAMES, SWITCH, TIME, Column, check_unit, si_unit_of
 from servotwin.parameters import write_file
 from servotwin.tables.reading import read_bytes

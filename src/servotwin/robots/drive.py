@@ -16,7 +16,7 @@ from servotwin.errors import InputError, ServotwinError, SimulationError, Unknow
 from servotwin.models import Model
 from servotwin.robots.command_map import CommandMap, told
 from servotwin.robots.joints_layout import BLOCK, FAILED, FOREIGN, INSTANCE, MESSAGES, RECORD, WELL
-from servotwin.robots.mount import Mount, joints_of, treat_friction
+from servotwin.robots.mount import Mount, heat_notes, joints_of, treat_friction, warm_mounts
 from servotwin.robots.places import load_mujoco, places
 from servotwin.robots.record import TOO_FEW, Record, set_iterations
 from servotwin.robots.servo_groups import (
@@ -31,7 +31,6 @@ from servotwin.robots.servo_groups import (
     put_into_model,
     words_of,
 )
-from servotwin.robots.sizing import heat_notes, warm_mounts
 from servotwin.simulation import VectorSimulator
 from servotwin.simulation.compile.calls import joint_addresses
 from servotwin.simulation.start import Status

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
+from servotwin.datasheet.holding import changed, supply_values
+from servotwin.datasheet.warming import thermal_masses
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models import AveragedServo, BoundedServo, DigitalServo, Model, PulseServo, PulseServoInductive
 from servotwin.robots.coupling import actuators_at_joints, couplings_of, tendon_actuators
 from servotwin.robots.places import load_mujoco
 from servotwin.units import is_finite
+
+if TYPE_CHECKING:
+    from servotwin.models import Model
+    from servotwin.parameters.groups import Supply
 
 SERVOS = (AveragedServo, BoundedServo, PulseServo, PulseServoInductive, DigitalServo)
 _PASSIVE = {"dof_damping": "damping", "dof_frictionloss": "friction loss"}
@@ -165,3 +171,71 @@ def treat_friction(model: Any, joints: list[Joint], friction: str) -> None:
             raise InputError(f"{word} of joints with servos", got=", ".join(own), allowed="0, for friction is the "
                              "servo's: joint_friction='clear' sets it so, 'keep' leaves it as the bearing's")
 
+
+
+def with_heat(model: Model) -> Model:
+    """Return a model whose winding and housing get warm, with thermal masses assumed by its mass if it has none.
+
+    A servo of which the mass is not known either stays as it is, and so does a model without temperatures.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> "winding_temperature" in with_heat(st.PulseServo(st.load_servo("hitec-hs-755hb"))).available
+    True
+    """
+    masses = thermal_masses(model.servo)
+    if masses is None or not masses.assumed or "thermal.winding_capacity" not in model.optional:
+        return model
+    return changed(model, {f"thermal.{name}": getattr(masses, name) for name in _NUMBERS})
+
+
+def warm_mounts(servos: Mapping[str, Model | Mount], *, assume_heat: bool, shared: bool) -> dict[str, Mount]:
+    """Return mounts of servos, with thermal numbers by their mass where that is asked for and possible."""
+    if not isinstance(servos, Mapping) or not servos:
+        raise InputError("servos of a robot", got=servos, allowed="a mapping of joints to models")
+    found = {name: given if isinstance(given, Mount) else Mount(given) for name, given in servos.items()}
+    if not assume_heat:
+        return found
+    warm: dict[int, Model] = {id(mount.model): with_heat(mount.model) for mount in found.values()}
+    known = [model.servo.thermal.winding_capacity is not None for model in warm.values()]
+    if shared and not all(known):  # servos on a shared supply all have thermal masses, or none
+        return found
+    return {name: replace(mount, model=warm[id(mount.model)]) for name, mount in found.items()}
+
+
+def heat_notes(given: Mapping[str, Model | Mount], mounts: Mapping[str, Mount]) -> tuple[str, ...]:
+    """Return sentences on thermal numbers that mounts have and their servos were given without, and on none at all."""
+    assumed, unknown = [], []
+    for joint, mount in mounts.items():
+        servo = given[joint]
+        own = servo.model if isinstance(servo, Mount) else servo
+        if mount.model is not own:
+            assumed.append(joint)
+        elif "thermal.winding_capacity" in own.optional and "winding_temperature" not in own.available:
+            unknown.append(joint)
+    said = []
+    if assumed:
+        said.append(f"thermal numbers of {', '.join(assumed)} are assumed by the servo's mass")
+    if unknown:
+        said.append(f"temperatures of {', '.join(unknown)} are not known: the servo has no thermal numbers, and no "
+                    "mass either, or shares its supply with such a one")
+    return tuple(said)
+
+
+def supplied(model: Model, supply: Supply | None) -> Model:
+    """Return a model on a supply that it shares with others, as if it were alone on it; as it is on its own one.
+
+    Raises
+    ------
+    InputError
+        If the supply has no voltage, or one that is not for this servo.
+    """
+    if isinstance(model, AveragedServo):  # it knows no supply, but has one
+        model = BoundedServo(model.servo)
+    if supply is None:
+        return model
+    return changed(model, supply_values(model.servo, supply))
+
+_NUMBERS = ("winding_capacity", "housing_capacity", "winding_to_housing", "housing_to_ambient", "ambient",
+            "magnet_coefficient")

@@ -24,10 +24,9 @@ from servotwin.robots.contacts import leave_out_measured
 from servotwin.robots.coupling import couple, silence
 from servotwin.robots.model_file import plant_of
 from servotwin.robots.motion import Motion
-from servotwin.robots.mount import Mount, joints_of
+from servotwin.robots.mount import Mount, joints_of, supplied
 from servotwin.robots.places import load_mujoco
 from servotwin.robots.run import RobotRun, run_motion
-from servotwin.robots.sizing import supplied
 from servotwin.simulation.progress import Progress, shown
 
 # --- The same robot with MuJoCo's `<position>` actuators, with numbers that people use for arms of bus servos ---------

@@ -22,10 +22,9 @@ from servotwin.robots.coupling import couple, couplings_of, led
 from servotwin.robots.drive import ServoDrive
 from servotwin.robots.model_file import joint_names, joint_ranges, plant_of
 from servotwin.robots.motion import Motion
-from servotwin.robots.mount import Mount
+from servotwin.robots.mount import Mount, supplied, warm_mounts
 from servotwin.robots.places import load_mujoco
 from servotwin.robots.record import FROM_NOWHERE, Record
-from servotwin.robots.sizing import supplied, warm_mounts
 from servotwin.robots.tracking import IdealRun, Tracking, blend_window, ideal_run, tracking_of
 from servotwin.simulation.progress import Progress, shown
 from servotwin.simulation.remarks import NOT_AT_REST, Sag, floor_of, held_back, may_fall, sag_in, watches_its_supply

@@ -19,10 +19,9 @@ from servotwin.robots.arm import TOOL, Arm, scara, two_link
 from servotwin.robots.controllers import STEERINGS, Delayed, DrivePort, Plain, Steering, known_of
 from servotwin.robots.drive import ServoDrive
 from servotwin.robots.motion import Motion
-from servotwin.robots.mount import Mount
+from servotwin.robots.mount import Mount, supplied, warm_mounts
 from servotwin.robots.places import load_mujoco
 from servotwin.robots.run import SETTLE, RobotRun, finished, supply_of
-from servotwin.robots.sizing import supplied, warm_mounts
 from servotwin.robots.tasks import Criterion, JointPath, LeastMotion, ToolPath, follow, task_path
 from servotwin.robots.tracking import Contour, contour_error, ideal_run
 

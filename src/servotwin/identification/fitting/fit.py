@@ -82,6 +82,8 @@ def split(logs: Sequence[Log], holdout: Any, seed: int) -> tuple[list[int], list
 
 # --- What a fit found -------------------------------------------------------------------------------------------------
 
+LINEARISED_TIMES = 3.0
+"""Times as wide as where the problem is straight, assumed: among kinks those of a finished fit are up to so wide."""
 NOT_YET = "not determined yet"
 """How an interval is told that a fit which was stopped has left open."""
 LEAST_SHARE = 0.005
@@ -644,6 +646,3 @@ class Validation:
         from servotwin.identification.report.page import write_validation
 
         return write_validation(self, Path(path), overwrite=overwrite)
-
-LINEARISED_TIMES = 3.0
-"""Times as wide as where the problem is straight, assumed: among kinks those of a finished fit are up to so wide."""

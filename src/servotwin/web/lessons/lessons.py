@@ -8,6 +8,7 @@ from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 from servotwin.errors import InputError, UnknownNameError
+from servotwin.web.lessons.mystery import SEEDS
 from servotwin.web.live.scene import read_scene
 
 if TYPE_CHECKING:
@@ -97,3 +98,19 @@ def read_lesson(name: str, text: str) -> Lesson:
         if not isinstance(table.get(key), str):
             raise InputError(f"{key} of lesson {name}", got=table.get(key), allowed="a text")
     return Lesson(name=name, scene=scene, look=tuple(look), **{key: table[key] for key in _TEXTS})
+
+
+
+def mystery_scene(seed: object) -> Scene:
+    """Return a bench with the servo behind a seed.
+
+    Raises
+    ------
+    InputError
+        If it is no seed.
+    """
+    from servotwin.web.live.scene import Scene, SceneServo
+
+    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**31:
+        raise InputError("seed of a mystery servo", got=seed, allowed=f"a whole number from 0 to {SEEDS}")
+    return Scene(servos=(SceneServo(mystery=seed, model="PulseServo"),), name=f"Mystery servo {seed}")

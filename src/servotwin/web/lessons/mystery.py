@@ -14,7 +14,6 @@ from servotwin.units import is_finite
 
 if TYPE_CHECKING:
     from servotwin.parameters import Servo
-    from servotwin.web.live.scene import Scene
 
 BASE = "hitec-hs-755hb"
 """The servo that it is made of."""
@@ -57,43 +56,11 @@ def mystery_servo(seed: int) -> Servo:
     return replace(load_servo(BASE), name="mystery", title=f"Mystery servo {seed}").replace(values)
 
 
-def mystery_scene(seed: object) -> Scene:
-    """Return a bench with the servo behind a seed.
-
-    Raises
-    ------
-    InputError
-        If it is no seed.
-    """
-    from servotwin.web.live.scene import Scene, SceneServo
-
-    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**31:
-        raise InputError("seed of a mystery servo", got=seed, allowed=f"a whole number from 0 to {SEEDS}")
-    return Scene(servos=(SceneServo(mystery=seed, model="PulseServo"),), name=f"Mystery servo {seed}")
-
 
 def truth(seed: int) -> dict[str, float]:
     """Return the hidden numbers behind a seed (SI), each drawn evenly over the logarithm of its range."""
     return {one["name"]: drawn(seed, k, one["low"], one["high"]) for k, one in enumerate(unknowns())}
 
-
-def unknowns() -> list[dict[str, Any]]:
-    """Return what is hidden and from which range it is drawn (SI), for the page.
-
-    Examples
-    --------
-    >>> unknowns()[0]["name"], unknowns()[0]["unit"]
-    ('electronics.deadband', 's')
-    """
-    from servotwin.web.live.facts import shown_in
-
-    base, found = load_servo(BASE), []
-    for name, meaning, low, high in HIDDEN:
-        own = BOTH_WAYS[0] if name == FRICTION else name
-        usual: Any = base.get(own)
-        found.append({"name": name, "meaning": meaning, "unit": unit_of(own), "low": low * usual, "high": high * usual,
-                      "shown": shown_in(dimension_of(own))})
-    return found
 
 
 def compare(seed: int, guess: object) -> list[dict[str, Any]]:
@@ -196,4 +163,24 @@ def guess_of(servo: Servo, unsure: Collection[str] = ()) -> dict[str, float]:
         value: Any = servo.get(BOTH_WAYS[0] if friction else name)
         if ("output_coulomb_torque" if friction else name) not in unsure and isinstance(value, float):
             found[name] = value
+    return found
+
+
+
+def unknowns() -> list[dict[str, Any]]:
+    """Return what is hidden and from which range it is drawn (SI), for the page.
+
+    Examples
+    --------
+    >>> unknowns()[0]["name"], unknowns()[0]["unit"]
+    ('electronics.deadband', 's')
+    """
+    from servotwin.web.live.rules import shown_in
+
+    base, found = load_servo(BASE), []
+    for name, meaning, low, high in HIDDEN:
+        own = BOTH_WAYS[0] if name == FRICTION else name
+        usual: Any = base.get(own)
+        found.append({"name": name, "meaning": meaning, "unit": unit_of(own), "low": low * usual, "high": high * usual,
+                      "shown": shown_in(dimension_of(own))})
     return found

@@ -17,6 +17,7 @@ from servotwin.parameters.registers.held import registers_of
 from servotwin.parameters.registers.table import family_label
 from servotwin.units import factor, si_unit
 from servotwin.web.live.live_bench import load_of
+from servotwin.web.live.rules import shown_in
 from servotwin.web.live.scene import SERVO_MODELS, model_named, with_registers
 from servotwin.web.live.station import names_of
 
@@ -105,9 +106,8 @@ def _count(converter: Converter, voltage: float | None) -> int | None:
 
 # --- A servo as the page's controls know it: each parameter with unit, range, meaning and source; travel, -------------
 
-_SHOWN = {"time": "us", "angle": "deg", "inertia": "g cm2", "inductance": "mH", "torque": "mN m",
-          "torque per current": "mN m/A"}
-"""Units in which people read some dimensions; SI else."""
+
+
 SLIDER: dict[str, Any] = {
     "wide": 4.0, "of_none": (0.0, 1.0), "positive": "a positive number", "least": 1e-3,
     "floors": {"a number of at least 1": 1.0, "a number of at least 0": 0.0}, "share": "a number from 0 to 1"}
@@ -246,17 +246,6 @@ def _control(name: str, symbol: str, dimension: str, meaning: str, value: Any, l
             "dimension": dimension, "meaning": meaning, "value": list(value) if isinstance(value, tuple) else value,
             "low": low, "high": high, "shown": shown_in(dimension)}
 
-
-def shown_in(dimension: str) -> dict[str, Any]:
-    """Return the unit in which the page shows a dimension, and how much of SI one of it is.
-
-    Examples
-    --------
-    >>> shown_in("torque"), shown_in("word")
-    ({'unit': 'mN m', 'factor': 0.001}, {'unit': '', 'factor': 1.0})
-    """
-    unit = "" if dimension == "word" else _SHOWN.get(dimension, si_unit(dimension))
-    return {"unit": unit, "factor": factor(unit, dimension) if unit else 1.0}
 
 
 def _range(value: Any, rule: str, known: Any) -> tuple[float | None, float | None]:

@@ -30,7 +30,7 @@ from servotwin.errors import HIDDEN, InputError, UnknownNameError
 from servotwin.models.engine.live.posts import UNITS
 from servotwin.models.engine.live.screen import FIELDS
 from servotwin.text import LONGEST_NAME
-from servotwin.units import is_finite
+from servotwin.units import factor, is_finite, si_unit
 
 # --- Rules of what a page and a scene may say -------------------------------------------------------------------------
 
@@ -287,3 +287,19 @@ SCENE: dict[str, Rule] = {
     "end": _span("end of a scene", 0.0, LONGEST, usual=0.0),
     "load": _numbers("load", LOAD_FIELDS), "supply": _numbers("supply", SUPPLY_FIELDS), "control": CONTROL}
 """What a scene holds beside its servos, its actions, its view and its lesson."""
+
+_SHOWN = {"time": "us", "angle": "deg", "inertia": "g cm2", "inductance": "mH", "torque": "mN m",
+          "torque per current": "mN m/A"}
+"""Units in which people read some dimensions; SI else."""
+
+
+def shown_in(dimension: str) -> dict[str, Any]:
+    """Return the unit in which the page shows a dimension, and how much of SI one of it is.
+
+    Examples
+    --------
+    >>> shown_in("torque"), shown_in("word")
+    ({'unit': 'mN m', 'factor': 0.001}, {'unit': '', 'factor': 1.0})
+    """
+    unit = "" if dimension == "word" else _SHOWN.get(dimension, si_unit(dimension))
+    return {"unit": unit, "factor": factor(unit, dimension) if unit else 1.0}

@@ -25,7 +25,7 @@ from servotwin.web.server.wire import line_of, packed, text_of
 if TYPE_CHECKING:
     from servotwin.models import Model
     from servotwin.parameters import Servo
-    from servotwin.web.server.visitor import Outbox
+    from servotwin.web.server.wire import Outbox
 
 
 # --- How a bench is let go on: in stretches that are short enough that others have their turn -------------------------

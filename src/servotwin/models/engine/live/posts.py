@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.loads.parts import STANDARD_GRAVITY
+from servotwin.loads.load import STANDARD_GRAVITY
 from servotwin.models.engine.live import screen
 from servotwin.models.engine.live.screen import NO_LOW, USED, Lines, Low, Said, Switch
 from servotwin.models.engine.memory import Inputs, Memories, in_force, memory_at, put_memory, put_started, with_bodies

@@ -17,7 +17,7 @@ import numpy as np
 
 from servotwin.errors import InputError, ServotwinError
 from servotwin.logs import Log, Reading, read_logs
-from servotwin.logs.formats import reading_facts
+from servotwin.logs.log import reading_facts
 from servotwin.web.server.own.frames import RefusedError
 from servotwin.web.server.wire import LONGEST_UPLOAD
 
