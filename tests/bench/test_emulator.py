@@ -18,7 +18,7 @@ from servotwin.bench.backends import EmulatedBackend, SerialBackend
 from servotwin.bench.emulator import process
 from servotwin.bench.emulator.plant import Front, ServoOnPins
 from servotwin.bench.emulator.process import Microcontroller, Pins
-from servotwin.bench.emulator.terminal import Terminal
+from servotwin.bench.emulator.pseudo_terminal import Terminal
 from servotwin.bench.wire import Board, protocol
 from servotwin.errors import BenchError, InputError
 

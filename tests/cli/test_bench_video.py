@@ -9,7 +9,7 @@ import typer
 pytest.importorskip("cv2", reason="the extra `video` is not installed")
 
 from bench.clips import Scene, film
-from servotwin.cli import app
+from servotwin.cli import commands
 from servotwin.cli.bench import marker, video
 from servotwin.logs import read_logs
 
@@ -20,7 +20,7 @@ def bench(cli, monkeypatch):
     group.command("marker")(marker)
     group.command("video")(video)
     whole.add_typer(group, name="bench")
-    monkeypatch.setattr(app, "app", whole)
+    monkeypatch.setattr(commands, "app", whole)
     return lambda *words: cli("bench", *words)
 
 

@@ -23,7 +23,7 @@ import pytest
 import typer
 
 import servotwin as st
-from servotwin.cli.app import app
+from servotwin.cli.commands import app
 from servotwin.errors import HIDDEN
 from servotwin.logs.csv_logs import write_log
 from servotwin.parameters.servo_file import servo_text
@@ -93,7 +93,8 @@ ELSEWHERE = {
 }
 # Modules that write files or make their contents; a new one has to show here what names do in it
 WRITERS = {
-    "bench/recording/recorder.py", "bench/recording/wiring.py", "bench/video/film_log.py", "bench/video/marker.py",
+    "bench/recording/bench_wiring.py", "bench/recording/recorder.py", "bench/video/film_log.py",
+    "bench/video/marker.py",
     "cli/bench.py", "cli/curves.py", "cli/curves_report.py", "cli/linear.py", "cli/linear_report.py", "cli/log.py",
     "cli/robot.py", "cli/robot_report.py", "cli/robot_task_report.py", "cli/robot_tasks.py", "cli/web.py",
     "export/c_writing.py", "export/fmu.py", "identification/report/page.py", "identification/sheets/sheet.py",

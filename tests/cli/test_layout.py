@@ -12,7 +12,7 @@ from typer.main import get_command
 
 import servotwin as st
 from servotwin.cli import main, terminal
-from servotwin.cli.app import app
+from servotwin.cli.commands import app
 
 ROOT = Path(__file__).parents[2]
 WIDE, WIDTHS = 200, (60, 80, 120)

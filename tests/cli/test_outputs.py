@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from servotwin import plotting, simulation
-from servotwin.cli.outputs import Target, check_targets, staged
+from servotwin.cli.output_files import Target, check_targets, staged
 from servotwin.errors import OutputError, OutputExistsError
 
 STEP = ["--step", "0:90"]

@@ -10,7 +10,7 @@ from identification.synthetic_logs import TRUTH, noisy, run
 from servotwin.identification import identify
 from servotwin.identification.fitting.diagnosis.bench import gain, teaching
 from servotwin.identification.fitting.identify import _outliers
-from servotwin.identification.fitting.noise import SensorSeries, cross_correlation, isolated, noise_of
+from servotwin.identification.fitting.residual_noise import SensorSeries, cross_correlation, isolated, noise_of
 from servotwin.identification.fitting.uncertainty import Rows
 from servotwin.identification.fitting.verdict import against, judge, rival
 from servotwin.logs.log import Log

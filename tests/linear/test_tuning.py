@@ -7,7 +7,7 @@ import pytest
 
 import servotwin as st
 from servotwin.errors import InputError
-from servotwin.linear.tuning import OuterLoop, stepped
+from servotwin.linear.gain_search import OuterLoop, stepped
 
 SERVOS = {
     "feetech-sts3215-12v": st.DigitalServo, "dynamixel-xl430-w250": st.DigitalServo, "dsservo-ds3218": st.DigitalServo,

@@ -9,8 +9,8 @@ import servotwin as st
 from robots.robots_cases import servo
 from servotwin.errors import InputError
 from servotwin.robots import Motion, run_motion, sizing_of, validate_robot
-from servotwin.robots.contacts import fall_of, leave_out, leave_out_measured, overlaps
 from servotwin.robots.model_file import plant_of, robot_model
+from servotwin.robots.overlaps import fall_of, leave_out, leave_out_measured, overlaps
 from servotwin.robots.record import FROM_NOWHERE
 
 mujoco = pytest.importorskip("mujoco", reason="the extra `robots` is not installed")

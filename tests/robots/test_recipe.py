@@ -10,7 +10,7 @@ from robots.robots_cases import LENGTH, MASS, WEIGHT, hinge, servo
 from servotwin.errors import InputError
 from servotwin.models import default_model
 from servotwin.robots import recipe_of
-from servotwin.robots.recipe import arm_of, lift_of_twin
+from servotwin.robots.actuator_recipe import arm_of, lift_of_twin
 
 mujoco = pytest.importorskip("mujoco", reason="the extra `robots` is not installed")
 NO_FRICTION = {"friction.coulomb_torque_forward": 0.0, "friction.coulomb_torque_backward": 0.0,

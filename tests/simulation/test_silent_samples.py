@@ -7,7 +7,7 @@ import pytest
 
 import servotwin as st
 from servotwin.errors import CommandError
-from servotwin.studies.metrics import decision_times, step_time
+from servotwin.studies.lane_metrics import decision_times, step_time
 
 NAN = math.nan
 SERVO = st.load_servo("hitec-hs-755hb").replace({

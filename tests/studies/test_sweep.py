@@ -8,7 +8,7 @@ import pytest
 import servotwin as st
 from servotwin.errors import CommandError, InputError, ParameterError, UnknownNameError
 from servotwin.studies import METRICS, variance_share
-from servotwin.studies.metrics import decision_times, lane_metrics, output_times
+from servotwin.studies.lane_metrics import decision_times, lane_metrics, output_times
 
 STEP = st.signals.step(0.0, 60.0, at=0.1, unit="deg")
 VARY = {"motor.torque_constant": "normal:5%", "electronics.deadband": "uniform:4us..8us",

@@ -9,7 +9,7 @@ import pytest
 import servotwin as st
 from servotwin.errors import InputError, OutputError
 from servotwin.studies import variance_share
-from servotwin.studies.metrics import lane_metrics, output_times, step_time
+from servotwin.studies.lane_metrics import lane_metrics, output_times, step_time
 from servotwin.studies.study import bar_of
 
 STEP = st.signals.step(0.0, 60.0, at=0.1, unit="deg")

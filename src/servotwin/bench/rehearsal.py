@@ -12,7 +12,7 @@ from servotwin.errors import BenchError
 
 if TYPE_CHECKING:
     from servotwin.bench.backends import Backend
-    from servotwin.bench.recording.wiring import Wiring
+    from servotwin.bench.recording.bench_wiring import Wiring
     from servotwin.loads import Load
     from servotwin.models import Model
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import LEFT_OUT, Commands, usual, with_records
+from servotwin.cli.option_records import LEFT_OUT, Commands, usual, with_records
 from servotwin.cli.terminal import emit, emit_help, emit_json, json_text, pairs, patience, show, table, typed
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from servotwin.bench.video import Filmed
     from servotwin.bench.video.marker import Region
     from servotwin.cli.bench_jobs import Job
-    from servotwin.cli.outputs import Target
+    from servotwin.cli.output_files import Target
     from servotwin.loads import Load
     from servotwin.models import Model
 
@@ -252,7 +252,7 @@ def calibrate(
 
 
 def _with_channel(base: Wiring, what: str) -> Wiring:
-    from servotwin.bench.recording.wiring import CHANNEL
+    from servotwin.bench.recording.bench_wiring import CHANNEL
 
     return base.replace(channels=tuple(dict.fromkeys((*base.channels, CHANNEL[what]))))
 
@@ -260,7 +260,7 @@ def _with_channel(base: Wiring, what: str) -> Wiring:
 def _wires(rig: AnalogRig, what: str, meter: str | None) -> Calibration:
     """Read a channel at each value of the meter; nothing moves."""
     from servotwin.bench.recording import calibrated
-    from servotwin.bench.recording.wiring import CHANNEL, UNIT
+    from servotwin.bench.recording.bench_wiring import CHANNEL, UNIT
     from servotwin.units.quantities import quantity
 
     dimension = "current" if UNIT[what] == "A" else "voltage"
@@ -297,7 +297,7 @@ def _angle(rig: AnalogRig, meter: str | None, allowed: _Allowed, servo: str | No
     """Move the servo from place to place, read the tap, and take the angle of a dial."""
     from servotwin.bench import calibrate_table
     from servotwin.cli.fit_report import calibration_facts, show_table_calibration
-    from servotwin.cli.outputs import Target, check_targets
+    from servotwin.cli.output_files import Target, check_targets
     from servotwin.parameters import load_servo, write_file
     from servotwin.tables import csv_text
 
@@ -450,7 +450,7 @@ def marker(
 ) -> None:
     """Write a mark with a ruler that checks the printer."""
     from servotwin.bench.video import mark_bytes
-    from servotwin.cli.outputs import Target, check_targets, staged
+    from servotwin.cli.output_files import Target, check_targets, staged
     from servotwin.units.quantities import quantity
 
     length = quantity("--side", side, "length", positive=True)
@@ -496,7 +496,7 @@ def video(
     from servotwin.bench.video import read_clip
     from servotwin.bench.video.film_log import film_log
     from servotwin.cli.fit_report import reading_mends
-    from servotwin.cli.outputs import check_targets
+    from servotwin.cli.output_files import check_targets
     from servotwin.units.quantities import quantity
 
     targets = _targets(out)
@@ -517,7 +517,7 @@ def video(
 
 
 def _targets(out: Path) -> list[Target]:
-    from servotwin.cli.outputs import Target
+    from servotwin.cli.output_files import Target
     from servotwin.logs.sidecar import sidecar_path
 
     return [Target(option="--out", path=out, endings=(".csv",)),
@@ -552,7 +552,7 @@ def _instant(words: str | None, led: str | None) -> str | float:
 
 
 def _write(targets: list[Target], text: str, sidecar: str, *, force: bool) -> None:
-    from servotwin.cli.outputs import staged
+    from servotwin.cli.output_files import staged
 
     with staged(targets, force=force) as drafts:
         drafts[0].write_bytes(text.encode())
@@ -694,7 +694,7 @@ def rehearse(
 
 def _offered(model: Model, load: Load, wiring: Wiring, *, noise: float, seed: int) -> None:
     """Let any program talk to the board, until Ctrl-C."""
-    from servotwin.bench.emulator.terminal import Terminal
+    from servotwin.bench.emulator.pseudo_terminal import Terminal
     from servotwin.bench.rehearsal import rehearsal_board
 
     board, _ = rehearsal_board(model, load, wiring, noise=noise, seed=seed, real_time=True)

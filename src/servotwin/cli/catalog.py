@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import Commands, usual, with_records
+from servotwin.cli.option_records import Commands, usual, with_records
 from servotwin.cli.robot_options import ContactOption, PackageOption
 from servotwin.cli.terminal import emit_help, emit_json, pairs, patience, show, table, with_span
 

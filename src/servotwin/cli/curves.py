@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import LEFT_OUT, usual, with_records
+from servotwin.cli.option_records import LEFT_OUT, usual, with_records
 from servotwin.cli.terminal import emit_json, pairs, patience, show, table
 
 if TYPE_CHECKING:
-    from servotwin.cli.outputs import Target
+    from servotwin.cli.output_files import Target
     from servotwin.datasheet import DataSheet
     from servotwin.models import Model
 
@@ -88,7 +88,7 @@ def curves(
 
 
 def _targets(paths: dict[str, Path | None], servos: list[str], voltages: int, *, force: bool) -> list[Target]:
-    from servotwin.cli.outputs import Target, check_targets, page_name
+    from servotwin.cli.output_files import Target, check_targets, page_name
     from servotwin.errors import InputError
     from servotwin.plotting import CURVES_A_PAGE, LOOPS_A_PAGE, pages
 
@@ -141,7 +141,7 @@ def _computed(models: list[Model], options: dict[str, Any]) -> list[DataSheet]:
 
 
 def _write(sheets: list[DataSheet], targets: list[Target], torque: float | None, *, force: bool) -> None:
-    from servotwin.cli.outputs import staged
+    from servotwin.cli.output_files import staged
 
     with patience("drawing"), staged(targets, force=force) as drafts:
         for target, draft in zip(targets, drafts, strict=True):

@@ -15,7 +15,7 @@ import typer
 
 from servotwin.cli import shared_options as shared
 from servotwin.cli.log import Reading
-from servotwin.cli.records import LEFT_OUT, usual, with_records
+from servotwin.cli.option_records import LEFT_OUT, usual, with_records
 from servotwin.cli.terminal import emit_json, pairs, patience, show, table
 from servotwin.logs.formats import MENDS
 

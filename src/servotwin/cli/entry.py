@@ -81,9 +81,9 @@ def _command(app: Typer) -> TyperGroup:
 def _run(words: Sequence[str]) -> int:
     import typer
 
-    from servotwin.cli import app
+    from servotwin.cli import commands
 
-    command = _command(app.app)
+    command = _command(commands.app)
     try:
         # Not command(...): that would print errors in its own way, and treat a broken pipe as one of ours.
         with command.make_context("servotwin", list(words)) as context:

@@ -12,12 +12,12 @@ import typer
 
 from servotwin.cli import log
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import usual, with_records
+from servotwin.cli.option_records import usual, with_records
 from servotwin.cli.shared_options import best_kept, end_if_stopped
 from servotwin.cli.terminal import emit_json, patience, show
 
 if TYPE_CHECKING:
-    from servotwin.cli.outputs import Target
+    from servotwin.cli.output_files import Target
     from servotwin.identification import Advice, Fit, Ladder, Log
     from servotwin.identification.fitting.stopping import Within
     from servotwin.models import Model
@@ -255,7 +255,7 @@ def _check_no_table(logs: list[Path] | None, arm: str | None) -> None:
 
 
 def _targets(out: Path | None, report: Path | None, inputs: list[Path], *, force: bool) -> list[Target]:
-    from servotwin.cli.outputs import Target, check_targets
+    from servotwin.cli.output_files import Target, check_targets
 
     targets = []
     if out is not None:
@@ -322,7 +322,7 @@ def _further(model: Model) -> list[str]:
 
 
 def _write(found: _Found, targets: list[Target], *, force: bool) -> list[str]:
-    from servotwin.cli.outputs import staged
+    from servotwin.cli.output_files import staged
 
     with patience("writing"), staged(targets, force=force) as drafts:
         for target, draft in zip(targets, drafts, strict=True):

@@ -27,7 +27,7 @@ from servotwin.identification.report.pictures import (
     tables_of,
 )
 from servotwin.logs.formats import MENDS
-from servotwin.look.report import facts_of
+from servotwin.look.plain_data import facts_of
 from servotwin.studies.kinds import Distribution, Normal, Offset, Relative, Uniform, distribution_of
 from servotwin.units.quantities import number_and_unit, quantity
 
@@ -156,7 +156,7 @@ def _shown() -> dict[type, str]:
     """Return what is shown of the parts of a fit."""
     from servotwin.identification.fitting.advise import Advice, Experiment
     from servotwin.identification.fitting.fit import Ladder, Rung, Start
-    from servotwin.identification.fitting.noise import CrossCorrelation
+    from servotwin.identification.fitting.residual_noise import CrossCorrelation
     from servotwin.identification.fitting.traces import LogError
     from servotwin.identification.fitting.uncertainty import Unidentifiable
     from servotwin.identification.fitting.verdict import Verdict
@@ -278,7 +278,7 @@ def calibrate_from(path: Path, servo: str | None, out: Path | None, *, change: S
         If table, servo or output is not usable.
     """
     from servotwin.bench import calibrate_table, is_load_table, is_pattern
-    from servotwin.cli.outputs import Target, check_targets
+    from servotwin.cli.output_files import Target, check_targets
     from servotwin.cli.shared_options import servo_of
     from servotwin.errors import InputError
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import usual, with_records
+from servotwin.cli.option_records import usual, with_records
 from servotwin.cli.terminal import emit_json, pairs, patience, show, table
 
 if TYPE_CHECKING:
-    from servotwin.cli.outputs import Target
+    from servotwin.cli.output_files import Target
     from servotwin.linear import Tuning
     from servotwin.linear.overview import Overview
     from servotwin.loads import Load
@@ -86,7 +86,7 @@ def linear(
 
 
 def _targets(paths: dict[str, Path | None], servo: str, amplitudes: int, *, tune: bool, force: bool) -> list[Target]:
-    from servotwin.cli.outputs import Target, check_targets, page_name
+    from servotwin.cli.output_files import Target, check_targets, page_name
     from servotwin.errors import InputError
     from servotwin.look import CURVES_A_PAGE, pages
 
@@ -120,7 +120,7 @@ def _tune(model: Model, load: Load, wanted: dict[str, Any], *, as_json: bool) ->
 
 
 def _write(found: Overview, targets: list[Target], *, force: bool) -> None:
-    from servotwin.cli.outputs import staged
+    from servotwin.cli.output_files import staged
 
     with patience("drawing"), staged(targets, force=force) as drafts:
         for target, draft in zip(targets, drafts, strict=True):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import LEFT_OUT, usual, with_records
+from servotwin.cli.option_records import LEFT_OUT, usual, with_records
 from servotwin.cli.terminal import emit_json, patience, show, table
 from servotwin.errors import one_line
 from servotwin.logs.formats import FORMATS, LOG_FORMATS, MENDS
@@ -19,7 +19,7 @@ from servotwin.logs.formats import FORMATS, LOG_FORMATS, MENDS
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from servotwin.cli.outputs import Target
+    from servotwin.cli.output_files import Target
     from servotwin.identification import Log
     from servotwin.identification.survey.survey import Survey
     from servotwin.models import Model
@@ -244,7 +244,7 @@ def _mends(words: Sequence[str]) -> tuple[str, ...]:
 
 def _check(files: Sequence[Path], out: Path | None, plot: Path | None, count: int, *, force: bool) -> list[Target]:
     """Return the files that are written, one of each kind for each log; none of them is there, or is read."""
-    from servotwin.cli.outputs import Target, check_targets
+    from servotwin.cli.output_files import Target, check_targets
     from servotwin.logs.sidecar import sidecar_path
 
     targets = []
@@ -266,7 +266,7 @@ def _numbered(path: Path, k: int, count: int) -> Path:
 
 
 def _write(found: Sequence[Survey], targets: Sequence[Target], *, force: bool) -> list[str]:
-    from servotwin.cli.outputs import staged
+    from servotwin.cli.output_files import staged
     from servotwin.logs.csv_logs import log_bytes
 
     with patience("writing"), staged(targets, force=force) as drafts:

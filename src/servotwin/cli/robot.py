@@ -11,7 +11,7 @@ import typer
 
 from servotwin.cli import robot_options as options
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import LEFT_OUT, Commands, usual, with_records
+from servotwin.cli.option_records import LEFT_OUT, Commands, usual, with_records
 from servotwin.cli.robot_options import (
     ERRORS,
     PAGE,
@@ -28,7 +28,7 @@ from servotwin.cli.terminal import emit_help, emit_json, json_text, pairs, patie
 from servotwin.text import file_stems
 
 if TYPE_CHECKING:
-    from servotwin.cli.outputs import Target
+    from servotwin.cli.output_files import Target
     from servotwin.identification.arms import ArmFit
     from servotwin.robots import Motion, RobotRun, RobotValidation, Sizing
 
@@ -119,7 +119,7 @@ def _write(found: RobotValidation, told: dict[str, Any], targets: Sequence[Targe
     if not targets:
         return
     from servotwin import plotting
-    from servotwin.cli.outputs import staged
+    from servotwin.cli.output_files import staged
     from servotwin.cli.robot_task_report import errors_picture, write_windows
     from servotwin.cli.robot_task_report import validation_page as page
 
@@ -214,7 +214,7 @@ def _write_fit(found: ArmFit, told: dict[str, Any], targets: Sequence[Target], s
     if not targets:
         return
     from servotwin import plotting
-    from servotwin.cli.outputs import staged
+    from servotwin.cli.output_files import staged
     from servotwin.cli.robot_report import figure, figures, joint_pages
     from servotwin.cli.robot_task_report import errors_picture, write_windows
     from servotwin.identification.report.page import arm_page

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from servotwin.cli.outputs import Target, check_targets, page_name, staged
+from servotwin.cli.output_files import Target, check_targets, page_name, staged
 from servotwin.cli.summary import model_name, supply_facts
 from servotwin.cli.terminal import json_text, patience
 from servotwin.errors import OutputError

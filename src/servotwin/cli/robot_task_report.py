@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from servotwin.cli.outputs import Target
+    from servotwin.cli.output_files import Target
     from servotwin.robots import RobotValidation, Sizing, WaypointRun
     from servotwin.robots.arm import Arm
     from servotwin.robots.camera import Trail
@@ -166,7 +166,7 @@ def mobile_pairs(found: dict[str, Any]) -> list[tuple[str, str]]:
 def write(run: WaypointRun, found: dict[str, Any], targets: Sequence[Any], output_step: float, *, force: bool) -> None:
     """Write all files, or after an error none."""
     from servotwin import plotting
-    from servotwin.cli.outputs import staged
+    from servotwin.cli.output_files import staged
 
     with staged(targets, force=force) as drafts:
         places: dict[str, Path] = {target.path.name: draft for target, draft in zip(targets, drafts, strict=True)}
@@ -526,7 +526,7 @@ def write_task(run: TaskRun, sized: Mapping[str, Sizing], ways: Ways, targets: S
 def write_ideal(done: IdealTask, ways: Ways, targets: Sequence[Target], found: Mapping[str, Any], *, force: bool,
                 output_step: float) -> None:
     """Write all files of a task that ideal actuators have done, or after an error none."""
-    from servotwin.cli.outputs import staged
+    from servotwin.cli.output_files import staged
 
     with staged(targets, force=force) as drafts:
         places = {target.path.name: draft for target, draft in zip(targets, drafts, strict=True)}

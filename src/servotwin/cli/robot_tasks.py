@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import LEFT_OUT, usual, with_records
+from servotwin.cli.option_records import LEFT_OUT, usual, with_records
 from servotwin.cli.robot_options import ALL, Chosen, as_options, models_of, named_words, supply_of
 from servotwin.cli.terminal import emit_json, json_text, pairs, patience, show, table
 
 if TYPE_CHECKING:
-    from servotwin.cli.outputs import Target
+    from servotwin.cli.output_files import Target
     from servotwin.cli.robot_task_report import Ways
     from servotwin.models import Model
     from servotwin.robots import WaypointRun
@@ -390,7 +390,7 @@ def _outcomes(comparison: Comparison, chosen: Sequence[Any], *, quiet: bool) -> 
 
 def _write(done: Sequence[Outcome], found: dict[str, Any], targets: Sequence[Target], *, force: bool) -> None:
     from servotwin import plotting
-    from servotwin.cli.outputs import staged
+    from servotwin.cli.output_files import staged
     from servotwin.cli.robot_task_report import comparison_page as page
     from servotwin.cli.robot_task_report import conditions_picture
     from servotwin.tables import csv_text

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import usual, with_records
+from servotwin.cli.option_records import usual, with_records
 from servotwin.cli.terminal import emit_json, pairs, patience, show
 
 if TYPE_CHECKING:
-    from servotwin.cli.outputs import Target
+    from servotwin.cli.output_files import Target
     from servotwin.models import Model
     from servotwin.signals import Signal
     from servotwin.simulation import Result
@@ -67,7 +67,7 @@ def simulate(
 def _checked_targets(out: Path | None, plot: Path | None, servo: str, words: shared.CommandWords, load: Sequence[str],
                      *, force: bool) -> list[Target]:
     from servotwin.cli.option_values import recorded_files
-    from servotwin.cli.outputs import Target, check_targets
+    from servotwin.cli.output_files import Target, check_targets
 
     targets = []
     if out is not None:
@@ -107,7 +107,7 @@ def _check_length(model: Model, signal: Signal, duration: float) -> None:
 
 
 def _write(result: Result, targets: list[Target], *, force: bool) -> dict[str, Any]:
-    from servotwin.cli.outputs import staged
+    from servotwin.cli.output_files import staged
     from servotwin.cli.summary import facts
 
     with patience("writing"), staged(targets, force=force) as drafts:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import LEFT_OUT, usual, with_records
+from servotwin.cli.option_records import LEFT_OUT, usual, with_records
 from servotwin.cli.terminal import emit_json, patience, show
 from servotwin.errors import InputError, MissingExtraError
 
@@ -183,7 +183,7 @@ def _run(model: Model, words: shared.CommandWords, plant: shared.Plant, metric: 
     from servotwin.cli.interrupts import last_words
     from servotwin.errors import InputError
     from servotwin.studies import sweep as run
-    from servotwin.studies.metrics import checked_metrics
+    from servotwin.studies.lane_metrics import checked_metrics
     from servotwin.units import is_finite
 
     duration = options["duration"]

@@ -11,13 +11,13 @@ import typer
 
 from servotwin.cli import log
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import usual, with_records
+from servotwin.cli.option_records import usual, with_records
 from servotwin.cli.terminal import emit_json, patience, show, table
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from servotwin.cli.outputs import Target
+    from servotwin.cli.output_files import Target
     from servotwin.identification import Log
     from servotwin.identification.fitting.fit import Validation
     from servotwin.models import Model
@@ -70,7 +70,7 @@ def validate(
 
 
 def _targets(report: Path | None, inputs: list[Path], *, force: bool) -> list[Target]:
-    from servotwin.cli.outputs import Target, check_targets
+    from servotwin.cli.output_files import Target, check_targets
 
     targets = [] if report is None else [Target(option="--report", path=report, endings=(".html", ".htm"))]
     check_targets(targets, force=force, inputs=inputs)
@@ -119,7 +119,7 @@ def exceeded(found: Validation, limits: Mapping[str | None, float]) -> dict[str,
 
 
 def _write(found: Validation, targets: list[Target], *, force: bool) -> list[str]:
-    from servotwin.cli.outputs import staged
+    from servotwin.cli.output_files import staged
 
     if targets:
         with patience("writing"), staged(targets, force=force) as drafts:

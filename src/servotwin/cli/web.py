@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import usual, with_records
+from servotwin.cli.option_records import usual, with_records
 from servotwin.cli.terminal import emit, emit_json
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def web(
 
 def _export(first: Scene, path: Path, *, force: bool, as_json: bool) -> None:
     """Write the bench as one file."""
-    from servotwin.cli.outputs import Target, check_targets, staged
+    from servotwin.cli.output_files import Target, check_targets, staged
     from servotwin.web.alone.page import page, sizes
 
     target = Target(option="--export", path=path, endings=(".html", ".htm"))

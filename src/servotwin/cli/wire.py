@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.records import usual, with_records
+from servotwin.cli.option_records import usual, with_records
 from servotwin.cli.terminal import emit, emit_json
 from servotwin.errors import one_line
 

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     )
     from servotwin.datasheet.full_drive import FullDrive, OperatingPoint, SpeedCurve, Swing
     from servotwin.datasheet.holding import Buzz, Held, Remedy, Span, buzz
-    from servotwin.datasheet.loop import Loop, Protection, Standing
     from servotwin.datasheet.sheet import (
         Bandwidth,
         DataSheet,
@@ -30,6 +29,7 @@ if TYPE_CHECKING:
         motion_of,
         printed_beside,
     )
+    from servotwin.datasheet.static_loop import Loop, Protection, Standing
     from servotwin.datasheet.turning import SpeedMap, slow_rotor, time_constant_of, wheel_speed_of
     from servotwin.datasheet.warming import Lift, Masses, Warming, lift_of, thermal_masses
 
@@ -47,7 +47,7 @@ _FILES = {
                      "standing_of", "travel_of"), "choice"),
     **dict.fromkeys(("FullDrive", "OperatingPoint", "SpeedCurve", "Swing"), "full_drive"),
     **dict.fromkeys(("Buzz", "Held", "Remedy", "Span", "buzz"), "holding"),
-    **dict.fromkeys(("Loop", "Protection", "Standing"), "loop"),
+    **dict.fromkeys(("Loop", "Protection", "Standing"), "static_loop"),
     **dict.fromkeys(("Bandwidth", "DataSheet", "Figure", "Motion", "VoltageSheet", "beside_flags", "curves",
                      "motion_of", "printed_beside"), "sheet"),
     **dict.fromkeys(("SpeedMap", "slow_rotor", "time_constant_of", "wheel_speed_of"), "turning"),

@@ -28,7 +28,7 @@ from servotwin.datasheet.holding import (
     warned_once,
     with_spans,
 )
-from servotwin.datasheet.loop import Loop, loop_of
+from servotwin.datasheet.static_loop import Loop, loop_of
 from servotwin.datasheet.turning import SpeedMap, is_pulsed, slow_rotor, still_pulses, wheel_speed_of
 from servotwin.datasheet.warming import HOT_WINDING, MAGNET_COEFFICIENT, Lift, lift_of, masses_by_mass, thermal_masses
 from servotwin.errors import InputError

@@ -9,7 +9,6 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from servotwin import plugins
-from servotwin.logs.columns import Column
 
 if TYPE_CHECKING:
     from servotwin.logs.columns import Column

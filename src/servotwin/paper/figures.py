@@ -11,7 +11,7 @@ import numpy as np
 
 from servotwin import plotting
 from servotwin.look import fixed
-from servotwin.paper.study import APPROACH_ROW, LABELS, BenchStudy, PaperStudy
+from servotwin.paper.reproduction import APPROACH_ROW, LABELS, BenchStudy, PaperStudy
 from servotwin.plotting import Curve, Limit
 
 if TYPE_CHECKING:

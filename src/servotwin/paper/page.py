@@ -13,9 +13,9 @@ from servotwin import __version__, plotting
 from servotwin.errors import MissingExtraError
 from servotwin.look import document, escape, fixed, number, picture, table, untagged
 from servotwin.models import PulseServo
-from servotwin.paper import linear, tables
+from servotwin.paper import linear_views, tables
 from servotwin.paper.figures import Drawing, Picture
-from servotwin.paper.study import (
+from servotwin.paper.reproduction import (
     CIRCUITS,
     LABELS,
     LOAD_INERTIA,
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from servotwin.paper.study import Stand
+    from servotwin.paper.reproduction import Stand
     from servotwin.parameters import Servo
     from servotwin.robots import TaskRun, WaypointRun
     Array = NDArray[np.float64]
@@ -546,12 +546,12 @@ parabola. p is the probability of such an F or a larger one if the truth were st
 def _models(study: PaperStudy, images: Images) -> str:
     parts = ["<p>The paper's diagrams, redrawn, with their transfer functions. The numbers are those of the servo "
              "file; dry friction has no transfer function and is left out.</p>"]
-    for which, formulas in linear.FORMULAS.items():
-        lines = [f"<p>{linear.formula(text)}<span>{equation}</span></p>" for equation, text in formulas]
-        numeric = linear.numeric(study, which)
+    for which, formulas in linear_views.FORMULAS.items():
+        lines = [f"<p>{linear_views.formula(text)}<span>{equation}</span></p>" for equation, text in formulas]
+        numeric = linear_views.numeric(study, which)
         if numeric is not None:
             poles = ", ".join(_pole(p) for p in numeric.poles if p.imag >= 0.0)
-            shown = linear.formula(numeric.text)
+            shown = linear_views.formula(numeric.text)
             lines.append(f"<p>{shown}<span>{numeric.words}; poles (1/s): {poles}</span></p>")
         after = f'<div class="formulas">{"".join(lines)}</div>'
         parts.append(_figure(images[f"figure-{which:02d}"], after=after, wide=True))

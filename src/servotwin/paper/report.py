@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 from servotwin.errors import OutputError, OutputExistsError
 from servotwin.look import FORMATS
-from servotwin.paper.study import PaperStudy, headline_numbers, run_study
+from servotwin.paper.reproduction import PaperStudy, headline_numbers, run_study
 from servotwin.parameters.output_file import undone
 from servotwin.tables import csv_text
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from servotwin import bench, units
 from servotwin.look import escape, fixed, number, table, with_error
-from servotwin.paper.study import LABELS, LOAD_INERTIA, MODELS, PaperStudy
+from servotwin.paper.reproduction import LABELS, LOAD_INERTIA, MODELS, PaperStudy
 from servotwin.parameters import GROUPS
 from servotwin.physics.friction import creep_speed
 

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from servotwin.robots.actuator_recipe import Recipe, recipe_of
 from servotwin.robots.arm import Arm, scara, two_link
 from servotwin.robots.command_map import CommandMap
 from servotwin.robots.drive import DriveState, ServoDrive
@@ -9,7 +10,6 @@ from servotwin.robots.mjcf_models import mobile_robot
 from servotwin.robots.model_file import joint_names, joint_ranges, robot_model
 from servotwin.robots.motion import Motion, read_motion
 from servotwin.robots.mount import Mount
-from servotwin.robots.recipe import Recipe, recipe_of
 from servotwin.robots.record import Record, ServoRecord
 from servotwin.robots.replay import JointError, Replay, RobotValidation, validate_robot
 from servotwin.robots.run import RobotRun, run_motion

@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 from xml.etree import ElementTree as Xml
 
 from servotwin.errors import InputError, UnknownNameError
-from servotwin.robots.contacts import part_neighbours, passive_joints
 from servotwin.robots.coupling import actuators_at_joints, couplings_of, other_actuators
 from servotwin.robots.mjcf_models import mobile_robot, so101
+from servotwin.robots.overlaps import part_neighbours, passive_joints
 from servotwin.robots.places import load_mujoco
 from servotwin.text import checked_name, fault_of
 

@@ -17,12 +17,12 @@ from servotwin.models import Model
 from servotwin.parameters.groups import Supply
 from servotwin.parameters.registers.held import as_robot_has_it, said_of, set_of_robot
 from servotwin.robots.command_map import unused_ranges
-from servotwin.robots.contacts import fall_of, leave_out, links_of, overlap_words, overlaps, robot_bodies
 from servotwin.robots.coupling import couple, couplings_of, led
 from servotwin.robots.drive import ServoDrive
 from servotwin.robots.model_file import joint_names, joint_ranges, plant_of
 from servotwin.robots.motion import Motion
 from servotwin.robots.mount import Mount, supplied, warm_mounts
+from servotwin.robots.overlaps import fall_of, leave_out, links_of, overlap_words, overlaps, robot_bodies
 from servotwin.robots.places import load_mujoco
 from servotwin.robots.record import FROM_NOWHERE, Record
 from servotwin.robots.tracking import IdealRun, Tracking, blend_window, ideal_run, tracking_of

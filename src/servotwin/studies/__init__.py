@@ -13,7 +13,7 @@ from servotwin.studies.distributions import (
     Uniform,
     stated,
 )
-from servotwin.studies.metrics import METRICS
+from servotwin.studies.lane_metrics import METRICS
 from servotwin.studies.plan import dimension_of
 from servotwin.studies.study import Bar, LaneFailure, Study, Tornado, variance_share
 

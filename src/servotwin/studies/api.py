@@ -15,7 +15,7 @@ from servotwin.simulation.progress import Crew, Progress, shown
 from servotwin.simulation.remarks import COLUMNS, warn_of
 from servotwin.simulation.start import Status
 from servotwin.studies.kinds import Distribution
-from servotwin.studies.metrics import run_chunk
+from servotwin.studies.lane_metrics import run_chunk
 from servotwin.studies.plan import planned
 from servotwin.studies.study import Folder, Study
 

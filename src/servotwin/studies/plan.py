@@ -21,7 +21,7 @@ from servotwin.simulation.lanes.packing import Chunk, Commands, groups
 from servotwin.simulation.progress import memory_limit
 from servotwin.studies.joint import DIMENSIONS, TINY, Together
 from servotwin.studies.kinds import ENDS, Distribution, Truncated, distribution_of
-from servotwin.studies.metrics import Job, checked_metrics, decision_times, output_times, step_time
+from servotwin.studies.lane_metrics import Job, checked_metrics, decision_times, output_times, step_time
 from servotwin.units import is_finite, si_unit
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 import servotwin.web
-from servotwin.cli.app import app
+from servotwin.cli.commands import app
 from servotwin.web.alone import page
 from servotwin.web.alone.page import modules
 

@@ -17,7 +17,7 @@ from web_talk import Deaf, Page, framed, running
 pytestmark = pytest.mark.slow
 SOAK = float(os.environ.get("SERVOTWIN_SOAK", "300"))
 """Bench time of the long run [s]; 3600 is its full length."""
-PATIENT = "from servotwin.web.server import serve, wire\nwire.SLOWEST = serve.PING = 1e5"
+PATIENT = "from servotwin.web.server import messages, serve\nmessages.SLOWEST = serve.PING = 1e5"
 MESSAGES = 10_000
 TOLERANCE = 0.10  # of memory
 

@@ -1,6 +1,6 @@
 """What carries bytes to a bench and back: one small interface, and all that fits it."""
 
-from servotwin.bench.backends.backend import Backend
+from servotwin.bench.backends.board_backend import Backend
 from servotwin.bench.backends.emulated import EmulatedBackend, MockBackend
 from servotwin.bench.backends.serial_port import SerialBackend, serial_ports
 

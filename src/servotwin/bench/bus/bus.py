@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import accumulate
 from typing import Any, NamedTuple
 
-from servotwin.bench.backends.backend import Backend
+from servotwin.bench.backends.board_backend import Backend
 from servotwin.bench.backends.serial_port import SerialBackend
 from servotwin.bench.bus.families import BusFamily, BusModel, chunks, count_of, decoded
 from servotwin.bench.bus.scan import FoundServo, identified, wire_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
-from servotwin.bench.backends.backend import Backend
+from servotwin.bench.backends.board_backend import Backend
 from servotwin.bench.backends.serial_port import SerialBackend
 from servotwin.bench.bus.families import MODEL_NUMBER_AT, BusModel, known_models
 from servotwin.bench.bus.sdk_wire import PATIENCE, BusWire, SdkWire, dynamixel_wire, feetech_wire

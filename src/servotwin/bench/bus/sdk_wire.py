@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
-from servotwin.bench.backends.backend import Backend
+from servotwin.bench.backends.board_backend import Backend
 from servotwin.errors import BenchError, MissingExtraError
 
 # --- What the makers' packages take for their port --------------------------------------------------------------------

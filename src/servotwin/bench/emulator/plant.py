@@ -12,7 +12,7 @@ import numpy as np
 
 from servotwin.bench.backends.emulated import EmulatedBackend
 from servotwin.bench.bench import FEEDBACK_CONVERTER, INPUT_CONVERTER, Converter, Reading, bench_servo
-from servotwin.bench.recording.wiring import Wiring
+from servotwin.bench.recording.bench_wiring import Wiring
 from servotwin.errors import BenchError, InputError
 from servotwin.models import PulseServo
 from servotwin.models.digital import DigitalServo

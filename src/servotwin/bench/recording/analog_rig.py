@@ -7,9 +7,9 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from servotwin.bench.backends.backend import Backend
+from servotwin.bench.backends.board_backend import Backend
+from servotwin.bench.recording.bench_wiring import SIGNALS, Wiring
 from servotwin.bench.recording.experiment import Experiment, Hold
-from servotwin.bench.recording.wiring import SIGNALS, Wiring
 from servotwin.bench.wire.board import Board, Identity, Message
 from servotwin.bench.wire.frames import protocol
 from servotwin.errors import BenchError, InputError

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from servotwin.bench.backends.backend import Backend
+from servotwin.bench.backends.board_backend import Backend
 from servotwin.bench.wire.frames import Clock, Frame, Kind, Splitter, protocol, to_wire
 from servotwin.errors import BenchError, InputError
 

@@ -56,9 +56,9 @@ from servotwin.identification.fitting.fit import (
 )
 from servotwin.identification.fitting.forecast import FIT_ACCURACY, Forecast, Running
 from servotwin.identification.fitting.free import Bounds, Priors, Space
-from servotwin.identification.fitting.noise import SensorSeries, noise_of
 from servotwin.identification.fitting.phases import credible, settled
 from servotwin.identification.fitting.registers import RegisterSearch, as_logs_say, register_search
+from servotwin.identification.fitting.residual_noise import SensorSeries, noise_of
 from servotwin.identification.fitting.stopping import Course, Within
 from servotwin.identification.fitting.task import HUBER, Task
 from servotwin.identification.fitting.traces import ErrorTables, Trace

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.noise import (
+from servotwin.identification.fitting.residual_noise import (
     CrossCorrelation,
     Noise,
     NoiseGuess,

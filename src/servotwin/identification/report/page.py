@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
     from servotwin.identification.arms.arm_fit import ArmFit
     from servotwin.identification.fitting.fit import Fit, Ladder, Validation
-    from servotwin.identification.fitting.noise import CrossCorrelation
+    from servotwin.identification.fitting.residual_noise import CrossCorrelation
     from servotwin.identification.fitting.traces import ErrorTable, Trace
     from servotwin.robots import RobotValidation
 

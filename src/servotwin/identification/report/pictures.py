@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from servotwin import units
 from servotwin.identification.fitting.free import LUMPED, nominal
-from servotwin.identification.fitting.noise import SensorSeries, cross_correlation
+from servotwin.identification.fitting.residual_noise import SensorSeries, cross_correlation
 from servotwin.identification.fitting.traces import fit_percent
 from servotwin.identification.fitting.verdict import FALSE_ALARM
 from servotwin.look import (
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from servotwin.identification.fitting.fit import Fit
-    from servotwin.identification.fitting.noise import CrossCorrelation
+    from servotwin.identification.fitting.residual_noise import CrossCorrelation
     from servotwin.identification.fitting.traces import ErrorTable, Interval, Trace
 
 

@@ -7,7 +7,7 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from servotwin.bench import FEEDBACK_CONVERTER, INPUT_CONVERTER
-from servotwin.datasheet.loop import loop_of
+from servotwin.datasheet.static_loop import loop_of
 from servotwin.errors import ServotwinError
 from servotwin.models import DigitalServo
 from servotwin.models.outputs import SIGNALS

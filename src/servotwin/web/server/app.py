@@ -28,10 +28,10 @@ from servotwin.models import BoundedServo, Model, default_model
 from servotwin.parameters import catalog_names, load_servo
 from servotwin.physics.thermal import REFERENCE_TEMPERATURE, Temperatures
 from servotwin.web.live.facts import models_of, size_of
+from servotwin.web.server.messages import LONGEST_UPLOAD, MOST_VISITORS, MOST_WATCHERS, Allowance, line_of, text_of
 from servotwin.web.server.own.brought import Desk
 from servotwin.web.server.session import Room, aside
 from servotwin.web.server.visitor import Visitor
-from servotwin.web.server.wire import LONGEST_UPLOAD, MOST_VISITORS, MOST_WATCHERS, Allowance, line_of, text_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -14,7 +14,7 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 
 from servotwin.errors import InputError, MissingExtraError
 from servotwin.web.live import LiveBench, Scene, SceneServo
-from servotwin.web.server.wire import LONGEST_MESSAGE
+from servotwin.web.server.messages import LONGEST_MESSAGE
 
 # --- Connections as uvicorn holds them, but for those that stay without saying or taking anything ---------------------
 

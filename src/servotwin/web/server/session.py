@@ -20,12 +20,12 @@ from servotwin.units import is_finite
 from servotwin.web.lessons.mystery import is_hidden, unknowns
 from servotwin.web.live import LiveBench, Push, Scene, ServoPush
 from servotwin.web.live.facts import facts_of, load_facts, reading_of
-from servotwin.web.server.wire import line_of, packed, text_of
+from servotwin.web.server.messages import line_of, packed, text_of
 
 if TYPE_CHECKING:
     from servotwin.models import Model
     from servotwin.parameters import Servo
-    from servotwin.web.server.wire import Outbox
+    from servotwin.web.server.messages import Outbox
 
 
 # --- How a bench is let go on: in stretches that are short enough that others have their turn -------------------------

@@ -19,9 +19,9 @@ from servotwin.web.lessons.lessons import lessons, mystery_scene
 from servotwin.web.live import read_fragment, read_scene
 from servotwin.web.live.replay import exported
 from servotwin.web.live.scene import checked_view, with_servos
+from servotwin.web.server.messages import VERSION, Allowance, Outbox, id_of, line_of, message_of, text_of
 from servotwin.web.server.own.brought import Brought
 from servotwin.web.server.session import EXPORTS, aside
-from servotwin.web.server.wire import VERSION, Allowance, Outbox, id_of, line_of, message_of, text_of
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable

@@ -20,8 +20,8 @@ from servotwin.web.lessons import mystery
 from servotwin.web.live.facts import models_of
 from servotwin.web.live.live_bench import load_of
 from servotwin.web.live.scene import HOW, model_named, taken_over
-from servotwin.web.server.own.process import Done, EndedError, Work, WorkError
-from servotwin.web.server.wire import Allowance, line_of
+from servotwin.web.server.messages import Allowance, line_of
+from servotwin.web.server.own.worker import Done, EndedError, Work, WorkError
 
 if TYPE_CHECKING:
     from servotwin.loads import Load

@@ -18,8 +18,8 @@ import numpy as np
 from servotwin.errors import InputError, ServotwinError
 from servotwin.logs import Log, Reading, read_logs
 from servotwin.logs.log import reading_facts
+from servotwin.web.server.messages import LONGEST_UPLOAD
 from servotwin.web.server.own.frames import RefusedError
-from servotwin.web.server.wire import LONGEST_UPLOAD
 
 if TYPE_CHECKING:
     from servotwin.web.server.own.work import Tell

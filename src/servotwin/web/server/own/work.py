@@ -14,8 +14,8 @@ from importlib import import_module
 from typing import Any, BinaryIO
 
 from servotwin.errors import ServotwinError
+from servotwin.web.server.messages import line_of, text_of
 from servotwin.web.server.own.frames import RefusedError, framed, taken
-from servotwin.web.server.wire import line_of, text_of
 
 KINDS = {"reading": "reading", "comparison": "comparing", "fit": "fitting"}
 """Kinds of work, and the modules whose `work` does them."""

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from servotwin.errors import BenchError
 
 if TYPE_CHECKING:
-    from servotwin.bench.backends.backend import Backend
+    from servotwin.bench.backends.board_backend import Backend
 
 _STEP = 2e-3  # s of the board between two looks at the terminal
 _MOST = 65536  # bytes

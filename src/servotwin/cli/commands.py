@@ -17,8 +17,8 @@ from servotwin.cli.linear import linear
 from servotwin.cli.log import EPILOG as LOG_EPILOG
 from servotwin.cli.log import HELP as LOG_HELP
 from servotwin.cli.log import log
+from servotwin.cli.option_records import Commands
 from servotwin.cli.paper_command import paper
-from servotwin.cli.records import Commands
 from servotwin.cli.robot import robot
 from servotwin.cli.simulate import simulate
 from servotwin.cli.sweep import sweep

@@ -9,7 +9,7 @@ import numpy as np
 from servotwin.loads import Inertia
 from servotwin.look import picture
 from servotwin.models import AveragedServo, DCMotor, GearedMotor
-from servotwin.paper.study import LOAD_INERTIA, PaperStudy
+from servotwin.paper.reproduction import LOAD_INERTIA, PaperStudy
 from servotwin.plotting import formula_svg
 
 if TYPE_CHECKING:
