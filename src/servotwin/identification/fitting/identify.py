@@ -533,11 +533,8 @@ def identify(
         1e-13 to 1e-4.
     within : float, optional
         Time that the fit may take [s]; then it stops.
-    robot : optional
-        Where `logs` are episodes of a whole robot: its MJCF file or model, "so101" or "unknown". `servo` is then that
-        of all joints, or one by joint, and what comes back an `ArmFit`.
-    of_robot
-        What else `identify_arm` takes.
+    robot, of_robot
+        Of whole robots; to be removed in 0.2: `identify_arm` takes their episodes, and returns an `ArmFit`.
 
     Returns
     -------
@@ -566,6 +563,8 @@ def identify(
     if robot is not None:
         from servotwin.identification.arms import identify_arm
 
+        warnings.warn("identify(robot=...) goes in 0.2; servotwin.identification.identify_arm(logs, robot, servos) is "
+                      "the same", FutureWarning, stacklevel=2)
         found: Any = identify_arm(logs, robot, servo, level=level, intervals=intervals, diagnose=diagnose,
                                   within=within, progress=progress, **of_robot)
         return found  # type: ignore[no-any-return]
