@@ -11,7 +11,7 @@ from servotwin.cli.summary import buzz_facts, remedy_words, rest_words
 from servotwin.cli.terminal import with_span
 from servotwin.cli.which_words import lift_facts
 from servotwin.datasheet.holding import Span
-from servotwin.look import document, escape, picture, table, to_bytes
+from servotwin.look import document, escape, reports, table
 from servotwin.parameters import printed_points
 
 if TYPE_CHECKING:
@@ -466,8 +466,7 @@ def _contents(sheets: Sequence[DataSheet], names: Sequence[str]) -> str:
 def _servo(sheet: DataSheet, torque: float | None, *, alone: bool) -> str:
     servo = sheet.servo
     heading = "" if alone else f"<h2>{escape(servo.title or servo.name)}</h2>\n"
-    known = "".join(f"<li>{escape(note)}</li>" for note in notes(sheet))
-    said = f'<div class="note"><ul>{known}</ul></div>\n' if known else ""
+    said = reports.notes(notes(sheet))
     parts = "".join(_voltage(sheet, part, torque) for part in sheet.voltages)
     pages = plotting.pages(len(sheet.voltages), plotting.CURVES_A_PAGE)
     hot = escape(_degrees(hot_words(sheet.voltages[0])))
@@ -509,8 +508,7 @@ def _cards(part: VoltageSheet) -> str:
              (f"{part.cold.stall_current:.2f} A", "standing at full drive")]
     if not math.isnan(part.smallest_move):
         shown.append((f"{math.degrees(part.smallest_move):.2f}°", "smallest move"))
-    listed = "".join(f"<li><b>{value}</b>{words}</li>" for value, words in shown)
-    return f'<ul class="numbers">{listed}</ul>\n'
+    return reports.cards(shown)
 
 
 def _rest(part: VoltageSheet) -> str:
@@ -551,8 +549,7 @@ def _degrees(text: str) -> str:
 
 def _figure(drawn: Sequence[Figure], words: str, *, wide: bool = False) -> str:
     """Return the pages of a picture, one below the other, with words below them."""
-    images = "".join(picture(to_bytes(figure, "svg"), words, kind="drawing") for figure in drawn)
-    return f'<figure{" class=wide" if wide else ""}><div>{images}</div><figcaption>{words}</figcaption></figure>\n'
+    return reports.Picture(lambda: drawn, words, wide).html
 
 
 _READING = """<ul>

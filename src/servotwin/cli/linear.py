@@ -9,7 +9,7 @@ import typer
 
 from servotwin.cli import shared_options as shared
 from servotwin.cli.option_records import usual, with_records
-from servotwin.cli.terminal import emit_json, pairs, patience, show, table
+from servotwin.cli.terminal import emit_json, pairs, patience, show, show_report
 
 if TYPE_CHECKING:
     from servotwin.cli.output_files import Target
@@ -82,7 +82,9 @@ def linear(
     if ending.as_json:
         emit_json(facts)
         return
-    _show(found, targets)
+    name = chosen.servo.name
+    show_report(f"{chosen.servo.title or name} ({name}), model {type(chosen).__name__}", words.report(found),
+                *(["", pairs([("written", str(target.path)) for target in targets])] if targets else []))
 
 
 def _targets(paths: dict[str, Path | None], servo: str, amplitudes: int, *, tune: bool, force: bool) -> list[Target]:
@@ -125,9 +127,9 @@ def _write(found: Overview, targets: list[Target], *, force: bool) -> None:
     with patience("drawing"), staged(targets, force=force) as drafts:
         for target, draft in zip(targets, drafts, strict=True):
             if target.option == "--out":
-                from servotwin.cli.linear_report import page
+                from servotwin.cli.linear_report import report
 
-                draft.write_text(page(found), encoding="utf-8", newline="\n")
+                draft.write_text(report(found).page, encoding="utf-8", newline="\n")
             elif target.option == "--plot":
                 from servotwin import plotting
                 from servotwin.cli.linear_report import by_amplitude
@@ -138,17 +140,3 @@ def _write(found: Overview, targets: list[Target], *, force: bool) -> None:
                 from servotwin.tables import csv_text
 
                 draft.write_bytes(csv_text(columns(found), digits=12).encode())
-
-
-def _show(found: Overview, targets: list[Target]) -> None:
-    from servotwin.cli import linear_report as words
-
-    servo = found.model.servo
-    parts: list[Any] = [f"{servo.title or servo.name} ({servo.name}), model {type(found.model).__name__}", ""]
-    parts += [pairs(words.mean_pairs(found))] if found.natural else []
-    if found.loops:
-        parts += ["", table(words.LOOP_HEAD, words.loop_rows(found))]
-    parts += ["", table(words.SINE_HEAD, words.sine_rows(found))]
-    if targets:
-        parts += ["", pairs([("written", str(target.path)) for target in targets])]
-    show(*parts)

@@ -10,7 +10,8 @@ import numpy as np
 
 from servotwin import plotting
 from servotwin.errors import InputError
-from servotwin.look import CURVES_A_PAGE, document, escape, on_page, pages, picture, table, to_bytes
+from servotwin.look import CURVES_A_PAGE, escape, on_page, pages
+from servotwin.look.reports import Pairs, Part, Picture, Report, Section, Table
 from servotwin.models import PulseServo, PulseServoInductive
 from servotwin.plotting import Response
 from servotwin.units.quantities import quantity
@@ -288,37 +289,23 @@ def _fine(found: Overview, half_rate: float) -> np.ndarray:
     return np.geomspace(float(found.frequency[0]), most, 300)
 
 
-def page(found: Overview) -> str:
-    """Return the page of a servo's linear views."""
+def report(found: Overview) -> Report:
+    """Return a servo's linear views in words, tables and pictures."""
     servo = found.model.servo
-    title = servo.title or servo.name
-    said = "".join(f"<p>{escape(name)}: {escape(text)}.</p>" for name, text in mean_pairs(found))
-    parts = [_figure([by_amplitude(found, page) for page in pages(len(found.sines), CURVES_A_PAGE)],
-                     "Angle over commanded angle: small signals (lines) and simulated sines of finite size (marks). "
-                     "The grey line is 3 dB below the command. Where friction holds the shaft for a part of the sine, "
-                     "no line is drawn for its describing functions.")]
-    parts.append(table(list(SINE_HEAD), [[escape(_signs(cell)) for cell in row] for row in sine_rows(found)],
-                       caption="Simulated sines"))
-    if found.loops:
-        parts.append("<h2>As it decides</h2>")
-        parts.append(table(list(LOOP_HEAD), [[escape(_signs(cell)) for cell in row] for row in loop_rows(found)],
-                           caption="The sampled loop, friction and deadband apart"))
-        parts.append(_figure([by_frames(found, page) for page in pages(len(found.loops), CURVES_A_PAGE)],
-                             "Small sines by the time between decisions: shorter frames make an analog servo stiffer "
-                             "and faster, and less damped."))
-        own = next(iter(found.loops.values()))
-        parts.append(_figure([plotting.root_locus(own)], "Where the poles of the sampled loop go as its gain grows. To "
-                             "the right of the axis it is unstable."))
-    facts = f"<code>{escape(servo.name)}</code>, {escape(servo.kind)}, {type(found.model).__name__}"
-    return document(f"{title}: linear views", f"<h1>{escape(title)}</h1>\n<p class=\"lead\">{facts}</p>\n{said}"
-                    + "\n".join(parts), style=_STYLE)
-
-
-def _signs(text: str) -> str:
-    return text.replace(" deg", "°").replace("+/-", "±").replace("-", "−")
-
-
-def _figure(drawn: Sequence[Figure], words: str) -> str:
-    """Return the pages of a picture, one below the other, with words below them."""
-    images = "".join(picture(to_bytes(figure, "svg"), words, kind="drawing") for figure in drawn)
-    return f"<figure><div>{images}</div><figcaption>{words}</figcaption></figure>\n"
+    parts: list[Part] = [Pairs(mean_pairs(found))] if found.natural else []
+    parts += [
+        Picture(lambda: [by_amplitude(found, page) for page in pages(len(found.sines), CURVES_A_PAGE)],
+                "Angle over commanded angle: small signals (lines) and simulated sines of finite size (marks). The "
+                "grey line is 3 dB below the command. Where friction holds the shaft for a part of the sine, no line "
+                "is drawn for its describing functions."),
+        Table(SINE_HEAD, sine_rows(found), "Simulated sines")]
+    loops: list[Part] = [] if not found.loops else [
+        Table(LOOP_HEAD, loop_rows(found), "The sampled loop, friction and deadband apart"),
+        Picture(lambda: [by_frames(found, page) for page in pages(len(found.loops), CURVES_A_PAGE)],
+                "Small sines by the time between decisions: shorter frames make an analog servo stiffer and faster, "
+                "and less damped."),
+        Picture(lambda: [plotting.root_locus(next(iter(found.loops.values())))],
+                "Where the poles of the sampled loop go as its gain grows. To the right of the axis it is unstable.")]
+    return Report(f"{servo.title or servo.name}: linear views",
+                  f"<code>{escape(servo.name)}</code>, {escape(servo.kind)}, {type(found.model).__name__}",
+                  [Section("", parts), *([Section("As it decides", loops)] if loops else [])], style=_STYLE)

@@ -17,6 +17,7 @@ from servotwin.cli.summary import model_name, supply_facts
 from servotwin.cli.terminal import json_text, patience
 from servotwin.errors import OutputError
 from servotwin.look import document, escape, table
+from servotwin.look.reports import Beside, cards, notes
 from servotwin.parameters.output_file import undone
 
 if TYPE_CHECKING:
@@ -413,8 +414,7 @@ def _supply_words(run: RobotRun) -> str:
 
 
 def _notes(run: RobotRun) -> str:
-    said = "".join(f"<li>{escape(signed(text))}</li>" for text in run.notes)
-    return f'<div class="note"><ul>{said}</ul></div>\n' if said else ""
+    return notes([signed(text) for text in run.notes])
 
 
 def _answer(sized: Mapping[str, Sizing]) -> str:
@@ -443,8 +443,7 @@ def _cards(run: RobotRun, sized: Mapping[str, Sizing]) -> str:
     if warm:
         hottest = max(warm, key=lambda joint: warm[joint])
         shown.append((signed(celsius(warm[hottest])), f"hottest winding, {hottest}"))
-    return '<ul class="numbers">' + "".join(
-        f"<li><b>{escape(value)}</b>{escape(words)}</li>" for value, words in shown) + "</ul>\n"
+    return cards([(escape(value), escape(words)) for value, words in shown])
 
 
 def film(files: Sequence[str], when: str = "") -> str:
@@ -465,8 +464,7 @@ def figure(name: str, words: str, *, kind: str = "wide") -> str:
 
 def figures(names: Sequence[str], words: str, *, kind: str = "wide") -> str:
     """Return the pages of a picture, one below the other, with words below them."""
-    drawn = "".join(f'<img src="{name}" alt="{escape(words)}">' for name in names)
-    return f'<figure class="{kind}"><div>{drawn}</div><figcaption>{escape(words)}</figcaption></figure>\n'
+    return Beside(names, words, kind).html
 
 
 def _sizes(run: RobotRun, sized: Mapping[str, Sizing]) -> str:

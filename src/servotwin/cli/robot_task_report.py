@@ -13,10 +13,11 @@ import numpy as np
 from servotwin import plotting
 from servotwin.cli import robot_report as files
 from servotwin.cli.robot_options import ERRORS, WINDOWS, degrees, validation_head, validation_rows
-from servotwin.cli.robot_report import STYLE, figure, figures, film, joint_pages
+from servotwin.cli.robot_report import STYLE, film, joint_pages
 from servotwin.cli.robot_report import run_facts as facts
 from servotwin.cli.terminal import json_text, patience
-from servotwin.look import document, escape, table
+from servotwin.look import escape
+from servotwin.look.reports import Beside, Cards, Html, Report, Section, Table, report_html
 from servotwin.robots.controllers import STEERINGS
 from servotwin.robots.replay import ALL, SERVOS
 from servotwin.robots.task_run import CONDITIONS, FIDELITIES, NOMINAL
@@ -55,35 +56,34 @@ def task_section(found: Mapping[str, Any], ways: Sequence[str], rows: Sequence[S
               f"{math.degrees(metrics['angle_rms']):.2f}°", f"{metrics['effort']:.2f} V",
               _chatter(metrics["chatter"], bypassed=found["chips_bypassed"]), _joules(metrics["energy"])],
              ["ideal", _mm(ideal["rms"]), _mm(ideal["largest"]), "–", "–", "–", "–", "–"]]
-    drawn = table(head, [[escape(cell) for cell in line] for line in lines], text_columns=len(head))
-    return ('<h2>The tool</h2>\n<p>The contour error is the distance of the tool from its path, however late it is.</p>'
-            f'\n<div class="joints">{drawn}</div>\n'
-            + figure("tool.png", "The tool's path, asked for and done, and its distance from the path over time.")
-            + _redundancy(ways, rows))
+    return report_html([
+        Section("The tool", ["The contour error is the distance of the tool from its path, however late it is.",
+                             Table(head, lines, text_columns=len(head), kind="joints"),
+                             Beside(["tool.png"], "The tool's path, asked for and done, and its distance from the path "
+                                    "over time.")]),
+        *_redundancy(ways, rows)])
 
 
 def ideal_page(found: Mapping[str, Any], files: Sequence[str], ways: Sequence[str],
                rows: Sequence[Sequence[str]]) -> str:
     """Return the page of a task that ideal actuators did."""
     ideal, title = found["ideal_contour"], f"{found['robot']}: {found['task']}"
-    torques = table(["joint", "largest torque or force"], [
-        [escape(joint), f"{value:.3g} {'N' if joint == 'lift' else 'N m'}"]
-        for joint, value in found["largest_torque"].items()], text_columns=2)
-    body = (f'<h1>{escape(title)}</h1>\n<p class="lead">Ideal actuators: joints are exactly where inverse kinematics '
-            f"wants them, for {found['duration']:.4g} s. The tool is at most {_mm(ideal['largest'])} beside its path, "
-            f"{_mm(ideal['rms'])} rms.</p>\n{film(files).replace('; pale: the same with ideal actuators', '')}"
-            + figure("tool.png", "The tool's path and its distance from it over time.")
-            + _redundancy(ways, rows) + f'<h2>What it takes</h2>\n<div class="joints">{torques}</div>\n')
-    return document(title, body, style=STYLE)
+    torques = Table(["joint", "largest torque or force"], [
+        [joint, f"{value:.3g} {'N' if joint == 'lift' else 'N m'}"]
+        for joint, value in found["largest_torque"].items()], text_columns=2, kind="joints")
+    lead = (f"Ideal actuators: joints are exactly where inverse kinematics wants them, for {found['duration']:.4g} s. "
+            f"The tool is at most {_mm(ideal['largest'])} beside its path, {_mm(ideal['rms'])} rms.")
+    return Report(title, lead, [
+        Section("", [Html(film(files).replace("; pale: the same with ideal actuators", "")),
+                     Beside(["tool.png"], "The tool's path and its distance from it over time.")]),
+        *_redundancy(ways, rows), Section("What it takes", [torques])], style=STYLE).page
 
 
-def _redundancy(ways: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    if not rows:
-        return ""
-    drawn = table(list(ways), [[escape(cell) for cell in row] for row in rows], text_columns=len(ways))
-    return (f'<h2>Redundancy</h2>\n<div class="joints">{drawn}</div>\n'
-            + figure("redundancy.png", "How far each hinge goes in its range, and its torque by rigid bodies alone, "
-                     "with ideal actuators. Limits left: distance to the nearest limit, of half a range."))
+def _redundancy(ways: Sequence[str], rows: Sequence[Sequence[str]]) -> list[Section]:
+    return [Section("Redundancy", [
+        Table(ways, rows, text_columns=len(ways), kind="joints"),
+        Beside(["redundancy.png"], "How far each hinge goes in its range, and its torque by rigid bodies alone, with "
+               "ideal actuators. Limits left: distance to the nearest limit, of half a range.")])] if rows else []
 
 
 def _mm(value: float) -> str:
@@ -211,12 +211,10 @@ def _draw(run: WaypointRun, picture: Path, video: Path | None) -> None:
 
 
 def _page(found: dict[str, Any], names: Sequence[str]) -> str:
-    rows = [[escape(name), escape(words)] for name, words in mobile_pairs(found)]
     drawn = film(names).replace("The robot; pale: the same with ideal actuators.", "The robot and its waypoints.")
-    body = (f"<h1>mobile: {len(found['waypoints'])} waypoints</h1>\n{drawn}<div class=\"joints\">"
-            f"{table(['', ''], rows, text_columns=2)}</div>\n"
-            + figure(PATHS, "Where the robot was, and where it believed to be."))
-    return document("mobile robot", body, style=STYLE)
+    return Report(f"mobile: {len(found['waypoints'])} waypoints", "", [Section("", [
+        Html(drawn), Table(["", ""], mobile_pairs(found), text_columns=2, kind="joints"),
+        Beside([PATHS], "Where the robot was, and where it believed to be.")])], style=STYLE).page
 
 
 # --- What `servotwin robot compare` says: tables, factors, and where each controller loses ----------------------------
@@ -318,34 +316,25 @@ def conditions_picture(done: Sequence[Outcome]) -> Figure:
 
 def comparison_page(found: dict[str, Any], done: Sequence[Outcome]) -> str:
     """Return the page of a comparison."""
-    title = "Controllers of servos, compared"
-    parts = [f"<h1>{title}</h1>\n<p class=\"lead\">{len(done)} runs: every task under every controller, by servos "
-             f"<code>{escape(found['servo'])}</code> of every fidelity and by "
-             f"<code>{escape(found['bus_servo'])}</code>; then, by pulse servos, with wrong beliefs, load, a low "
-             "battery and worn gears.</p>\n",
-             "<h2>When it gets hard</h2>\n", figure("conditions.png", "How far the tool is from where it should be, "
-                                                    "mean of all tasks, pulse servos."),
-             _table(CONDITION_HEAD, condition_rows(done), "Tool behind, rms, mean of all tasks, pulse servos"),
-             "<h3>Where each loses</h3>\n<ul>" + "".join(f"<li>{escape(text)}.</li>" for text in losses(done))
-             + "</ul>\n", "<h2>What it takes</h2>\n"]
-    for servos in ("pulse", "digital"):
-        parts.append(_table(("controller", "motor voltage, rms", "commands go up and down by", "energy",
-                             "times better than plain"), cost_rows(done, servos),
-                            f"Nominal, mean of all tasks, {servos} servos"))
-    for robot, task in tasks(done):
-        parts.append(f"<h2>{escape(robot)}: {escape(task)}</h2>\n")
-        for what, words in (("tool_rms", "Tool behind, rms"), ("contour_rms", "Distance from the path, rms")):
-            parts.append(_table(("controller", *FIDELITIES), fidelity_rows(done, (robot, task), what), words))
-    failed = [each for each in done if each.failure]
-    if failed:
-        parts.append("<h2>What did not go</h2>\n<ul>" + "".join(
-            f"<li>{escape(' / '.join(each.case))}: {escape(each.failure)}</li>" for each in failed) + "</ul>\n")
-    return document(title, "".join(parts) + _READING, style=_STYLE)
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]], caption: str) -> str:
-    cells = [[escape(cell.replace("-", "−") if cell == "-" else cell) for cell in row] for row in rows]
-    return table([escape(cell) for cell in head], cells, caption=escape(caption))
+    lead = (f"{len(done)} runs: every task under every controller, by servos <code>{escape(found['servo'])}</code> of "
+            f"every fidelity and by <code>{escape(found['bus_servo'])}</code>; then, by pulse servos, with wrong "
+            "beliefs, load, a low battery and worn gears.")
+    cost = ("controller", "motor voltage, rms", "commands go up and down by", "energy", "times better than plain")
+    sections = [
+        Section("When it gets hard", [
+            Beside(["conditions.png"], "How far the tool is from where it should be, mean of all tasks, pulse servos."),
+            Table(CONDITION_HEAD, condition_rows(done), "Tool behind, rms, mean of all tasks, pulse servos")]),
+        Section("Where each loses", [f"{text}." for text in losses(done)]),
+        Section("What it takes", [Table(cost, cost_rows(done, servos), f"Nominal, mean of all tasks, {servos} servos")
+                                  for servos in ("pulse", "digital")])]
+    sections += [Section(f"{robot}: {task}", [
+        Table(("controller", *FIDELITIES), fidelity_rows(done, (robot, task), what), words)
+        for what, words in (("tool_rms", "Tool behind, rms"), ("contour_rms", "Distance from the path, rms"))])
+        for robot, task in tasks(done)]
+    failed = [f"{' / '.join(each.case)}: {each.failure}" for each in done if each.failure]
+    sections += [Section("What did not go", failed)] if failed else []
+    return Report("Controllers of servos, compared", lead, [*sections, Section("", [Html(_READING)])],
+                  style=_STYLE).page
 
 
 _READING = """<section><h2>How to read this page</h2><ul>
@@ -397,21 +386,18 @@ def validation_page(found: RobotValidation, told: dict[str, Any]) -> str:
     lead = (f"The goals of {len(found.replays)} episode{'s' * (len(found.replays) != 1)} ({seconds:.4g} s) went "
             f"through the robot with its servos ({', '.join(sorted(set(told['servos'].values())))}); its joints are "
             f"{degrees(found.rms())}° rms off the measured ones.")
-    cards = "".join(f"<li><b>{degrees(found.rms(name))}°</b>{escape(name)}</li>" for name in found.errors)
-    notes = "".join(f"<li>{escape(text)}</li>" for text in told["notes"])
-    drawn = table([escape(cell) for cell in validation_head(found)],
-                  [[escape("−" if cell == "-" else cell) for cell in row] for row in validation_rows(found)],
-                  caption="Simulated less measured angle, rms (°); at most: the largest single one of the servos")
-    late = ", ".join(f"{escape(name)} {1e3 * value:.0f} ms" for name, value in found.latency.items())
-    return document(title, (
-        f'<h1>{escape(title)}</h1>\n<p class="lead">{escape(lead)}</p>\n<ul class="numbers">{cards}</ul>\n'
-        + (f'<div class="note"><ul>{notes}</ul></div>\n' if notes else "")
-        + f'<h2>Joint by joint</h2>\n<div class="joints">{drawn}</div>\n'
-        + figure(ERRORS, "The same, all samples.") + "<h2>Where it is worst</h2>\n"
-        + figures(joint_pages(WINDOWS, len(found.windows)), "The second of each joint in which the servos are furthest "
-                  "off, the worst joint first; beside the best of the other actuators.")
-        + f"<h2>When goals act</h2>\n<p>Later than the positions of their row were read by: {late}; each is the one "
-        f"time of all joints at which it fits best.</p>\n{_READING_VALIDATION}"), style=STYLE)
+    late = ", ".join(f"{name} {1e3 * value:.0f} ms" for name, value in found.latency.items())
+    return Report(title, escape(lead), [
+        Section("", [Cards([(f"{degrees(found.rms(name))}°", name) for name in found.errors])]),
+        Section("Joint by joint", [
+            Table(validation_head(found), validation_rows(found), "Simulated less measured angle, rms (°); at most: "
+                  "the largest single one of the servos", kind="joints"), Beside([ERRORS], "The same, all samples.")]),
+        Section("Where it is worst", [Beside(
+            joint_pages(WINDOWS, len(found.windows)), "The second of each joint in which the servos are furthest off, "
+            "the worst joint first; beside the best of the other actuators.")]),
+        Section("When goals act", [f"Later than the positions of their row were read by: {late}; each is the one time "
+                                   "of all joints at which it fits best.", Html(_READING_VALIDATION)])],
+        told["notes"], STYLE).page
 
 
 _READING_VALIDATION = """<section><h2>How to read this page</h2><ul>

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType
 
     from servotwin.datasheet.holding import Span
+    from servotwin.look.reports import Report
 
 
 # --- Tables and texts as lines of a terminal of any width -------------------------------------------------------------
@@ -324,6 +325,17 @@ def drawn(parts: Sequence[RenderableType], width: int | None, *, terminal: bool 
     for part in parts:
         console.print(_Drawn(partial(text_lines, shown(part))) if isinstance(part, str) else part, crop=False)
     return "\n".join(line.rstrip() for line in page.getvalue().rstrip("\n").split("\n"))
+
+
+def show_report(head: str, report: Report, *more: RenderableType) -> None:
+    """Write the parts of a report that a terminal can show, below a line, and what else there is to say."""
+    from servotwin.look.reports import Table
+
+    parts: list[RenderableType] = [head]
+    for part in report.parts():
+        parts += ["", table(part.head, part.rows) if isinstance(part, Table) else part if isinstance(part, str)
+                  else pairs(part.rows)]
+    show(*parts, *more)
 
 
 @contextlib.contextmanager

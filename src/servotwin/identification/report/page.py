@@ -37,6 +37,8 @@ from servotwin.look import (
     to_bytes,
     unit_for,
 )
+from servotwin.look.reports import Html, Picture, Report, Section, Table, chapters
+from servotwin.look.reports import cards as cards_html
 from servotwin.parameters import write_file
 
 if TYPE_CHECKING:
@@ -210,8 +212,7 @@ def figure(figure: Figure, words: str) -> str:
 
 def figures(drawn: Sequence[Figure], words: str) -> str:
     """Return the pages of a picture, one below the other, with their caption."""
-    images = "".join(picture(to_bytes(figure, "svg"), words, kind="drawing") for figure in drawn)
-    return f'<figure><div>{images}</div><figcaption>{words}</figcaption></figure>\n'
+    return Picture(lambda: drawn, words).html
 
 
 def space(unit: str) -> str:
@@ -300,15 +301,12 @@ def validation_page(found: Validation) -> str:
         ("logs", "Measured and simulated", trace_list(found.traces)),
         ("residuals", "What is left", residuals(found.traces, found.noise)),
     )
-    contents = "".join(f'<li><a href="#{key}">{title}</a></li>' for key, title, _ in sections)
-    body = "".join(f'<section id="{key}"><h2>{title}</h2>\n{text}</section>\n' for key, title, text in sections)
     name, count = found.servo.title or found.servo.name, len(found.traces)
     logs = f"{count} log" + ("" if count == 1 else "s")
     return document(f"{name}: validation", f"""<h1>{escape(name)}: validated on {logs}</h1>
 <p class="lead">{escape(type(found.model).__name__)}, <code>{escape(found.servo.name)}</code>. No parameter was fitted
 here.</p>
-<nav aria-label="Contents"><ol>{contents}</ol></nav>
-{body}""", style=STYLE)
+{chapters(sections)}""", style=STYLE)
 
 
 def _validation_summary(found: Validation) -> str:
@@ -322,9 +320,7 @@ def _validation_summary(found: Validation) -> str:
     for name, value in found.nuisance.items():
         how = "fitted to these logs" if name in found.fitted else "as the servo file's fit recorded it"
         cards.append((escape(rig_text(name, value)), how))
-    listed = "".join(f"<li><b>{value}</b>{words}</li>" for value, words in cards)
-    notes = "".join(f'<div class="note"><p>{escape(text)}</p></div>\n' for text in found.warnings)
-    return f'<ul class="numbers">{listed}</ul>\n{notes}'
+    return cards_html(cards) + "".join(f'<div class="note"><p>{escape(text)}</p></div>\n' for text in found.warnings)
 
 
 # --- The report of a fit: one HTML page that needs nothing but itself -------------------------------------------------
@@ -368,15 +364,12 @@ def page(fit: Fit, ladder: Ladder | None = None) -> str:
         ("correlation", "Correlation of the estimates", _correlation(fit)), ("search", "The search", _search(fit)),
         ("reading", "How to read this page", _reading(fit)),
     )
-    contents = "".join(f'<li><a href="#{key}">{title}</a></li>' for key, title, _ in sections)
-    body = "".join(f'<section id="{key}"><h2>{title}</h2>\n{text}</section>\n' for key, title, text in sections)
     name = fit.servo.title or fit.servo.name
     held = sum(trace.held_out for trace in fit.traces)
     return document(f"{name}: fit", f"""<h1>{escape(name)}: fitted to {_count(len(fit.traces), "log")}</h1>
 <p class="lead">{escape(type(fit.model).__name__)}, {_count(len(fit.space), "searched parameter")},
 {_count(held, "log")} held out. Everything on this page follows from the data <code>{escape(_short(fit))}</code>.</p>
-<nav aria-label="Contents"><ol>{contents}</ol></nav>
-{body}""", style=STYLE)
+{chapters(sections)}""", style=STYLE)
 
 
 def _short(fit: Fit) -> str:
@@ -417,14 +410,13 @@ def _summary(fit: Fit) -> str:
     if len(fit.starts) > 1:
         number_of, words = fit.searches
         cards.append((f"{number_of} of {len(fit.starts)}", escape(words)))
-    listed = "".join(f"<li><b>{value}</b>{words}</li>" for value, words in cards)
     notes = "".join(f'<div class="note"><p>{escape(text)}</p></div>\n' for text in fit.warnings
                     if fit.verdict is None or text != fit.verdict.sentence)
     if fit.interrupted:
         nothing = "" if known else ", and there are no intervals"
         notes = ('<div class="note"><p><strong>The fit was interrupted.</strong> This is the best that it had found; '
                  f"there may be better values{nothing}.</p></div>\n") + notes
-    return f'<ul class="numbers">{listed}</ul>\n{notes}'
+    return cards_html(cards) + notes
 
 
 def _widest(fit: Fit) -> tuple[str, float] | None:
@@ -538,12 +530,11 @@ def arm_page(fit: ArmFit, pictures: str = "") -> str:
     title = "The servos of a robot, from its episodes"
     said = [*(cause.sentence for cause in fit.causes), *map(str, fit.unidentifiable), *map(str, fit.left_out),
             *fit.warnings]
-    notes = "".join(f"<li>{escape(text)}</li>" for text in said)
-    body = (f'<h1>{title}</h1>\n<p class="lead">{escape(fit.sentence)}.</p>\n'
-            + (f'<div class="note"><ul>{notes}</ul></div>\n' if notes else "")
-            + f"<h2>Joint by joint</h2>\n{errors_table(fit)}{pictures}<h2>What was found</h2>\n{estimates_table(fit)}"
-            + _READING)
-    return document(title, body)
+    return Report(title, f"{escape(fit.sentence)}.", [
+        Section("Joint by joint", [Table(*error_rows(fit), "Simulated less measured angle, rms (°)"), Html(pictures)]),
+        Section("What was found", [
+            Table(("number", "value", f"{100 * fit.level:g} % interval", "known"), estimate_rows(fit), text_columns=4),
+            Html(_READING)])], said).page
 
 
 def degrees(value: float) -> str:
@@ -561,13 +552,6 @@ def error_rows(fit: ArmFit) -> tuple[list[str], list[list[str]]]:
     return ["joint", *(name for name, _ in columns), "noise"], rows
 
 
-def errors_table(fit: ArmFit) -> str:
-    """Return the errors of all joints as HTML."""
-    head, rows = error_rows(fit)
-    return table([escape(cell) for cell in head], [[escape(cell) for cell in row] for row in rows],
-                 caption="Simulated less measured angle, rms (°)")
-
-
 def estimate_rows(fit: ArmFit) -> list[list[str]]:
     """Return a row for each number: name, value, interval, how that was found."""
     made = []
@@ -575,12 +559,6 @@ def estimate_rows(fit: ArmFit) -> list[list[str]]:
         spread = "–" if math.isnan(lower) else f"{lower:.4g} to {upper:.4g}"
         made.append([name, f"{fit.estimates[name]:.4g} {fit.units[name]}".removesuffix(" 1"), spread, method])
     return made
-
-
-def estimates_table(fit: ArmFit) -> str:
-    """Return the estimates as HTML."""
-    return table(["number", "value", f"{100 * fit.level:g} % interval", "known"],
-                 [[escape(cell) for cell in row] for row in estimate_rows(fit)], text_columns=4)
 
 
 _READING = """<section><h2>How to read this page</h2><ul>
