@@ -36,9 +36,17 @@ def installed(tmp_path_factory, child_environment):
 def test_a_plugin_adds_servos_logs_bus_models_and_commands(installed, tmp_path):
     shown = installed("-m", "servotwin", "catalog", "show", "acme-s1", "--json")
     assert json.loads(shown.stdout)["title"] == "Acme S1"
-    told = installed("-m", "servotwin", "counts", "acme-s1", "--bits", "10").stdout
-    assert told == f"{200 / 360 * 1024:.0f} counts\n"
-    assert "counts" in installed("-m", "servotwin", "--help").stdout
+    page = tmp_path / "reserve.html"
+    told = installed("-m", "servotwin", "reserve", "acme-s1", "--torque", "0.3", "--out", str(page)).stdout
+    assert "Acme S1, holding 0.3 N m" in told
+    assert "deg/s" in told
+    assert page.read_text().count("<figcaption>") == 1
+    facts = json.loads(installed("-m", "servotwin", "reserve", "acme-s1", "--torque", "0.3", "--json").stdout)
+    assert list(facts["speeds"].values()) == sorted(facts["speeds"].values())
+    again = installed("-m", "servotwin", "reserve", "acme-s1", "--out", str(page))
+    assert again.returncode == 2
+    assert f"{page} exists" in again.stderr.splitlines()[-1]
+    assert "reserve" in installed("-m", "servotwin", "--help").stdout
     file = tmp_path / "run.json"
     target, angle = [0.0] * 20 + [30.0] * 80, [0.0] * 25 + [min(k, 30.0) for k in range(75)]
     file.write_text(json.dumps({"tester": "acme", "step_ms": 10.0, "target_deg": target, "angle_deg": angle}))
