@@ -6,10 +6,11 @@ import contextlib
 import os
 import secrets
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from servotwin.cli.interrupts import held
 from servotwin.errors import OutputError, OutputExistsError
@@ -178,3 +179,44 @@ def _identity(path: Path) -> tuple[object, ...]:
     except (OSError, ValueError):
         return (path.absolute() if not path.parent.exists() else path.resolve(),)
     return (found.st_dev, found.st_ino)
+
+
+Writers = Mapping[str, Callable[[Path], object]]
+"""What writes a file, by the file's name."""
+
+
+def write_files(targets: Sequence[Target], writers: Writers, *, force: bool,
+                draw: Callable[[Mapping[str, Path]], object] | None = None) -> None:
+    """Write files, all of them or after an error none.
+
+    Parameters
+    ----------
+    targets : sequence of Target
+        Each has its writer by its name, or `draw` writes it.
+    writers : mapping of str to callable
+    force : bool
+        Whether files that are there may be replaced.
+    draw : callable, optional
+        Writes what takes longest, into the places that it is given by name; shows progress itself.
+    """
+    from servotwin.cli.terminal import patience
+
+    with staged(targets, force=force) as drafts:
+        places = {target.path.name: draft for target, draft in zip(targets, drafts, strict=True)}
+        with patience("drawing"):
+            for name, writer in writers.items():
+                writer(places[name])
+        if draw is not None:
+            draw(places)
+
+
+def text_of(text: str | Callable[[], str]) -> Callable[[Path], object]:
+    """Return the writer of a text, or of one that is made then."""
+    return lambda path: path.write_bytes((text if isinstance(text, str) else text()).encode())
+
+
+def json_of(found: Any) -> Callable[[Path], object]:
+    """Return the writer of data as JSON."""
+    from servotwin.cli.terminal import json_text
+
+    return text_of(lambda: json_text(found) + "\n")

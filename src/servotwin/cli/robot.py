@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,7 +25,7 @@ from servotwin.cli.robot_options import (
     validation_rows,
 )
 from servotwin.cli.robot_tasks import add_to, compare, mobile
-from servotwin.cli.terminal import emit_help, emit_json, json_text, pairs, patience, show, table
+from servotwin.cli.terminal import emit_help, emit_json, pairs, patience, show, table
 from servotwin.text import file_stems
 
 if TYPE_CHECKING:
@@ -119,16 +120,12 @@ def _write(found: RobotValidation, told: dict[str, Any], targets: Sequence[Targe
     if not targets:
         return
     from servotwin import plotting
-    from servotwin.cli.output_files import staged
-    from servotwin.cli.robot_task_report import errors_picture, write_windows
-    from servotwin.cli.robot_task_report import validation_page as page
+    from servotwin.cli.output_files import json_of, text_of, write_files
+    from servotwin.cli.robot_task_report import errors_picture, validation_page, window_writers
 
-    with staged(targets, force=force) as drafts:
-        places: dict[str, Path] = {target.path.name: draft for target, draft in zip(targets, drafts, strict=True)}
-        places[SUMMARY].write_bytes((json_text(told) + "\n").encode())
-        plotting.save(errors_picture(found), places[ERRORS])
-        write_windows(found, places)
-        places[PAGE].write_bytes(page(found, told).encode())
+    write_files(targets, {
+        SUMMARY: json_of(told), ERRORS: lambda path: plotting.save(errors_picture(found), path),
+        **window_writers(found), PAGE: text_of(lambda: validation_page(found, told))}, force=force)
 
 
 # --- `servotwin robot fit`: servos, supply, links, zeros and latency of a robot from its episodes ---------------------
@@ -214,23 +211,20 @@ def _write_fit(found: ArmFit, told: dict[str, Any], targets: Sequence[Target], s
     if not targets:
         return
     from servotwin import plotting
-    from servotwin.cli.output_files import staged
-    from servotwin.cli.robot_report import figure, figures, joint_pages
-    from servotwin.cli.robot_task_report import errors_picture, write_windows
+    from servotwin.cli.output_files import json_of, text_of, write_files
+    from servotwin.cli.robot_report import joint_pages
+    from servotwin.cli.robot_task_report import errors_picture, window_writers
     from servotwin.identification.report.page import arm_page
+    from servotwin.look.reports import Beside
 
     judged = found.holdout or found.training
-    with staged(targets, force=force) as drafts:
-        places: dict[str, Path] = {target.path.name: draft for target, draft in zip(targets, drafts, strict=True)}
-        for joint, servo in found.servos.items():
-            servo.save(places[f"{stems[joint]}.toml"], overwrite=True)
-        places[SUMMARY].write_bytes((json_text(told) + "\n").encode())
-        plotting.save(errors_picture(judged), places[ERRORS])
-        write_windows(judged, places)
-        pictures = figure(ERRORS, "The same beside ideal actuators.") + figures(
-            joint_pages(WINDOWS, len(judged.windows)), "The second of each joint in which the fitted servos are "
-            "furthest off, the worst joint first.")
-        places[PAGE].write_bytes(arm_page(found, pictures).encode())
+    pictures = [Beside([ERRORS], "The same beside ideal actuators."), Beside(
+        joint_pages(WINDOWS, len(judged.windows)), "The second of each joint in which the fitted servos are furthest "
+        "off, the worst joint first.")]
+    write_files(targets, {
+        **{f"{stems[joint]}.toml": partial(servo.save, overwrite=True) for joint, servo in found.servos.items()},
+        SUMMARY: json_of(told), ERRORS: lambda path: plotting.save(errors_picture(judged), path),
+        **window_writers(judged), PAGE: text_of(lambda: arm_page(found, pictures))}, force=force)
 
 
 # --- `servotwin robot`: robots whose joints are servos ----------------------------------------------------------------

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from servotwin.cli.output_files import Target, check_targets, page_name, staged
+from servotwin.cli.output_files import Target, check_targets, json_of, page_name, text_of, write_files
 from servotwin.cli.summary import model_name, supply_facts
-from servotwin.cli.terminal import json_text, patience
 from servotwin.errors import OutputError
 from servotwin.look import document, escape, table
 from servotwin.look.reports import Beside, cards, notes
@@ -235,22 +234,15 @@ def write_all(run: RobotRun, sized: Mapping[str, Sizing], targets: Sequence[Targ
     still : int, optional
         Row that the picture is of; that of the largest error unless given.
     """
-    with staged(targets, force=force) as drafts:
-        places = {target.path.name: draft for target, draft in zip(targets, drafts, strict=True)}
-        writers: dict[str, Callable[[Path], object]] = {
-            SERVOS: lambda path: run.record.save(path, every=_every(run, output_step)),
-            JOINTS: lambda path: path.write_bytes(_joint_table(run, output_step).encode()),
-            SUMMARY: lambda path: path.write_bytes((json_text(found) + "\n").encode()),
-            PAGE: lambda path: path.write_bytes(page(
-                run, sized, found, list(places), section,
-                "At the time of the largest error." if still is None else f"At {run.time[still]:.2f} s.").encode()),
-            **_pictures(run, sized), **(more or {}),
-        }
-        with patience("drawing"):
-            for name, writer in writers.items():
-                writer(places[name])
-        if PICTURE in places:
-            _robot(run, places[PICTURE], places.get(VIDEO), camera, rate, trails or (lambda k: ()), still)
+    when = "At the time of the largest error." if still is None else f"At {run.time[still]:.2f} s."
+    names = [target.path.name for target in targets]
+    write_files(targets, {
+        SERVOS: lambda path: run.record.save(path, every=_every(run, output_step)),
+        JOINTS: text_of(lambda: _joint_table(run, output_step)), SUMMARY: json_of(found),
+        PAGE: text_of(lambda: page(run, sized, found, names, section, when)),
+        **_pictures(run, sized), **(more or {})}, force=force,
+        draw=lambda places: _robot(run, places[PICTURE], places.get(VIDEO), camera, rate, trails or (lambda k: ()),
+                                   still) if PICTURE in places else None)
 
 
 def _every(run: RobotRun, output_step: float) -> int:

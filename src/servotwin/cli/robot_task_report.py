@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -12,10 +13,10 @@ import numpy as np
 
 from servotwin import plotting
 from servotwin.cli import robot_report as files
+from servotwin.cli.output_files import json_of, text_of, write_files
 from servotwin.cli.robot_options import ERRORS, WINDOWS, degrees, validation_head, validation_rows
 from servotwin.cli.robot_report import STYLE, film, joint_pages
 from servotwin.cli.robot_report import run_facts as facts
-from servotwin.cli.terminal import json_text, patience
 from servotwin.look import escape
 from servotwin.look.reports import Beside, Cards, Html, Report, Section, Table, report_html
 from servotwin.robots.controllers import STEERINGS
@@ -165,23 +166,17 @@ def mobile_pairs(found: dict[str, Any]) -> list[tuple[str, str]]:
 
 def write(run: WaypointRun, found: dict[str, Any], targets: Sequence[Any], output_step: float, *, force: bool) -> None:
     """Write all files, or after an error none."""
-    from servotwin import plotting
-    from servotwin.cli.output_files import staged
-
-    with staged(targets, force=force) as drafts:
-        places: dict[str, Path] = {target.path.name: draft for target, draft in zip(targets, drafts, strict=True)}
-        with patience("drawing"):
-            label = "ideal wheels" if run.record is None else "servos"
-            plotting.save(plotting.robot_paths([plotting.PathTrace(label, run.path, run.believed)], run.waypoints),
-                          places[PATHS])
-            places[PATH_TABLE].write_bytes(_path_table(run, output_step).encode())
-            if run.record is not None:
-                every = max(round(output_step / float(run.record.time[1] - run.record.time[0])), 1)
-                run.record.save(places[files.SERVOS], every=every)
-            places[files.SUMMARY].write_bytes((json_text(found) + "\n").encode())
-            places[files.PAGE].write_bytes(_page(found, list(places)).encode())
-        if files.PICTURE in places:
-            _draw(run, places[files.PICTURE], places.get(files.VIDEO))
+    label, record = "ideal wheels" if run.record is None else "servos", run.record
+    writers: dict[str, Callable[[Path], object]] = {
+        PATHS: lambda path: plotting.save(plotting.robot_paths(
+            [plotting.PathTrace(label, run.path, run.believed)], run.waypoints), path),
+        PATH_TABLE: text_of(lambda: _path_table(run, output_step)), files.SUMMARY: json_of(found),
+        files.PAGE: text_of(lambda: _page(found, [target.path.name for target in targets]))}
+    if record is not None:
+        every = max(round(output_step / float(record.time[1] - record.time[0])), 1)
+        writers[files.SERVOS] = lambda path: record.save(path, every=every)
+    write_files(targets, writers, force=force, draw=lambda places: _draw(
+        run, places[files.PICTURE], places.get(files.VIDEO)) if files.PICTURE in places else None)
 
 
 def _path_table(run: WaypointRun, step: float) -> str:
@@ -363,8 +358,8 @@ def errors_picture(found: RobotValidation) -> Figure:
         for name, kinds in found.errors.items()})
 
 
-def write_windows(found: RobotValidation, places: Mapping[str, Path]) -> None:
-    """Draw the worst second of each joint, page by page, into the places of their names."""
+def window_writers(found: RobotValidation) -> dict[str, Callable[[Path], object]]:
+    """Return what draws the worst second of each joint, page by page, by the names of the files."""
     traces = []
     for window in found.windows:
         one = found.replays[window.replay]
@@ -375,8 +370,12 @@ def write_windows(found: RobotValidation, places: Mapping[str, Path]) -> None:
             f"{shortened(window.joint.replace('_', ' '))}: {degrees(window.rms)}° rms, {window.kind}", one.time[inside],
             goal[inside], one.measured[window.joint][inside],
             {name: one.simulated[name][window.joint][inside] for name in (SERVOS, best)}))
-    for validation_page, name in enumerate(joint_pages(WINDOWS, len(traces)), 1):
-        plotting.save(plotting.replay_windows(traces, page=validation_page), places[name])
+    return {name: partial(_save_windows, traces, page) for page, name in enumerate(
+        joint_pages(WINDOWS, len(traces)), 1)}
+
+
+def _save_windows(traces: Sequence[plotting.ReplayTrace], page: int, path: Path) -> None:
+    plotting.save(plotting.replay_windows(traces, page=page), path)
 
 
 def validation_page(found: RobotValidation, told: dict[str, Any]) -> str:
@@ -512,21 +511,14 @@ def write_task(run: TaskRun, sized: Mapping[str, Sizing], ways: Ways, targets: S
 def write_ideal(done: IdealTask, ways: Ways, targets: Sequence[Target], found: Mapping[str, Any], *, force: bool,
                 output_step: float) -> None:
     """Write all files of a task that ideal actuators have done, or after an error none."""
-    from servotwin.cli.output_files import staged
-
-    with staged(targets, force=force) as drafts:
-        places = {target.path.name: draft for target, draft in zip(targets, drafts, strict=True)}
-        writers = _writers(ways.joints.path, ways, [("ideal actuators", done.time, done.tool, done.contour.error)],
-                           output_step) | {
-            files.JOINTS: lambda path: path.write_bytes(_joint_table(done, ways.joints.arm, output_step).encode()),
-            files.SUMMARY: lambda path: path.write_bytes((json_text(found) + "\n").encode()),
-            files.PAGE: lambda path: path.write_bytes(
-                ideal_page(found, list(places), WAYS, way_rows(found)).encode())}
-        with patience("drawing"):
-            for name, writer in writers.items():
-                writer(places[name])
-        if files.PICTURE in places:
-            _draw_ideal(done, ways.joints, places[files.PICTURE], places.get(files.VIDEO))
+    names = [target.path.name for target in targets]
+    traces = [("ideal actuators", done.time, done.tool, done.contour.error)]
+    write_files(targets, {
+        **_writers(ways.joints.path, ways, traces, output_step),
+        files.JOINTS: text_of(lambda: _joint_table(done, ways.joints.arm, output_step)), files.SUMMARY: json_of(found),
+        files.PAGE: text_of(lambda: ideal_page(found, names, WAYS, way_rows(found)))}, force=force,
+        draw=lambda places: _draw_ideal(done, ways.joints, places[files.PICTURE], places.get(files.VIDEO))
+        if files.PICTURE in places else None)
 
 
 def _writers(path: ToolPath, ways: Ways, traces: Sequence[tuple[str, Array, Array, Array]],
@@ -536,7 +528,7 @@ def _writers(path: ToolPath, ways: Ways, traces: Sequence[tuple[str, Array, Arra
 
     drawn = [plotting.ToolTrace(*trace) for trace in traces]
     made: dict[str, Callable[[Path], object]] = {
-        TOOL_TABLE: lambda file: file.write_bytes(_tool_table(path, drawn[0], output_step).encode()),
+        TOOL_TABLE: text_of(lambda: _tool_table(path, drawn[0], output_step)),
         TOOL_PICTURE: lambda file: plotting.save(plotting.tool_paths(path.line, drawn), file)}
     if ways.others:
         made[USE_PICTURE] = lambda file: plotting.save(joint_uses(ways.others), file)

@@ -12,7 +12,7 @@ import typer
 from servotwin.cli import shared_options as shared
 from servotwin.cli.option_records import LEFT_OUT, usual, with_records
 from servotwin.cli.robot_options import ALL, Chosen, as_options, models_of, named_words, supply_of
-from servotwin.cli.terminal import emit_json, json_text, pairs, patience, show, table
+from servotwin.cli.terminal import emit_json, pairs, patience, show, table
 
 if TYPE_CHECKING:
     from servotwin.cli.output_files import Target
@@ -390,15 +390,12 @@ def _outcomes(comparison: Comparison, chosen: Sequence[Any], *, quiet: bool) -> 
 
 def _write(done: Sequence[Outcome], found: dict[str, Any], targets: Sequence[Target], *, force: bool) -> None:
     from servotwin import plotting
-    from servotwin.cli.output_files import staged
-    from servotwin.cli.robot_task_report import comparison_page as page
-    from servotwin.cli.robot_task_report import conditions_picture
+    from servotwin.cli.output_files import json_of, text_of, write_files
+    from servotwin.cli.robot_task_report import comparison_page, conditions_picture
     from servotwin.tables import csv_text
 
-    with staged(targets, force=force) as drafts:
-        places: dict[str, Path] = {target.path.name: draft for target, draft in zip(targets, drafts, strict=True)}
-        columns = {name: [case[name] for case in found["cases"]] for name in found["cases"][0]}
-        places[_TABLE].write_bytes(csv_text(columns, digits=9).encode())
-        places[_SUMMARY].write_bytes((json_text(found) + "\n").encode())
-        plotting.save(conditions_picture(done), places[_PICTURE])
-        places[_PAGE].write_bytes(page(found, done).encode())
+    columns = {name: [case[name] for case in found["cases"]] for name in found["cases"][0]}
+    write_files(targets, {
+        _TABLE: text_of(csv_text(columns, digits=9)), _SUMMARY: json_of(found),
+        _PICTURE: lambda path: plotting.save(conditions_picture(done), path),
+        _PAGE: text_of(lambda: comparison_page(found, done))}, force=force)

@@ -37,7 +37,7 @@ from servotwin.look import (
     to_bytes,
     unit_for,
 )
-from servotwin.look.reports import Html, Picture, Report, Section, Table, chapters
+from servotwin.look.reports import Html, Part, Picture, Report, Section, Table, chapters
 from servotwin.look.reports import cards as cards_html
 from servotwin.parameters import write_file
 
@@ -525,13 +525,13 @@ def write_arm_report(fit: ArmFit, path: Path, *, overwrite: bool = False) -> Pat
     return Path(path)
 
 
-def arm_page(fit: ArmFit, pictures: str = "") -> str:
+def arm_page(fit: ArmFit, pictures: Sequence[Part] = ()) -> str:
     """Return the report as HTML; `pictures` are figures that stand beside it."""
     title = "The servos of a robot, from its episodes"
     said = [*(cause.sentence for cause in fit.causes), *map(str, fit.unidentifiable), *map(str, fit.left_out),
             *fit.warnings]
     return Report(title, f"{escape(fit.sentence)}.", [
-        Section("Joint by joint", [Table(*error_rows(fit), "Simulated less measured angle, rms (°)"), Html(pictures)]),
+        Section("Joint by joint", [Table(*error_rows(fit), "Simulated less measured angle, rms (°)"), *pictures]),
         Section("What was found", [
             Table(("number", "value", f"{100 * fit.level:g} % interval", "known"), estimate_rows(fit), text_columns=4),
             Html(_READING)])], said).page
