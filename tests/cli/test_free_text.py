@@ -94,12 +94,12 @@ ELSEWHERE = {
 # Modules that write files or make their contents; a new one has to show here what names do in it
 WRITERS = {
     "bench/recording/bench_wiring.py", "bench/recording/recorder.py", "bench/video/film_log.py",
-    "bench/video/marker.py",
-    "cli/bench.py", "cli/curves.py", "cli/curves_report.py", "cli/linear.py", "cli/linear_report.py", "cli/log.py",
-    "cli/output_files.py", "cli/robot.py", "cli/robot_report.py", "cli/robot_task_report.py", "cli/robot_tasks.py", "cli/web.py",
-    "export/c_writing.py", "export/fmu.py", "identification/report/page.py", "identification/sheets/sheet.py",
-    "logs/csv_logs.py", "logs/sidecar.py", "look/reports.py", "look/style.py", "paper/report.py", "parameters/output_file.py",
-    "parameters/servo_file.py", "plotting/files.py", "plotting/block_diagrams.py", "simulation/compile/building.py",
+    "bench/video/marker.py", "cli/bench.py", "cli/curves.py", "cli/curves_report.py", "cli/linear.py",
+    "cli/linear_report.py", "cli/log.py", "cli/output_files.py", "cli/robot.py", "cli/robot_report.py",
+    "cli/robot_task_report.py", "cli/robot_tasks.py", "cli/web.py", "export/c_writing.py", "export/fmu.py",
+    "identification/report/page.py", "identification/sheets/sheet.py", "logs/csv_logs.py", "logs/sidecar.py",
+    "look/reports.py", "look/style.py", "paper/report.py", "parameters/output_file.py", "parameters/servo_file.py",
+    "plotting/block_diagrams.py", "plotting/files.py", "simulation/compile/building.py",
     "simulation/compile/storage.py", "simulation/lanes/c_entry.py", "simulation/result.py", "studies/study.py",
     "tables/columns.py", "web/alone/page.py", "web/server/own/reading.py", "web/server/own/work.py",
     "wire/service.py", "wire/traffic.py",
@@ -383,7 +383,8 @@ def test_every_command_that_writes_is_tried():
     assert len(tried) == 48
 
 
-WRITES = re.compile(r"""\b(?:write_text|write_bytes|write_files?|writestr|savefig|savetxt|csv\.writer|Report|Picture)\(|"""
+WRITES = re.compile(r"""\b(?:write_text|write_bytes|write_files?|writestr|savefig|savetxt|csv\.writer)\(|"""
+                    r"""\b(?:Report|Beside)\(|\breports\.|"""
                     r"""(?<!\.)\bto_bytes\((?!self)|open\([^()]*(?:\([^()]*\))?[^()]*["'](?:w|wb|x|r\+)["']""")
 
 
