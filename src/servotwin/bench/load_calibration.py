@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from servotwin.bench.load_columns import LiftRecord, LoadTable, load_table
 from servotwin.bench.load_lines import CURRENT, SAG, SPEED, VOLTAGE, LoadLine, LoadLines, load_lines
 from servotwin.bench.table_columns import LineFit, curvature_test, fit_line, wide
-from servotwin.bench.table_parameters import Estimate, plus_minus, residual_pattern, with_measured
+from servotwin.bench.table_parameters import Estimate, gain_of_sag, plus_minus, residual_pattern, with_measured
 from servotwin.parameters import Quantity, Servo, printed_points
 from servotwin.parameters.servo import output_value
 from servotwin.physics import load_share
@@ -680,8 +680,6 @@ def calibrate_loads(table: str | Path | LoadTable | Mapping[str, ArrayLike], ser
 
 
 def _stiffness(servo: Servo, sag: LoadLine, made: dict[str, Estimate]) -> list[str]:
-    from servotwin.bench.table_parameters import gain_of_sag
-
     gain = gain_of_sag(servo, sag)
     if isinstance(gain, str):
         return [gain]

@@ -658,8 +658,6 @@ def length_of(text: str | None) -> float | None:
     InputError
         If it is no positive length with a unit.
     """
-    from servotwin.units.quantities import quantity
-
     if text is None:
         return None
     if number_and_unit(text) is None:

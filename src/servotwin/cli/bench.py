@@ -18,6 +18,7 @@ import typer
 from servotwin.cli import shared_options as shared
 from servotwin.cli.option_records import LEFT_OUT, Commands, usual, with_records
 from servotwin.cli.terminal import emit, emit_help, emit_json, json_text, pairs, patience, show, table, typed
+from servotwin.errors import InputError, OutputError, OutputExistsError, UnknownNameError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -140,7 +141,6 @@ def limits_from(kind: str, span: str | None, voltage: str | None, current: str |
     0.8
     """
     from servotwin.bench.recording import Limits
-    from servotwin.errors import InputError
     from servotwin.units.quantities import quantity
 
     said = {"range": span, "voltage": voltage, "current": current}
@@ -175,7 +175,6 @@ def port_from(port: str | None) -> str:
         If there is none, or more than one.
     """
     from servotwin.bench.backends import serial_ports
-    from servotwin.errors import InputError
 
     if port is not None:
         return port
@@ -228,7 +227,6 @@ def calibrate(
     """Calibrate one thing of the bench."""
     from servotwin.bench.backends import SerialBackend
     from servotwin.bench.recording import AnalogRig
-    from servotwin.errors import InputError, UnknownNameError
 
     if what not in _WHAT:
         raise UnknownNameError("calibration", what, _WHAT)
@@ -320,7 +318,6 @@ def _angle(rig: AnalogRig, meter: str | None, allowed: _Allowed, servo: str | No
 
 def _readings(rig: AnalogRig, limits: Limits, meter: str | None) -> dict[str, list[float]]:
     """Return pulse, tap and dial at each place; all are come to from below."""
-    from servotwin.errors import InputError
     from servotwin.parameters.output_file import undone
     from servotwin.units.quantities import quantity
 
@@ -391,8 +388,6 @@ def bench_paper(
 
 
 def _files(out: Path, names: Sequence[str], *, force: bool) -> list[Path]:
-    from servotwin.errors import OutputError, OutputExistsError
-
     if out.exists() and not out.is_dir():
         raise OutputError(f"--out {out} is no folder")
     files = [out / name for name in names]
@@ -525,8 +520,6 @@ def _targets(out: Path) -> list[Target]:
 
 
 def _region(words: str | None) -> Region | None:
-    from servotwin.errors import InputError
-
     if words is None:
         return None
     parts = [part.strip() for part in words.split(",")]
@@ -537,7 +530,6 @@ def _region(words: str | None) -> Region | None:
 
 
 def _instant(words: str | None, led: str | None) -> str | float:
-    from servotwin.errors import InputError
     from servotwin.units.quantities import quantity
 
     if led is not None and words not in (None, "led"):
@@ -606,7 +598,6 @@ def record(
 ) -> None:
     """Record experiments."""
     from servotwin.cli.bench_jobs import Files, OneServo, SeveralServos, bus_of, recorded
-    from servotwin.errors import InputError
 
     kind = "pulse_width" if bus is None else "angle"
     if bus is None and (identity or baud is not None):
@@ -663,7 +654,6 @@ def rehearse(
     from servotwin.cli.bench_jobs import Files, OneServo, recorded
     from servotwin.cli.option_values import load_from
     from servotwin.cli.shared_options import model_of
-    from servotwin.errors import InputError
     from servotwin.units.quantities import quantity
 
     if (out is None) is not pty or (pty and mock):
@@ -710,7 +700,6 @@ def _advised(limits: Limits, servo: str, frame_period: float) -> Experiment:
     import numpy as np
 
     from servotwin.bench.recording import Experiment, Hold, of_log
-    from servotwin.cli.terminal import patience
     from servotwin.identification import advise
     from servotwin.parameters import load_servo
 

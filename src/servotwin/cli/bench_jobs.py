@@ -13,6 +13,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+from servotwin.errors import BenchError, OutputError, OutputExistsError, UnknownNameError
+
 if TYPE_CHECKING:
     from servotwin.bench.bus import Bus
     from servotwin.bench.recording import About, AnalogRig, Experiment, Limits, Recorded
@@ -98,7 +100,6 @@ def bus_of(family: str, port: str, ids: Sequence[int], baud: int | None, period:
     from servotwin.bench.backends import SerialBackend
     from servotwin.bench.bus import BAUDS, IDS, Bus, scan
     from servotwin.cli.terminal import patience
-    from servotwin.errors import BenchError, UnknownNameError
 
     if family not in _BUSES:
         raise UnknownNameError("bus", family, _BUSES)
@@ -130,8 +131,6 @@ class Files:
 
     def check(self, made: Sequence[Experiment], ids: Sequence[int]) -> None:
         """See that nothing is there yet."""
-        from servotwin.errors import OutputError, OutputExistsError
-
         if self.out.exists() and not self.out.is_dir():
             raise OutputError(f"--out {self.out} is no folder")
         for path in (self.path(one, servo) for one in made for servo in (ids if len(ids) > 1 else [None])):
@@ -141,8 +140,6 @@ class Files:
     @contextlib.contextmanager
     def made(self) -> Iterator[None]:
         """Make the folder, and take it away again if nothing came into it."""
-        from servotwin.errors import OutputError
-
         new = [folder for folder in (self.out, *self.out.parents) if not folder.exists()]
         try:
             self.out.mkdir(parents=True, exist_ok=True)

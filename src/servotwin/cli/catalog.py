@@ -14,8 +14,9 @@ import typer
 
 from servotwin.cli import shared_options as shared
 from servotwin.cli.option_records import Commands, usual, with_records
-from servotwin.cli.robot_options import ContactOption, PackageOption
+from servotwin.cli.robot_options import ContactOption, PackageOption, as_options, overlap_of, packages_of
 from servotwin.cli.terminal import emit_help, emit_json, pairs, patience, show, table, with_span
+from servotwin.errors import InputError, OutputError, OutputExistsError, UnknownNameError
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -174,7 +175,6 @@ def which(
 ) -> None:
     """List the servos that do a task within limits, side by side, and say why the others do not."""
     from servotwin.cli.option_values import asked_lift
-    from servotwin.cli.robot_options import overlap_of
     from servotwin.cli.which_words import limits_of, prices_of
 
     limits, prices = limits_of(bounds.limit, bounds.time), bounds.prices
@@ -195,14 +195,11 @@ def which(
 
 
 def _nothing() -> Exception:
-    from servotwin.errors import InputError
-
     return InputError("nothing is asked", allowed="--lift MASS --arm LENGTH, --motion FILE, --limit NAME=VALUE or "
                       "--among ID,ID")
 
 
 def _supply(voltage: str | None, supply: str | None) -> tuple[Supply | float, Supply | None]:
-    from servotwin.errors import InputError
     from servotwin.parameters import Supply
     from servotwin.units.quantities import quantity
 
@@ -217,13 +214,10 @@ def _supply(voltage: str | None, supply: str | None) -> tuple[Supply | float, Su
 def _motion(path: Path | None, robot: str | None, joints: Sequence[str], lift: tuple[float, float] | None,
             packages: Sequence[str]) -> tuple[Plant | None, Motion | None]:
     """Return robot and motion; without a robot that of an arm, whose joint is the column of the table."""
-    from servotwin.errors import InputError
-
     if path is None:
         if robot is not None or joints:
             raise InputError("--robot" if robot is not None else "--joint", allowed="--motion FILE beside it")
         return None, None
-    from servotwin.cli.robot_options import as_options, packages_of
     from servotwin.robots import joint_names, joint_ranges, read_motion
     from servotwin.robots.choice import arm_of, moved_joints
     from servotwin.robots.model_file import plant_of
@@ -239,7 +233,6 @@ def _motion(path: Path | None, robot: str | None, joints: Sequence[str], lift: t
 
 def _column(path: Path, joints: Sequence[str]) -> str:
     """Return the joint of a table of one joint: its column without the unit."""
-    from servotwin.errors import InputError
     from servotwin.tables import read_table
     from servotwin.units.words import unit_word
 
@@ -259,7 +252,6 @@ def _servos(named: list[str], shop: Prices | None, file: Path | None, limits: Li
             ) -> list[tuple[Servo, float]]:
     """Return the candidates with their prices."""
     from servotwin.cli.shared_options import with_registers
-    from servotwin.errors import InputError, UnknownNameError
     from servotwin.parameters import catalog_names, load_servo
 
     if limits.price is not None and shop is None:
@@ -474,8 +466,6 @@ def from_sheet(
 
 
 def _one_way(way: str, typed: list[str], again: str | None) -> None:
-    from servotwin.errors import InputError
-
     beside = [*typed, *([again] if again is not None else [])]
     if beside:
         raise InputError(f"{way} holds the sheet already", got=", ".join(beside), allowed="one way to give a sheet")
@@ -493,7 +483,6 @@ def _again(servo: str, name: str | None, title: str | None) -> Sheet:
 
 def _sheet(points: _Points, whole: _Whole) -> Sheet:
     from servotwin.cli import option_values as fig
-    from servotwin.errors import InputError
     from servotwin.identification import Sheet
     from servotwin.identification.sheets.sheet import ENDLESS
     from servotwin.units.quantities import quantity
@@ -524,7 +513,6 @@ def _sheet(points: _Points, whole: _Whole) -> Sheet:
 
 def _points(given: _Points, usual: float | None) -> tuple[Any, ...]:
     from servotwin.cli import option_values as fig
-    from servotwin.errors import InputError
     from servotwin.identification import SheetPoint
     from servotwin.units.quantities import quantity
 
@@ -574,7 +562,6 @@ def _one_sheet(sheet: Sheet, how: dict[str, bool], out: Path | None, *, weighed:
 
 def _many(path: Path, how: dict[str, bool], out: Path | None, *, force: bool, as_json: bool) -> None:
     from servotwin.cli.interrupts import held
-    from servotwin.errors import OutputExistsError
     from servotwin.identification import read_sheets, servo_from_sheet, sheet_contradictions, write_servo_text
 
     found = read_sheets(path)
@@ -603,8 +590,6 @@ def _many(path: Path, how: dict[str, bool], out: Path | None, *, force: bool, as
 
 
 def _folder(out: Path) -> None:
-    from servotwin.errors import OutputError
-
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -11,6 +11,7 @@ import typer
 from servotwin.cli import shared_options as shared
 from servotwin.cli.option_records import LEFT_OUT, usual, with_records
 from servotwin.cli.terminal import emit_json, pairs, patience, show, table
+from servotwin.errors import InputError
 
 if TYPE_CHECKING:
     from servotwin.cli.output_files import Target
@@ -63,7 +64,6 @@ def curves(
     """Compute the sheets of servos from their parameters, beside what their makers print."""
     from servotwin.cli.curves_report import facts
     from servotwin.cli.option_values import loads_of
-    from servotwin.errors import InputError
 
     asked, volts = loads_of(lift, arm, load or []), _voltages(voltage)
     targets = _targets({"--out": out, "--plot": plot, "--loop": loop, "--csv": csv}, servos,
@@ -89,7 +89,6 @@ def curves(
 
 def _targets(paths: dict[str, Path | None], servos: list[str], voltages: int, *, force: bool) -> list[Target]:
     from servotwin.cli.output_files import Target, check_targets, page_name
-    from servotwin.errors import InputError
     from servotwin.plotting import CURVES_A_PAGE, LOOPS_A_PAGE, pages
 
     repeated = next((name for name in servos if servos.count(name) > 1), None)
@@ -121,7 +120,6 @@ def _models(servos: list[str], plant: shared.Plant) -> list[Model]:
 
 
 def _check_loop(path: Path | None, models: list[Model]) -> None:
-    from servotwin.errors import InputError
     from servotwin.models import DigitalServo
 
     if path is not None and not (len(models) == 1 and isinstance(models[0], DigitalServo) and not models[0].endless):

@@ -7,12 +7,12 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin import plotting, units
-from servotwin.cli.summary import buzz_facts, remedy_words, rest_words
+from servotwin.cli.summary import buzz_facts, model_name, remedy_words, rest_words
 from servotwin.cli.terminal import with_span
-from servotwin.cli.which_words import lift_facts
-from servotwin.datasheet.holding import Span
+from servotwin.cli.which_words import degrees, lift_cells, lift_facts, mass_cell, times
+from servotwin.datasheet.holding import Span, guesses, highest_voltage, is_below_sheet, lowest_voltage
 from servotwin.look import document, escape, reports, table
-from servotwin.parameters import printed_points
+from servotwin.parameters import printed_fact, printed_flags, printed_points
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -294,9 +294,6 @@ def lift_pairs(lift: Lift) -> list[tuple[str, str]]:
 
 def beside(sheets: Sequence[DataSheet]) -> list[dict[str, str]]:
     """Return several servos side by side, a row for each voltage, by the names of columns."""
-    from servotwin.cli.which_words import degrees, lift_cells, mass_cell, times
-    from servotwin.parameters import printed_fact
-
     several = len({part.voltage for sheet in sheets for part in sheet.voltages}) > 1
     found = []
     for sheet in sheets:
@@ -353,10 +350,8 @@ def _while(seconds: float) -> str:
 
 def notes(sheet: DataSheet) -> list[str]:
     """Return what one has to know to read a sheet: flags of what the maker prints, and what the model is."""
-    from servotwin.datasheet.holding import guesses, highest_voltage, is_below_sheet, lowest_voltage
     from servotwin.datasheet.turning import slow_rotor
     from servotwin.models import BoundedServo, DigitalServo
-    from servotwin.parameters import printed_flags
 
     servo, most = sheet.servo, highest_voltage(sheet.servo)
     found = [f"{part.voltage:g} V is above what the sheet prints ({most:g} V)" for part in sheet.voltages
@@ -389,8 +384,6 @@ def hot_words(part: VoltageSheet) -> str:
 
 def facts(sheet: DataSheet, torque: float | None = None) -> dict[str, Any]:
     """Return a sheet in SI, ready for JSON."""
-    from servotwin.cli.summary import model_name
-
     return {"servo": sheet.servo.name, "title": sheet.servo.title, "kind": sheet.servo.kind,
             "model": model_name(sheet.model), "notes": notes(sheet),
             "voltages": [_facts(part, torque) for part in sheet.voltages]}

@@ -17,6 +17,7 @@ from servotwin.cli import shared_options as shared
 from servotwin.cli.log import Reading
 from servotwin.cli.option_records import LEFT_OUT, usual, with_records
 from servotwin.cli.terminal import emit_json, pairs, patience, show, table
+from servotwin.errors import CommandError, InputError
 from servotwin.logs.formats import MENDS
 
 if TYPE_CHECKING:
@@ -342,8 +343,6 @@ def doctor(
 
 
 def _look_at_installation(*, given: bool, as_json: bool) -> None:
-    from servotwin.errors import InputError
-
     if given:
         raise InputError("doctor", got="options of a servo, but no servo", allowed="a catalog id or a servo file first")
     found = installation_facts()
@@ -354,8 +353,6 @@ def _look_at_installation(*, given: bool, as_json: bool) -> None:
 
 
 def _log(path: Path, read: Callable[[], list[Log]]) -> Log:
-    from servotwin.errors import InputError
-
     logs = read()
     if len(logs) != 1:
         raise InputError(str(path), got=f"{len(logs)} logs", allowed="one: servotwin log with --out FILE.csv writes "
@@ -367,7 +364,6 @@ def _diagnose(made: Model, log: Log | None, words: shared.CommandWords, plant: s
               seed: int, *, board: str | None, verbose: bool, as_json: bool) -> None:
     from servotwin.cli import option_values
     from servotwin.diagnosis import diagnose
-    from servotwin.errors import CommandError, InputError
     from servotwin.loads import Load
 
     longest = _LONGEST if log is None else max(_LONGEST, log.duration)

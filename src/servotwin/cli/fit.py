@@ -15,6 +15,7 @@ from servotwin.cli import shared_options as shared
 from servotwin.cli.option_records import usual, with_records
 from servotwin.cli.shared_options import best_kept, end_if_stopped
 from servotwin.cli.terminal import emit_json, patience, show
+from servotwin.errors import InputError
 
 if TYPE_CHECKING:
     from servotwin.cli.output_files import Target
@@ -121,7 +122,6 @@ class _Laws:
 
     def check(self, model: Model) -> None:
         """Raise InputError if they contradict, or no law is open to a model."""
-        from servotwin.errors import InputError
         from servotwin.models import BoundedServo
 
         if self.ladder and self.structures:
@@ -222,8 +222,6 @@ class _Found:
 
 def _check_words(logs: list[Path] | None, servo: str | None, table: Path | None, report: Path | None,
                  scheduler: str | None, raw: str | None, *, advise: bool, registers: bool) -> None:
-    from servotwin.errors import InputError
-
     if table is not None:
         for given, what in ((bool(logs), "logs"), (report is not None, "--report"), (advise, "--advise"),
                             (scheduler is not None, "--scheduler"), (registers, "--register"),
@@ -241,7 +239,6 @@ def _check_words(logs: list[Path] | None, servo: str | None, table: Path | None,
 def _check_no_table(logs: list[Path] | None, arm: str | None) -> None:
     """Raise where what is given as a log is a table of loads: it has no time, and has a door of its own."""
     from servotwin.bench import is_load_table
-    from servotwin.errors import InputError
 
     if arm is not None:
         raise InputError("--arm", got="no --table", allowed="--table FILE.csv, a table of loads")
@@ -294,7 +291,6 @@ def _check_time(within: Within) -> None:
     InputError
     """
     from servotwin.cli.interrupts import noted
-    from servotwin.errors import InputError
 
     if within.over and not noted():
         raise InputError("--within", got="a time in which nothing was found", allowed="a longer one")

@@ -15,7 +15,7 @@ from servotwin.errors import InputError, ServotwinError, UnknownNameError
 from servotwin.identification.fitting.checks import MENDED
 from servotwin.identification.fitting.free import Space, nominal
 from servotwin.identification.fitting.stopping import Within
-from servotwin.identification.fitting.traces import fit_percent
+from servotwin.identification.fitting.traces import LogError, fit_percent
 from servotwin.identification.report.pictures import (
     MODELS,
     dimension_of_free,
@@ -157,7 +157,6 @@ def _shown() -> dict[type, str]:
     from servotwin.identification.fitting.advise import Advice, Experiment
     from servotwin.identification.fitting.fit import Ladder, Rung, Start
     from servotwin.identification.fitting.residual_noise import CrossCorrelation
-    from servotwin.identification.fitting.traces import LogError
     from servotwin.identification.fitting.uncertainty import Unidentifiable
     from servotwin.identification.fitting.verdict import Verdict
     from servotwin.identification.fitting.yielding import Foreseen, Widened, Yielded
@@ -280,7 +279,6 @@ def calibrate_from(path: Path, servo: str | None, out: Path | None, *, change: S
     from servotwin.bench import calibrate_table, is_load_table, is_pattern
     from servotwin.cli.output_files import Target, check_targets
     from servotwin.cli.shared_options import servo_of
-    from servotwin.errors import InputError
 
     if out is not None:
         check_targets([Target(option="--out", path=out, endings=(".toml",))], force=force,
@@ -679,7 +677,6 @@ def calibrate_of_loads(path: Path, servo: Servo | None, arm: str | None, columns
     """
     from servotwin.bench import calibrate_loads, is_pattern, lifts
     from servotwin.bench.load_columns import length_of
-    from servotwin.errors import InputError
 
     length = length_of(arm)
     if not is_pattern(path):

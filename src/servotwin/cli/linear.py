@@ -10,6 +10,7 @@ import typer
 from servotwin.cli import shared_options as shared
 from servotwin.cli.option_records import usual, with_records
 from servotwin.cli.terminal import emit_json, pairs, patience, show, show_report
+from servotwin.errors import InputError
 
 if TYPE_CHECKING:
     from servotwin.cli.output_files import Target
@@ -89,7 +90,6 @@ def linear(
 
 def _targets(paths: dict[str, Path | None], servo: str, amplitudes: int, *, tune: bool, force: bool) -> list[Target]:
     from servotwin.cli.output_files import Target, check_targets, page_name
-    from servotwin.errors import InputError
     from servotwin.look import CURVES_A_PAGE, pages
 
     several = {"--plot": pages(amplitudes, CURVES_A_PAGE)}

@@ -13,7 +13,7 @@ import typer
 from servotwin.cli import shared_options as shared
 from servotwin.cli.option_records import LEFT_OUT, usual, with_records
 from servotwin.cli.terminal import emit_json, patience, show, table
-from servotwin.errors import one_line
+from servotwin.errors import InputError, OutputError, one_line
 from servotwin.logs.formats import FORMATS, LOG_FORMATS, MENDS
 
 if TYPE_CHECKING:
@@ -114,7 +114,6 @@ def _option(said: str | None, raw: str | None) -> str:
 
 def _kept(read: Sequence[Log], found: Sequence[Log], path: Path, *, said: str, force: bool) -> list[str]:
     """Write what was said or found of columns into sidecars, and return what to say of it."""
-    from servotwin.errors import InputError, OutputError
     from servotwin.identification import keep_columns
 
     what = said or "this"
@@ -233,7 +232,6 @@ def _mends(words: Sequence[str]) -> tuple[str, ...]:
         If something is to be mended that only shows beside a servo.
     """
     from servotwin.cli.fit_report import kinds, reading_mends
-    from servotwin.errors import InputError
 
     mends = reading_mends(words)
     if others := kinds(words):

@@ -18,9 +18,14 @@ from servotwin.cli.robot_options import (
     PAGE,
     SUMMARY,
     WINDOWS,
+    as_options,
     check_drawing,
     check_numbers,
     degrees,
+    overlap_of,
+    packages_of,
+    servos_at,
+    units_of,
     validation_head,
     validation_rows,
 )
@@ -58,7 +63,6 @@ def validate(
 ) -> None:
     """Replay recorded goals, and compare with the measured joints."""
     from servotwin.cli import robot_report as files
-    from servotwin.cli.robot_options import as_options
     from servotwin.robots import validate_robot
     from servotwin.robots.replay import measured_joints
 
@@ -156,7 +160,6 @@ def fit(
     """Fit the servos of a robot."""
     from servotwin.cli import robot_report as files
     from servotwin.cli.fit_report import duration
-    from servotwin.cli.robot_options import as_options
     from servotwin.cli.shared_options import best_kept, end_if_stopped
     from servotwin.identification.arms import identify_arm
     from servotwin.identification.arms.identify_arm import UNKNOWN, mounts_of, plant_of
@@ -289,13 +292,6 @@ def run(
 ) -> None:
     """Let a robot follow a motion, and say whether its servos are big enough."""
     from servotwin.cli import robot_report as files
-    from servotwin.cli.robot_options import (
-        as_options,
-        overlap_of,
-        packages_of,
-        servos_at,
-        units_of,
-    )
     from servotwin.cli.robot_report import run_facts as facts
     from servotwin.robots import joint_names, joint_ranges, run_motion, sizing_of
     from servotwin.robots.model_file import plant_of

@@ -413,7 +413,6 @@ _RATES = (1.0, 120.0)  # pictures a second
 
 def check_numbers(*, output_step: float, rate: float, blend: float | None) -> None:
     """Raise InputError unless numbers of options are possible."""
-    from servotwin.errors import InputError
     from servotwin.units import is_finite
 
     for option, value in (("--output-step", output_step), ("--blend", 1.0 if blend is None else blend)):

@@ -17,6 +17,7 @@ from servotwin.cli.output_files import json_of, text_of, write_files
 from servotwin.cli.robot_options import ERRORS, WINDOWS, degrees, validation_head, validation_rows
 from servotwin.cli.robot_report import STYLE, film, joint_pages
 from servotwin.cli.robot_report import run_facts as facts
+from servotwin.errors import InputError
 from servotwin.look import escape
 from servotwin.look.reports import Beside, Cards, Html, Report, Section, Table, report_html
 from servotwin.robots.controllers import STEERINGS
@@ -121,7 +122,6 @@ def points_of(text: str | None, task: str = "square", size: str | None = None) -
     >>> points_of("0,0; 0.6,0").tolist()
     [[0.0, 0.0], [0.6, 0.0]]
     """
-    from servotwin.errors import InputError
     from servotwin.robots import round_of
     from servotwin.units.quantities import quantity
 

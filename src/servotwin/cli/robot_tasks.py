@@ -11,8 +11,18 @@ import typer
 
 from servotwin.cli import shared_options as shared
 from servotwin.cli.option_records import LEFT_OUT, usual, with_records
-from servotwin.cli.robot_options import ALL, Chosen, as_options, models_of, named_words, supply_of
+from servotwin.cli.robot_options import (
+    ALL,
+    Chosen,
+    as_options,
+    check_drawing,
+    check_numbers,
+    models_of,
+    named_words,
+    supply_of,
+)
 from servotwin.cli.terminal import emit_json, pairs, patience, show, table
+from servotwin.errors import UnknownNameError
 
 if TYPE_CHECKING:
     from servotwin.cli.output_files import Target
@@ -71,7 +81,6 @@ def mobile(
     """Let the mobile robot drive along waypoints."""
     from servotwin.cli import robot_report as files
     from servotwin.cli import robot_task_report as written
-    from servotwin.cli.robot_options import as_options, check_drawing, check_numbers
     from servotwin.robots import robot_model
 
     check_numbers(output_step=output_step, rate=written.MOBILE_RATE, blend=None)
@@ -108,7 +117,6 @@ def _wheel(servo: str) -> Model:
 
 def _run(corners: Any, servos: Sequence[Model], nominal: Model, speed: float, lookahead: float, encoders: int | None,
          supply: str | None, *, ideal: bool) -> WaypointRun:
-    from servotwin.cli.robot_options import supply_of
     from servotwin.robots import ideal_waypoints, run_waypoints
 
     if ideal:
@@ -211,7 +219,6 @@ def _do(arm: Arm, asked: Asked) -> None:
     """Do a task, write its files and tell of it."""
     from servotwin.cli import robot_report as files
     from servotwin.cli import robot_task_report as written
-    from servotwin.cli.robot_options import check_drawing, check_numbers
 
     check_numbers(output_step=asked.output_step, rate=written.TASK_RATE, blend=None)
     criterion, steering = _criterion(arm, asked.redundancy), _steering(asked.controller)
@@ -249,7 +256,6 @@ def path_of(arm: Arm, task: str, size: str | None, speed: float) -> ToolPath:
 
 
 def _criterion(arm: Arm, name: str) -> Criterion:
-    from servotwin.errors import UnknownNameError
     from servotwin.robots.tasks import CRITERIA, LeastMotion, check_redundant
 
     known = {one.name: one for one in CRITERIA}
@@ -261,7 +267,6 @@ def _criterion(arm: Arm, name: str) -> Criterion:
 
 
 def _steering(name: str) -> Steering:
-    from servotwin.errors import UnknownNameError
     from servotwin.robots.controllers import STEERINGS
 
     if name not in STEERINGS:
@@ -353,7 +358,6 @@ def compare(
 
 
 def _cases(robots: list[str] | None, tasks: list[str] | None) -> list[Any]:
-    from servotwin.errors import UnknownNameError
     from servotwin.robots import task_run
 
     for name in robots or []:
@@ -372,7 +376,6 @@ def _cases(robots: list[str] | None, tasks: list[str] | None) -> list[Any]:
 
 def _outcomes(comparison: Comparison, chosen: Sequence[Any], *, quiet: bool) -> list[Outcome]:
     """Do all cases; the path of the joints is found once a task."""
-    from servotwin.cli.robot_options import as_options
     from servotwin.simulation.progress import shown
 
     paths: dict[tuple[str, str], Any] = {}

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple, Protocol
 import typer
 
 from servotwin.cli import interrupts
-from servotwin.errors import ParameterError
+from servotwin.errors import CommandError, ParameterError, UnknownNameError
 
 if TYPE_CHECKING:
     from servotwin.loads import Load
@@ -83,7 +83,6 @@ def class_of(name: str, among: Sequence[str] | None = None) -> type[Model]:
     >>> class_of("pulse").__name__
     'PulseServo'
     """
-    from servotwin.errors import UnknownNameError
     from servotwin.models import MODELS
 
     if name not in (among or MODELS):
@@ -488,8 +487,6 @@ class CommandWords:
         CommandError
             If none was, or several were, or an option does not belong to it.
         """
-        from servotwin.errors import CommandError
-
         given = [f.name for f in fields(self) if getattr(self, f.name) is not None]
         shapes = [name for name in given if name in _SHAPES]
         everything = ", ".join(f"--{name}" for name in _SHAPES)

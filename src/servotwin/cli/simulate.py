@@ -13,6 +13,7 @@ import typer
 from servotwin.cli import shared_options as shared
 from servotwin.cli.option_records import usual, with_records
 from servotwin.cli.terminal import emit_json, pairs, patience, show
+from servotwin.errors import InputError
 
 if TYPE_CHECKING:
     from servotwin.cli.output_files import Target
@@ -80,7 +81,6 @@ def _checked_targets(out: Path | None, plot: Path | None, servo: str, words: sha
 
 def _run(model: Model, words: shared.CommandWords, plant: shared.Plant, duration: float, output_step: float | None,
          seed: int) -> Result:
-    from servotwin.errors import InputError
     from servotwin.simulation import simulate as run
 
     if not (math.isfinite(duration) and duration > 0.0):
@@ -96,8 +96,6 @@ def _run(model: Model, words: shared.CommandWords, plant: shared.Plant, duration
 
 def _check_length(model: Model, signal: Signal, duration: float) -> None:
     """Raise InputError if a run has more frames or ticks than anybody waits for."""
-    from servotwin.errors import InputError
-
     chip, firmware = model.chip(signal), model.firmware(signal)
     for one, period, what in ((chip, 0.0 if chip is None or signal.edges is not None else chip.frame_period, "frames"),
                               (firmware, 0.0 if firmware is None else firmware.T_c, "ticks")):

@@ -182,8 +182,6 @@ def readiness(servo: Servo) -> dict[str, dict[str, Any]]:
 
 def heading(servo: Servo) -> list[RenderableType]:
     """Return title, kind, notes and flags of a servo."""
-    from servotwin.parameters import printed_flags
-
     said = printed_flags(servo)
     return [f"{servo.title} ({servo.name}), {servo.kind}", " ".join(servo.notes.split()),
             *([f"flags: {'; '.join(said)}"] if said else [])]

@@ -144,8 +144,6 @@ def sweep(
 
 
 def _check_options(out: Path | None, *, resume: bool, plot: bool, varies: bool) -> None:
-    from servotwin.errors import InputError
-
     if not varies:
         raise InputError("nothing varies; use at least one of --vary, --from-file, --draws")
     for option, given in (("--resume", resume), ("--plot", plot)):
@@ -154,7 +152,6 @@ def _check_options(out: Path | None, *, resume: bool, plot: bool, varies: bool) 
 
 
 def _varied(model: Model, words: list[str], *, from_file: bool) -> dict[str, Any]:
-    from servotwin.errors import InputError
     from servotwin.studies import stated
 
     given: dict[str, Any] = {}
@@ -181,7 +178,6 @@ def _draws(path: Path | None) -> dict[str, Any] | None:
 def _run(model: Model, words: shared.CommandWords, plant: shared.Plant, metric: list[str], options: dict[str, Any],
          scheduler: str | None) -> Study:
     from servotwin.cli.interrupts import last_words
-    from servotwin.errors import InputError
     from servotwin.studies import sweep as run
     from servotwin.studies.lane_metrics import checked_metrics
     from servotwin.units import is_finite

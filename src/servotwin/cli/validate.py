@@ -13,6 +13,7 @@ from servotwin.cli import log
 from servotwin.cli import shared_options as shared
 from servotwin.cli.option_records import usual, with_records
 from servotwin.cli.terminal import emit_json, patience, show, table
+from servotwin.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -94,7 +95,6 @@ def _run(servo: Servo, model: str | None, nuisance: list[str] | None, sensors: l
 
 def _limits(found: Validation, words: list[str]) -> Mapping[str | None, float]:
     from servotwin.cli import fit_report
-    from servotwin.errors import InputError, UnknownNameError
 
     signals = {trace.signal for trace in found.traces}
     if words and len(signals) > 1:

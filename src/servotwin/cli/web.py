@@ -10,6 +10,7 @@ import typer
 from servotwin.cli import shared_options as shared
 from servotwin.cli.option_records import usual, with_records
 from servotwin.cli.terminal import emit, emit_json
+from servotwin.errors import InputError
 
 if TYPE_CHECKING:
     from servotwin.web.live import Scene
@@ -80,8 +81,6 @@ def _export(first: Scene, path: Path, *, force: bool, as_json: bool) -> None:
 
 
 def _check(port: int, host: str, *, classroom: bool) -> None:
-    from servotwin.errors import InputError
-
     if not 0 <= port <= _MOST_PORT:
         raise InputError("--port", got=port, allowed=f"0 to {_MOST_PORT}")
     if classroom and host in ("127.0.0.1", "localhost", "::1"):
@@ -91,7 +90,6 @@ def _check(port: int, host: str, *, classroom: bool) -> None:
 
 def _first(servo: str | None, scene: Path | None, lesson: str | None) -> Scene:
     """Return the bench that the page begins with."""
-    from servotwin.errors import InputError
     from servotwin.parameters.catalog import catalog_names, load_servo
     from servotwin.parameters.servo_file import servo_text
     from servotwin.web.live import Scene, SceneServo, read_scene

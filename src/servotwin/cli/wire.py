@@ -12,7 +12,7 @@ import typer
 from servotwin.cli import shared_options as shared
 from servotwin.cli.option_records import usual, with_records
 from servotwin.cli.terminal import emit, emit_json
-from servotwin.errors import one_line
+from servotwin.errors import InputError, one_line
 
 if TYPE_CHECKING:
     from servotwin.wire import Bus
@@ -135,8 +135,6 @@ def _tell(bus: Bus, names: dict[int, str], service: Service, link: Path | None, 
 
 
 def _servos(words: Sequence[str]) -> dict[int, str]:
-    from servotwin.errors import InputError
-
     found: dict[int, str] = {}
     for word in words:
         id, equals, name = word.partition("=")
@@ -150,8 +148,6 @@ def _servos(words: Sequence[str]) -> dict[int, str]:
 
 
 def _version(text: str | None) -> tuple[int, ...] | None:
-    from servotwin.errors import InputError
-
     if text is None:
         return None
     parts = text.split(".")
@@ -161,8 +157,6 @@ def _version(text: str | None) -> tuple[int, ...] | None:
 
 
 def _tcp(text: str | None) -> tuple[str, int] | None:
-    from servotwin.errors import InputError
-
     if text is None:
         return None
     host, _, port = text.rpartition(":")
@@ -172,7 +166,5 @@ def _tcp(text: str | None) -> tuple[str, int] | None:
 
 
 def _check(duration: float | None) -> None:
-    from servotwin.errors import InputError
-
     if duration is not None and not 0.0 < duration < 1e7:
         raise InputError("--duration", got=duration, allowed="a positive number of seconds")

@@ -17,7 +17,7 @@ from servotwin.errors import InputError
 from servotwin.identification.fitting.arrow import Begin
 from servotwin.identification.fitting.checks import checked_level
 from servotwin.identification.fitting.free import LUMPED, FreeParameter, Space
-from servotwin.identification.fitting.registers import RegisterSearch
+from servotwin.identification.fitting.registers import RegisterSearch, register_values
 from servotwin.identification.fitting.traces import ErrorTable, Interval, Trace
 from servotwin.identification.fitting.uncertainty import Unidentifiable
 from servotwin.logs.log import Log
@@ -258,8 +258,6 @@ class Fit:
     @property
     def register_values(self) -> tuple[RegisterValue, ...]:
         """Registers that nobody recorded: raw values of those whose numbers were searched, with their intervals."""
-        from servotwin.identification.fitting.registers import register_values
-
         if self.registers is None:
             return ()
         spans = {name: (one.lower, one.upper) for name, one in self.intervals().items()}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.web.lessons.mystery import SEEDS
-from servotwin.web.live.scene import read_scene
+from servotwin.web.live.scene import Scene, SceneServo, read_scene
 
 if TYPE_CHECKING:
     from servotwin.web.live.scene import Scene
@@ -109,8 +109,6 @@ def mystery_scene(seed: object) -> Scene:
     InputError
         If it is no seed.
     """
-    from servotwin.web.live.scene import Scene, SceneServo
-
     if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**31:
         raise InputError("seed of a mystery servo", got=seed, allowed=f"a whole number from 0 to {SEEDS}")
     return Scene(servos=(SceneServo(mystery=seed, model="PulseServo"),), name=f"Mystery servo {seed}")
