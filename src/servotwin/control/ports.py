@@ -229,7 +229,7 @@ class SimulatedServo:
     sensors : sequence of Sensor
         All that a controller sees; nothing unless given.
     believed : Servo, optional
-        Whose calibration makes pulses of angles; the model's own unless given.
+        Its calibration makes pulses of angles; the model's own unless given.
     resolution : float
         Of the pulses that are sent, 1 us unless given [s].
     delay : float

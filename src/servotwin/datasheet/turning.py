@@ -177,7 +177,7 @@ def still_pulses(model: Model, found: SpeedMap) -> tuple[float, float] | None:
     Parameters
     ----------
     model : Model
-        Whose map it is.
+        The servo of the map.
     found : SpeedMap
     """
     servo, still = endless(model), np.flatnonzero(found.speeds == 0.0)

@@ -395,7 +395,7 @@ def brown_out(model: Model, command: Signal | None, board: str, *, load: Load, d
     duration : float
         Of the run [s]
     log : Log, optional
-        Whose voltage is looked at too.
+        Its voltage is looked at too.
 
     Raises
     ------

@@ -174,7 +174,7 @@ def layout_of(table: TextTable, sidecar: Mapping[str, Column] | None, wanted: Ma
     unknown_step : bool
         Whether a command that lacks may be the one step that the angle shows.
     raw : RawRegisters, optional
-        Whose registers columns may be named after.
+        By whose registers columns may be named.
 
     Raises
     ------
@@ -631,7 +631,7 @@ def read_log_table(path: Path, mends: Sequence[str], wanted: Mapping[str, Wanted
     unknown_step : bool
         Whether a command that lacks may be the one step that the angle shows.
     registers : str or Servo, optional
-        Whose registers columns may be named after: a family, a model, or a servo.
+        A family, a model or a servo, by whose registers columns may be named.
 
     Raises
     ------

@@ -35,7 +35,7 @@ _ZERO_CELSIUS = 273.15
 
 
 class RawRegisters(NamedTuple):
-    """Whose registers the columns of a table may be named after.
+    """The family and servo by whose registers the columns of a table may be named.
 
     Parameters
     ----------

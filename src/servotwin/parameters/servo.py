@@ -446,7 +446,7 @@ class Servo:
         values : mapping
             Dotted name to SI number; None takes a value away.
         source : str
-            Who says so; what begins with "set by" is listed under `set` in summaries.
+            Source of the values; one that begins with "set by" is listed under `set` in summaries.
 
         Raises
         ------

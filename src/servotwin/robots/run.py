@@ -415,7 +415,7 @@ def finished(drive: ServoDrive, data: Any, motion: Motion, mounts: Mapping[str, 
     ----------
     drive : ServoDrive
     data : MjData
-        Whose record has begun before the motion, which begins at time 0.
+        Its record has begun before the motion, which begins at time 0.
     motion, mounts, bus, window
         As of `run_motion`.
     poses : ndarray, shape (n, nq)

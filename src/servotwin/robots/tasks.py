@@ -624,7 +624,7 @@ class LeastTorque:
     Parameters
     ----------
     joint : str
-        Whose angle at the beginning is tried.
+        Its angle at the beginning is tried.
     """
 
     joint: str = "third"

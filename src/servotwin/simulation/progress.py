@@ -187,7 +187,7 @@ HERE = Here()
 
 
 class Crew:
-    """Whoever does pieces of work.
+    """An executor of pieces of work that outlives the loss of one.
 
     A pool of processes of which one was killed can do nothing more. A fresh pool of as many takes its place, and what
     was lost is done again; the executor that was given stays as it is, and is not shut down. A piece that it fails at,

@@ -345,7 +345,7 @@ def grouped_in(table: TextTable, *, asked: bool = False) -> Grouped | None:
     """Return how thousands are separated in a table, None where nothing says that they are.
 
     The other mark is that of decimals, or whole numbers without a mark stand in one column with numbers of three
-    places: 500, 980, 1.020. Who `asked` knows it.
+    places: 500, 980, 1.020. With `asked` that is taken for granted.
     """
     cells = [cell for row in table.rows for cell in row.cells if "." in cell or "," in cell]
     found = {mark: [cell for cell in cells if mark in cell] for mark in ".,"}

@@ -1,4 +1,4 @@
-"""Who is on a wire: both makers' protocols are tried at the usual speeds."""
+"""The servos on a wire: both makers' protocols are tried at the usual speeds."""
 
 from __future__ import annotations
 

@@ -179,7 +179,7 @@ _BACKLOG = 4096  # bytes of one order, so that neither side waits for the other 
 
 
 class Pins(NamedTuple):
-    """Who is told what happens at the pins; times in cycles.
+    """The listeners to what happens at the pins; times in cycles.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ class Terminal:
     """A pseudo-terminal in front of a backend; what a program writes is sent, what the board says can be read.
 
     What is written before anybody has opened it is lost, as with a board that is not plugged in: a program has to shake
-    hands. Who closes it and opens it again finds the board as it was left.
+    hands. A program that closes it and opens it again finds the board as it was left.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ class Message(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Identity:
-    """Who the board is.
+    """The identity of a board.
 
     Parameters
     ----------

@@ -66,7 +66,7 @@ _WORTH_AWAY = 20.0  # the same, where what goes to a worker and comes back is co
 
 @dataclass(frozen=True)
 class Running:
-    """Who simulates, and how closely.
+    """The executor of simulations, and their accuracy.
 
     Parameters
     ----------
@@ -490,7 +490,7 @@ class Forecast:
     sensors : sequence of str
         Names of measured signals that are compared.
     running : Running, optional
-        Who simulates, and how closely; threads of this process unless given.
+        Executor and accuracy; threads of this process unless given.
     original : Case, optional
         One of which all logs are copies with other commands or times; its pulses come when a point says.
 

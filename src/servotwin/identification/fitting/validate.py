@@ -110,7 +110,7 @@ def fitted_rig(forecast: Forecast, start: Point, asked: Sequence[str], show: Cal
     Parameters
     ----------
     forecast : Forecast
-        Whose searched numbers all stay.
+        Its searched numbers all stay.
     start : Point
         Where the search begins.
     asked : sequence of str

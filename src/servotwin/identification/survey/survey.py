@@ -302,7 +302,7 @@ class Motion(NamedTuple):
         The dead time of steps in the median; where the command moves all the time, by how much the angle comes later
         [s].
     steps : int
-        Whose dead time was seen; 0 where the command moves all the time.
+        Of which the dead time was seen; 0 where the command moves all the time.
     speed : float
         The fastest that lasts [rad/s].
     onset : float

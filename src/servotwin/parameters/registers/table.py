@@ -397,7 +397,7 @@ class Family:
     middle : int
         Count at angle 0.
     current_sense : {"motor", "bus"}
-        Whose current Present_Current is.
+        The current that Present_Current measures.
     assumed : frozenset of str
         Registers whose factory value no page prints.
     elsewhere : mapping of str to str

@@ -266,7 +266,7 @@ EXPORTS = asyncio.Semaphore(2)
 
 
 class _StoppedError(BaseException):
-    """Nobody waits any more for what a thread computes."""
+    """The end of a computation whose result no request waits for."""
 
 
 async def aside(what: str, work: Callable[[], Found], seconds: float | None = None) -> Found:

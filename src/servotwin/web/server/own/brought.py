@@ -214,7 +214,7 @@ class Desk:
         self.light = asyncio.Semaphore(_AT_ONCE)
         """For work that takes seconds."""
         self.fitting: Fits | None = None
-        """Whose fit goes on."""
+        """The fits of the visitor that has one running."""
 
     def enter(self, visitor: Brought) -> None:
         """Take a visitor in."""
