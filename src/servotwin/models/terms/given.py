@@ -121,9 +121,6 @@ class Hung(NamedTuple):
     flexible_hanging_angle: float
 
 
-NOTHING_HUNG = Hung(*[0.0] * len(Hung._fields))
-
-
 def hung_of(load: Load) -> Hung:
     """Return the numbers of a load."""
     flexible = (0.0,) * 6

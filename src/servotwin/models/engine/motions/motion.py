@@ -103,13 +103,6 @@ def by_series(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: 
                   NO_DENSE, NO_LONG_DENSE)
 
 
-def by_step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, length: float,
-            dense: tuple[Vector, ...], end: Vector) -> Motion:
-    """Return a motion whose dense output is given: all that is known of it, with no step to follow."""
-    return Motion(LONG_STEP, numbers, mode, u, tau, t0, y, length, NO_COEFFICIENTS, (0.0, 0.0), end, 0.0, -1, True,
-                  NO_STAGES, NO_DENSE, dense)
-
-
 def output_apart(numbers: Numbers, mode: Mode, u: Piece, tau: Piece) -> tuple[float, float]:
     """Return the law of an output that moves apart from the motor, (λ, f)."""
     if mode.mesh != INSIDE:
