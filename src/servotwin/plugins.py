@@ -7,12 +7,11 @@ and a plug-in that cannot be loaded is left out; a warning says either in one li
 from __future__ import annotations
 
 import warnings
-from collections.abc import Container, Iterator
-from functools import cache
+from collections.abc import Callable, Container
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
+    from importlib.metadata import EntryPoints
 
 GROUPS = {
     "servos": "a package with servo files (.toml), which join the catalog by their names",
@@ -23,7 +22,7 @@ GROUPS = {
 """What an entry point of each group leads to."""
 
 
-def loaded(group: str, built_in: Container[str] = ()) -> dict[str, Any]:
+def loaded(group: str, built_in: Container[str] = (), use: Callable[[Any], Any] | None = None) -> dict[str, Any]:
     """Return what plug-ins add to a group, by name.
 
     Parameters
@@ -32,6 +31,8 @@ def loaded(group: str, built_in: Container[str] = ()) -> dict[str, Any]:
         One of `GROUPS`.
     built_in : container of str
         Names that plug-ins may not take.
+    use : callable, optional
+        Makes what is returned of what an entry point leads to; where it fails the plug-in cannot be loaded.
 
     Warns
     -----
@@ -40,45 +41,33 @@ def loaded(group: str, built_in: Container[str] = ()) -> dict[str, Any]:
 
     Examples
     --------
-    >>> loaded("servos") if not _points("servos") else {}
-    {}
+    >>> {*loaded("servos")} <= {*named()["servos"]}
+    True
     """
-    return {name: found for name, found in _each(group) if _is_free(group, name, built_in)}
-
-
-def _each(group: str) -> Iterator[tuple[str, Any]]:
+    found = {}
     for point in _points(group):
-        found = _loaded(point)
-        if found is not None:
-            yield point.name, found
+        if point.name in built_in:
+            leave_out(f"plug-in {point.name}", f"servotwin has {group.replace('_', ' ')} of that name itself")
+            continue
+        try:
+            found[point.name] = point.load() if use is None else use(point.load())
+        except (Exception, SystemExit) as error:  # it is not ours
+            leave_out(f"plug-in {point.name} ({point.value})", error)
+    return found
 
 
-@cache
-def _points(group: str) -> tuple[EntryPoint, ...]:
+def leave_out(what: str, why: str | BaseException) -> None:
+    """Warn in one line of something that a plug-in adds and that is not taken."""
+    said = why if isinstance(why, str) else f"{type(why).__name__}: {' '.join(str(why).split())}"
+    warnings.warn(f"{what} is left out: {said}", UserWarning, stacklevel=3)
+
+
+def named() -> dict[str, list[str]]:
+    """Return the names of all plug-ins that are installed by their groups, without loading one."""
+    return {group: sorted(point.name for point in _points(group)) for group in GROUPS}
+
+
+def _points(group: str) -> EntryPoints:
     from importlib.metadata import entry_points
 
-    return tuple(entry_points(group=f"servotwin.{group}"))
-
-
-@cache
-def _loaded(point: EntryPoint) -> Any:
-    """Return what an entry point leads to; None, after a warning, where that fails in whatever way."""
-    try:
-        return point.load()
-    except Exception as error:  # it is not ours
-        said = " ".join(str(error).split())
-        warnings.warn(f"plug-in {point.name} ({point.value}) is left out: {type(error).__name__}: {said}", UserWarning,
-                      stacklevel=5)
-        return None
-
-
-@cache
-def _warned(text: str) -> None:
-    warnings.warn(text, UserWarning, stacklevel=6)
-
-
-def _is_free(group: str, name: str, built_in: Container[str]) -> bool:
-    if name in built_in:
-        _warned(f"plug-in {name} is left out: servotwin has {group.replace('_', ' ')} of that name itself")
-        return False
-    return True
+    return entry_points(group=f"servotwin.{group}")

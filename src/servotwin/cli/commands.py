@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -93,8 +93,20 @@ app.add_typer(catalog, name="catalog")
 app.add_typer(robot, name="robot")
 app.add_typer(export, name="export")
 app.add_typer(bench, name="bench")
+
+
+def _checked(command: Any) -> Any:
+    """Return the command of a plug-in, if one can be made of it."""
+    alone = command
+    if not isinstance(command, typer.Typer):
+        alone = Commands()
+        alone.command("alone")(command)
+    typer.main.get_command(alone)
+    return command
+
+
 _OWN = {str(each.name) for each in app.registered_commands} | {str(each.name) for each in app.registered_groups}
-for name, command in plugins.loaded("commands", _OWN).items():
+for name, command in plugins.loaded("commands", _OWN, use=_checked).items():
     if isinstance(command, typer.Typer):
         app.add_typer(command, name=name)
     else:

@@ -462,7 +462,7 @@ def _servo(sheet: DataSheet, torque: float | None, *, alone: bool) -> str:
     said = reports.notes(notes(sheet))
     parts = "".join(_voltage(sheet, part, torque) for part in sheet.voltages)
     pages = plotting.pages(len(sheet.voltages), plotting.CURVES_A_PAGE)
-    hot = escape(_degrees(hot_words(sheet.voltages[0])))
+    hot = escape(reports.signs(hot_words(sheet.voltages[0])))
     drawn = _figure([plotting.speed_curves(sheet, page=page) for page in pages], "At full drive over speed: cold "
                     f"(25 °C) and hot ({hot}). Open marks are what the sheet prints.", wide=True)
     small = _figure([plotting.holding_curves(sheet, page=page) for page in pages], "How far a constant load pulls the "
@@ -488,9 +488,9 @@ def _servo(sheet: DataSheet, torque: float | None, *, alone: bool) -> str:
 
 def _voltage(sheet: DataSheet, part: VoltageSheet, torque: float | None) -> str:
     found = rows(part, printed_points(sheet.servo), torque)
-    cells = [[escape(_degrees(cell)) for cell in _minus(row)] for row in found]
+    cells = [[escape(reports.signs(cell)) for cell in row] for row in found]
     drawn = table(["", "cold", "hot", "the sheet prints", "off"], cells,
-                  caption=f"At {part.voltage:g} V. Cold: 25 °C. Hot: {escape(_degrees(hot_words(part)))}.")
+                  caption=f"At {part.voltage:g} V. Cold: 25 °C. Hot: {escape(reports.signs(hot_words(part)))}.")
     below = _rest(part) + _loop(part, torque) + _lift(part)
     return f'<h3>At {part.voltage:g} V</h3>\n{_cards(part)}<div class="sheet">{drawn}</div>\n{below}'
 
@@ -508,14 +508,14 @@ def _rest(part: VoltageSheet) -> str:
     found = rest_pairs(part)
     if not found:
         return ""
-    said = table(["At rest", ""], [[escape(_degrees(words)) for words in pair] for pair in found], text_columns=2)
+    said = table(["At rest", ""], [[escape(reports.signs(words)) for words in pair] for pair in found], text_columns=2)
     return f'<div class="pairs">{said}</div>\n'
 
 
 def _loop(part: VoltageSheet, torque: float | None) -> str:
     if part.loop is None:
         return ""
-    said = table(["The loop at rest", ""], [[escape(_degrees(words)) for words in pair]
+    said = table(["The loop at rest", ""], [[escape(reports.signs(words)) for words in pair]
                                             for pair in loop_pairs(part.loop, torque)], text_columns=2)
     return f'<div class="pairs">{said}</div>\n'
 
@@ -523,21 +523,12 @@ def _loop(part: VoltageSheet, torque: float | None) -> str:
 def _lift(part: VoltageSheet) -> str:
     if part.lift is None:
         return ""
-    said = table(["Lifting", ""], [[escape(_degrees(words)) for words in pair] for pair in lift_pairs(part.lift)],
+    said = table(["Lifting", ""], [[escape(reports.signs(words)) for words in pair] for pair in lift_pairs(part.lift)],
                  text_columns=2)
     verdict = "lifts it" if part.lift.lifts else "does not lift it at all angles"
     kind = "note yes" if part.lift.lifts else "note"
     return (f'<div class="{kind}"><p>At {part.voltage:g} V the servo {verdict}.</p></div>\n'
             f'<div class="pairs">{said}</div>\n')
-
-
-def _minus(row: CurveRow) -> list[str]:
-    return [cell.replace("-", "−") if k == len(row) - 1 else cell for k, cell in enumerate(row)]
-
-
-def _degrees(text: str) -> str:
-    """Return a text of the terminal with the signs that a page can show."""
-    return text.replace(" deg C", " °C").replace("deg/s", "°/s").replace(" deg", "°").replace(" us)", " µs)")
 
 
 def _figure(drawn: Sequence[Figure], words: str, *, wide: bool = False) -> str:

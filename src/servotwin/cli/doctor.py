@@ -221,7 +221,7 @@ def installation_facts() -> dict[str, Any]:
     >>> found["servotwin"], found["backend"] in ("c", "plain"), "data" in found["extras"]
     ('0.1.0', True, True)
     """
-    from servotwin import __version__
+    from servotwin import __version__, plugins
     from servotwin.simulation.compile import backend, finding
 
     found = [compiler.command for compiler in finding.compilers()]
@@ -232,7 +232,7 @@ def installation_facts() -> dict[str, Any]:
         "processors": os.cpu_count(), "level": finding.level(),
         "packages": {name: _version(name) for name in ("numpy", "scipy", "matplotlib", "control")},
         "backend": "plain" if plain else "c", "compilers": [" ".join(command) for command in found],
-        "shipped_kernels": len(shipped), "cache": _cache(), "extras": _extras(),
+        "shipped_kernels": len(shipped), "cache": _cache(), "extras": _extras(), "plugins": plugins.named(),
     }
 
 
@@ -280,6 +280,8 @@ def installation_parts(found: dict[str, Any]) -> list[RenderableType]:
         ("cache", f"{cache['folder']}, {cache['files']} files, {cache['bytes'] / 1e6:.1f} MB"
          + (f"; not used, for {cache['distrust']}" if cache["distrust"] else "")),
     ]
+    added = [f"{name} ({group.replace('_', ' ')})" for group, names in found["plugins"].items() for name in names]
+    rows += [("plug-ins", ", ".join(added))] if added else []
     extras = [(name, "yes" if not lacking else "no", _FOR.get(name, ""),
                f'pip install "servotwin[{name}]"' if lacking else "") for name, lacking in found["extras"].items()]
     return [pairs(rows), "", table(("extra", "here", "for", "to have it"), extras)]

@@ -125,11 +125,10 @@ def usual(*names: str) -> Callable[[Command], Command]:
     def marked(command: Command) -> Command:
         signature = inspect.signature(command)
         more = inspect.Parameter("help_all", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=Annotated[
-            bool, typer.Option(_ALL, is_eager=True, callback=_show_all,
-                               help="Show all options and exit.")])
+            bool, typer.Option(_ALL, is_eager=True, callback=_show_all, help="Show all options and exit.")])
 
         @wraps(command)
-        def brief(*, help_all: bool, **given: Any) -> None:
+        def brief(*, help_all: bool = False, **given: Any) -> None:
             command(**given)
 
         made: Any = brief
@@ -156,8 +155,8 @@ class Brief(TyperCommand):
         """Write the help."""
         names = getattr(self.callback, "usual", ())
         shown = {f"--{name}" for name in names} | {"--help", _ALL}
-        left_out: list[Any] = [each for each in self.get_params(ctx) if names and _ALL not in ctx.meta
-                    and each.param_type_name == "option" and not shown & set(each.opts)]
+        left_out: list[Any] = [] if not names or _ALL in ctx.meta else [
+            each for each in self.get_params(ctx) if each.param_type_name == "option" and not shown & set(each.opts)]
         for option in left_out:
             option.hidden = True
         try:
@@ -168,9 +167,14 @@ class Brief(TyperCommand):
 
 
 class Commands(typer.Typer):
-    """Commands of one kind, `Brief` ones."""
+    """Commands of one kind, `Brief` ones: all of them know `--help-all`."""
 
     def command(self, name: str | None = None, **options: Any  # type: ignore[override]
                 ) -> Callable[[Command], Command]:
         """Return what adds a command."""
-        return super().command(name, cls=Brief, **options)
+        def add(command: Command) -> Command:
+            if not getattr(command, "usual", ()):
+                options["context_settings"] = {"help_option_names": ["-h", "--help", _ALL]}
+            return typer.Typer.command(self, name, cls=Brief, **options)(command)
+
+        return add

@@ -16,7 +16,7 @@ from servotwin.cli.output_files import Target, check_targets, json_of, page_name
 from servotwin.cli.summary import model_name, supply_facts
 from servotwin.errors import OutputError
 from servotwin.look import document, escape, table
-from servotwin.look.reports import Beside, cards, notes
+from servotwin.look.reports import Beside, cards, notes, signs
 from servotwin.parameters.output_file import undone
 
 if TYPE_CHECKING:
@@ -406,17 +406,17 @@ def _supply_words(run: RobotRun) -> str:
 
 
 def _notes(run: RobotRun) -> str:
-    return notes([signed(text) for text in run.notes])
+    return notes([signs(text) for text in run.notes])
 
 
 def _answer(sized: Mapping[str, Sizing]) -> str:
     unjudged = next((each.unjudged for each in sized.values() if each.unjudged), "")
     if unjudged:
-        return f'<div class="no"><p>The servos are not judged: {escape(signed(unjudged))}.</p></div>\n'
+        return f'<div class="no"><p>The servos are not judged: {escape(signs(unjudged))}.</p></div>\n'
     wrong = [each for each in sized.values() if not each.big_enough]
     if not wrong:
         return '<div class="yes"><p>All servos are big enough for this motion.</p></div>\n'
-    said = "".join(f"<li><b>{escape(each.joint)}</b>: {escape(signed(each.verdict))}</li>" for each in wrong)
+    said = "".join(f"<li><b>{escape(each.joint)}</b>: {escape(signs(each.verdict))}</li>" for each in wrong)
     return f'<div class="no"><p>Not all servos are big enough:</p><ul>{said}</ul></div>\n'
 
 
@@ -424,7 +424,7 @@ def _cards(run: RobotRun, sized: Mapping[str, Sizing]) -> str:
     least = min(sized.values(), key=lambda each: each.margin)
     furthest = max(run.tracking, key=lambda joint: (not run.slides(joint), run.tracking[joint].rms))
     shown = [(margin_words(least.margin), f"least margin, {least.joint}"),
-             (signed(place(run.tracking[furthest].rms, run.slides(furthest))), f"error, rms, {furthest}")]
+             (signs(place(run.tracking[furthest].rms, run.slides(furthest))), f"error, rms, {furthest}")]
     currents = {joint: found.peak_current for joint, found in run.tracking.items()}
     most = max(currents, key=lambda joint: currents[joint])
     shown.append((f"{currents[most]:.2f} A", f"peak motor current, {most}"))
@@ -434,7 +434,7 @@ def _cards(run: RobotRun, sized: Mapping[str, Sizing]) -> str:
     warm = {joint: found.winding for joint, found in run.tracking.items() if not math.isnan(found.winding)}
     if warm:
         hottest = max(warm, key=lambda joint: warm[joint])
-        shown.append((signed(celsius(warm[hottest])), f"hottest winding, {hottest}"))
+        shown.append((signs(celsius(warm[hottest])), f"hottest winding, {hottest}"))
     return cards([(escape(value), escape(words)) for value, words in shown])
 
 
@@ -468,8 +468,8 @@ def _sizes(run: RobotRun, sized: Mapping[str, Sizing]) -> str:
         rows.append([
             each.joint, margin_words(each.margin), f"{worst.time:.2f} s", f"{worst.torque:.3g} N m",
             f"{worst.available:.3g} N m", f"{math.degrees(worst.speed):.0f}°/s", f"{each.rms_torque:.3g} N m",
-            _or_dash(each.lasting_torque, "{:.3g} N m"), "–" if heat is None else signed(celsius(heat.winding)),
-            signed(each.verdict)])
+            _or_dash(each.lasting_torque, "{:.3g} N m"), "–" if heat is None else signs(celsius(heat.winding)),
+            signs(each.verdict)])
     drawn = table(head, [[escape(cell) for cell in row] for row in rows], text_columns=len(head))
     return f'<div class="joints">{drawn}</div>\n'
 
@@ -484,10 +484,10 @@ def _tracking(run: RobotRun) -> str:
         slides = run.slides(joint)
         rows.append([
             joint, run.mounts[joint].model.servo.name,
-            *([signed(place(run.measured_error(joint), slides)) or "–"] if measured else []),
-            *(signed(place(value, slides)) for value in (found.rms, found.largest)),
+            *([signs(place(run.measured_error(joint), slides)) or "–"] if measured else []),
+            *(signs(place(value, slides)) for value in (found.rms, found.largest)),
             _or_dash(1e3 * found.delay, "{:.0f} ms"),
-            *(signed(place(value, slides)) or "–" for value in (
+            *(signs(place(value, slides)) or "–" for value in (
                 found.rms_delayed, found.droop_before, found.droop_after)),
             f"{found.peak_current:.2f} A", f"{found.mean_current:.3f} A", _or_dash(found.lowest_voltage, "{:.2f} V")])
     drawn = table(head, [[escape(cell) for cell in row] for row in rows], text_columns=len(head))
@@ -504,11 +504,6 @@ def _heat_words(run: RobotRun) -> str:
         return ""
     which = "all servos" if len(assumed) == len(run.mounts) else ", ".join(assumed)
     return f" Thermal numbers of {which} are assumed by their mass."
-
-
-def signed(text: str) -> str:
-    """Return a text of the terminal with the signs that a page can show."""
-    return text.replace(" deg C", " °C").replace("deg/s", "°/s").replace(" deg", "°").replace("-", "−")
 
 
 _READING = """<ul>

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from importlib import import_module
 from types import ModuleType
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from servotwin import plugins
 
@@ -137,9 +138,18 @@ LOG_FORMATS = {
 FORMATS = ("auto", *LOG_FORMATS)  # what may be asked for without a plug-in
 
 
+@cache
 def log_formats() -> dict[str, LogFormat]:
     """Return all formats by name: those of `LOG_FORMATS`, and of plug-ins."""
-    return LOG_FORMATS | plugins.loaded("log_formats", LOG_FORMATS)
+    return LOG_FORMATS | plugins.loaded("log_formats", LOG_FORMATS, use=_format)
+
+
+def _format(found: Any) -> LogFormat:
+    """Return a format of a plug-in whose module can be loaded."""
+    if not isinstance(found, LogFormat):
+        raise TypeError(f"{found!r} is no LogFormat")
+    _ = found.room
+    return found
 
 
 def formats_that_hold(what: str) -> dict[str, LogFormat]:

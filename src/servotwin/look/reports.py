@@ -29,7 +29,7 @@ class Table:
     def html(self) -> str:
         """It on a page, with the signs that a page can show."""
         drawn = html_table([escape(cell) for cell in self.head],
-                           [[escape(_signs(cell)) for cell in row] for row in self.rows], caption=escape(self.caption),
+                           [[escape(signs(cell)) for cell in row] for row in self.rows], caption=escape(self.caption),
                            text_columns=self.text_columns)
         return f'<div class="{self.kind}">{drawn}</div>\n' if self.kind else drawn
 
@@ -43,7 +43,7 @@ class Pairs:
     @property
     def html(self) -> str:
         """It on a page: a sentence each."""
-        return "".join(f"<p>{escape(name)}: {escape(_signs(text))}.</p>\n" for name, text in self.rows)
+        return "".join(f"<p>{escape(name)}: {escape(signs(text))}.</p>\n" for name, text in self.rows)
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Cards:
     @property
     def html(self) -> str:
         """It on a page."""
-        return cards([(escape(_signs(value)), escape(words)) for value, words in self.rows])
+        return cards([(escape(signs(value)), escape(words)) for value, words in self.rows])
 
 
 @dataclass(frozen=True)
@@ -192,16 +192,16 @@ def figure(images: Sequence[str], words: str, *, kind: str = "") -> str:
     return f"<figure{of_kind}><div>{''.join(images)}</div><figcaption>{words}</figcaption></figure>\n"
 
 
-def _signs(text: str) -> str:
+def signs(text: str) -> str:
     """Return a text of a terminal with the signs that a page can show; words keep their hyphens.
 
     Examples
     --------
-    >>> _signs("-3 +/- 2 deg"), _signs("xl330-m288"), _signs("1e-3"), _signs("-")
-    ('−3 ± 2°', 'xl330-m288', '1e−3', '–')
+    >>> signs("-3 +/- 2 deg"), signs("xl330-m288: --contact"), signs("1e-3"), signs("-"), signs("25 deg C")
+    ('−3 ± 2°', 'xl330-m288: --contact', '1e−3', '–', '25 °C')
     """
     if text == "-":
         return "–"
     text = re.sub(r"(?<=\d) deg(?= C\b)", " °", text).replace("° C", "°C")
-    text = re.sub(r"(?<=\d) deg\b", "°", text).replace("+/-", "±")
+    text = re.sub(r"(?<=\d) us\b", " µs", re.sub(r"(?<=\d) deg\b", "°", text)).replace("+/-", "±")
     return re.sub(r"(?<![\w-])-(?=[\d.])|(?<=\de)-(?=\d)", MINUS, text)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin import plugins
-from servotwin.errors import UnknownNameError
+from servotwin.errors import ServotwinError, UnknownNameError
 from servotwin.parameters.servo import Servo
 from servotwin.parameters.servo_file import read_servo_file
 from servotwin.tables import read_columns
@@ -87,14 +87,30 @@ def load_dataset(name: str) -> Dataset:
 @cache
 def _servo_files() -> dict[str, Path]:
     """Return the servo files of the catalog by id: those of the package, and of plug-ins."""
-    own = Path(str(resources.files("servotwin.parameters"))) / "catalog"
-    found = {path.stem: path for path in own.glob("*.toml")}
-    for package in plugins.loaded("servos").values():
-        added = {path.stem: path for path in Path(str(resources.files(package))).glob("*.toml")}
-        for name in added.keys() & found.keys():
-            warnings.warn(f"{added[name]} is left out: the catalog has {name} already", UserWarning, stacklevel=2)
-        found = added | found
+    found = {path.stem: path for path in _own_files().glob("*.toml")}
+    for files in plugins.loaded("servos", use=lambda package: sorted(
+            Path(str(resources.files(package))).glob("*.toml"))).values():
+        for path in files:
+            if path.stem in found:
+                plugins.leave_out(str(path), f"the catalog has {path.stem} already")
+            elif _is_readable(path):
+                found[path.stem] = path
     return found
+
+
+def _own_files() -> Path:
+    return Path(str(resources.files("servotwin.parameters"))) / "catalog"
+
+
+def _is_readable(path: Path) -> bool:
+    """Return whether a file of a plug-in is a servo's: a broken one must not end what lists the catalog."""
+    try:
+        with warnings.catch_warnings(action="ignore"):
+            read_servo_file(path)
+    except ServotwinError as error:
+        plugins.leave_out(str(path), error)
+        return False
+    return True
 
 
 def catalog_names() -> tuple[str, ...]:
@@ -142,4 +158,5 @@ def load_servo(name: str | Path) -> Servo:
             return read_servo_file(Path(text))
         raise UnknownNameError("servo", text, catalog_names(),
                                allowed="an id that `servotwin catalog list` shows, or a servo file")
-    return read_servo_file(_servo_files()[text], name=f"catalog/{text}.toml")
+    path = _servo_files()[text]
+    return read_servo_file(path, name=f"catalog/{text}.toml" if path.parent == _own_files() else None)

@@ -1,5 +1,8 @@
 """Servos of a bench are made of what is given of them: as the models make them, for all of the catalog."""
 
+import os
+import subprocess
+import sys
 import warnings
 
 import numpy as np
@@ -85,3 +88,13 @@ def test_shapes_are_the_signals_of_the_package(command):
     count = screen.shaped([*screen.FIELDS].index(known["shape"]), given, *samples, table)
     np.testing.assert_allclose(table[:count], signal.pieces.rows, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(screen.extremes(table, count)[:2], signal.pieces.extremes, rtol=1e-12)
+
+
+@pytest.mark.long
+def test_what_a_page_knows_has_one_order():
+    """Of sets it has another in each process: `web --export` wrote two pages by chance."""
+    program = ("import json; from servotwin.web.alone.pack import _servo; "
+               "print(json.dumps(_servo('dynamixel-2xl430-w250')))")
+    told = {subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True,
+                           env={**os.environ, "PYTHONHASHSEED": seed}).stdout for seed in ("0", "1", "2", "3", "4")}
+    assert len(told) == 1

@@ -263,9 +263,16 @@ MODELS = _models()
 @cache
 def known_models() -> dict[tuple[str, int], BusModel]:
     """Return all models by protocol and model number: `MODELS`, and those of plug-ins."""
-    added = {(family.protocol, model.number): BusModel(model.number, model.name, family)
-             for pairs in plugins.loaded("bus_models").values() for model, family in pairs()}
-    return added | MODELS
+    found = dict(MODELS)
+    for pairs in plugins.loaded("bus_models", use=lambda models: [
+            ((family.protocol, model.number), BusModel(model.number, model.name, family))
+            for model, family in models()]).values():
+        for key, model in pairs:
+            if key in found:
+                plugins.leave_out(f"bus model {model.name}", f"{found[key].name} has its number, {model.number}")
+            else:
+                found[key] = model
+    return found
 
 
 MODEL_NUMBER_AT = {"feetech": 3, "dynamixel-2": 0, "dynamixel-1": 0}
