@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 
 import servotwin as st
 from cli import fit_logs
+from servotwin.cli.fit_report import facts
 from servotwin.identification import Ladder, Rung, compare_structures, identify, read_logs
+from servotwin.identification.fitting.yielding import Widened
 
 QUICK = ["--servo", fit_logs.SERVO, "--model", "bounded", "--free", "output_inertia", "--no-priors", "--starts", "1",
          "--nuisance", "none", "--no-compare"]
@@ -418,3 +421,16 @@ def test_columns_that_cannot_be(cli, tmp_path, words, said):
     assert ended.code == 2
     assert said in ended.error
     assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_json_has_widened_priors_and_numbers_that_would_move(folder):
+    found = identify(read_logs(folder), st.load_servo(fit_logs.SERVO), st.BoundedServo, ["output_inertia"], (), None,
+                     starts=1, compare_with=())
+    wide = Widened("output_inertia", file=6e-3, file_std=1e-4, logs=5e-3, apart=5.0, std=1e-3, unit="kg m2")
+    told = facts(replace(found, widened=(wide,), verdict=replace(
+        found.verdict, moved={"output_inertia": (0.4, "play")})), [])
+    assert told["moved"] == {"output_inertia": {"half_widths": 0.4, "by": "play"}}
+    assert told["widened"] == [{
+        "parameter": "output_inertia", "unit": "kg m2", "file": 6e-3, "file_std": 1e-4, "logs": 5e-3, "apart": 5.0,
+        "std": 1e-3, "of_file": True, "words": str(wide)}]
+    assert told["yielded"] == []

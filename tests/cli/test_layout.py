@@ -172,3 +172,16 @@ def test_help_is_short_at_80_columns_and_all_of_it_is_behind_help_all(words, cap
     assert set(re.findall(r"^[│|] (?:\*  |   )?(--[a-z0-9-]+)", told, re.MULTILINE)) == usual | {"--help", "--help-all"}
     assert main([*words, "--help-all"]) == 0
     assert options <= set(re.findall(r"--[a-z0-9-]+", capsys.readouterr().out))
+
+
+def test_a_command_says_of_an_option_of_a_record_what_it_means_there(capsys):
+    """A text of its own stands in the help of one command, and leaves that of the record to the others."""
+    told = {}
+    for name in ("simulate", "linear", "sweep"):
+        assert main([name, "--help-all"]) == 0
+        told[name] = " ".join(re.sub("[│|]", " ", capsys.readouterr().out).split())
+    assert "geared-motor or dc-motor" in told["simulate"]
+    assert "geared-motor" not in told["linear"] + told["sweep"]
+    assert "as in servotwin simulate" in told["sweep"]
+    assert "--register" in told["linear"]
+    assert "--register" not in told["sweep"]

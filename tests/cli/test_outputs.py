@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from servotwin import plotting, simulation
-from servotwin.cli.output_files import Target, check_targets, staged
+from servotwin.cli.output_files import Target, check_targets, staged, text_of, write_files
 from servotwin.errors import OutputError, OutputExistsError
 
 STEP = ["--step", "0:90"]
@@ -141,3 +141,14 @@ def test_names_that_no_system_takes(tmp_path):
     target = Target(option="--out", path=tmp_path / "a\0b.csv", endings=(".csv",))
     with pytest.raises(OutputError, match="--out"):
         check_targets([target], force=False)
+
+
+def test_a_file_that_came_after_the_check_is_not_replaced(tmp_path):
+    targets = [Target(option="--out", path=tmp_path / name, endings=(".txt",)) for name in ("a.txt", "b.txt")]
+    writers = {"a.txt": text_of("new"), "b.txt": text_of(lambda: "new")}
+    (tmp_path / "b.txt").write_text("old")
+    with pytest.raises(OutputExistsError):
+        write_files(targets, writers, force=False)
+    assert [path.read_text() for path in sorted(tmp_path.iterdir())] == ["old"]
+    write_files(targets, writers, force=True)
+    assert [path.read_text() for path in sorted(tmp_path.iterdir())] == ["new", "new"]

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import servotwin as st
 from identification.synthetic_logs import TRUTH, noisy, run
 from servotwin.errors import InputError
 from servotwin.identification import RUNGS, friction_ladder
-from servotwin.identification.fitting.fit import Rung
+from servotwin.identification.fitting.fit import Rung, begin_after
 from servotwin.identification.fitting.ladder import choice_of, told_of, with_criterion
 
 FREE = ["motor.armature_resistance", "output_inertia", "electronics.stretcher_gain"]
@@ -282,3 +283,14 @@ def test_what_makes_no_sense_is_refused(more, words):
 def test_a_rung_that_is_not_there_is_named(plain):
     with pytest.raises(InputError, match="M1, M3"):
         plain["M6"]
+
+
+@pytest.mark.parametrize("exactly", [True, False])
+def test_a_search_begins_where_a_fit_ended(exactly):
+    own = (np.array([0.1]), np.array([0.2]))
+    fit = SimpleNamespace(phased=False, estimates={"delay": 0.02, "output_inertia": 1e-3}, scales={"delay": 1e-3},
+                          own=own)
+    begun = begin_after(fit, exactly=exactly)
+    assert (begun.searches, begun.shared, begun.own, begun.exactly) == (1, {"delay": 0.02}, own, exactly)
+    anew = begin_after(SimpleNamespace(phased=True), exactly=exactly)  # when pulses come is found again
+    assert (anew.shared, anew.own, anew.exactly) == ({}, (), exactly)
