@@ -138,10 +138,14 @@ LOG_FORMATS = {
 FORMATS = ("auto", *LOG_FORMATS)  # what may be asked for without a plug-in
 
 
-@cache
 def log_formats() -> dict[str, LogFormat]:
     """Return all formats by name: those of `LOG_FORMATS`, and of plug-ins."""
-    return LOG_FORMATS | plugins.loaded("log_formats", LOG_FORMATS, use=_format)
+    return LOG_FORMATS | _added()
+
+
+@cache
+def _added() -> dict[str, LogFormat]:
+    return plugins.loaded("log_formats", LOG_FORMATS, use=_format)
 
 
 def _format(found: Any) -> LogFormat:
