@@ -11,6 +11,7 @@ import pytest
 
 import servotwin as st
 from docs.pages import ROOT
+from servotwin.parameters import catalog_names
 
 pytest.importorskip("sphinx")
 pytest.importorskip("latex2mathml")
@@ -79,3 +80,7 @@ def test_every_dependency_says_what_it_replaces():
     page = (ROOT / "docs" / "reference" / "dependencies.md").read_text(encoding="utf-8")
     listed = set(re.findall(r"^\| (?:`[\w-]+` \| )?([a-z][\w-]+) \|", page, re.MULTILINE)) - {"package", "extra"}
     assert listed == {re.match(r"[\w-]+", line)[0] for line in asked}
+
+
+def test_readme_counts_the_servos_of_the_catalog():
+    assert f"{len(catalog_names())} servos come along" in (ROOT / "README.md").read_text("utf-8")
