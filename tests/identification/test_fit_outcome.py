@@ -10,6 +10,7 @@ import servotwin as st
 from identification.fits import DISC, STD, WRONG, fitted, some
 from identification.synthetic_logs import TRUTH, noisy, run
 from servotwin.identification.fitting.free import nominal
+from servotwin.identification.fitting.stopping import LONGER
 
 
 def test_traces_and_errors_are_those_of_the_simulation(logs, fit):
@@ -139,7 +140,7 @@ def test_an_interrupt_in_a_bad_start_keeps_the_good_one(logs):
     told = []
 
     def midway(share, text):
-        told.append(text)
+        told.append(text.removesuffix(LONGER))  # slow processors add it
         if told.count("3 starts") > 8:
             raise KeyboardInterrupt
 
