@@ -459,12 +459,9 @@ def sheet_words(shares: Sequence[SheetShare], found: LoadLines, voltage: float |
                    f"{'' if sure else ', if it stalls there'}: the heaviest load, {torque_words(first.measured)}, "
                    f"beside a stall torque of {_printed(first)}{more}")
             continue
+        measured = f"{first.name} {_number(first, first.measured)}"
         yield (f"your servo has {100.0 * first.share:.3g} % ({100.0 * first.lower:.3g} to {100.0 * first.upper:.3g} %) "
-               f"of what its sheet says: {_titled(first)} beside {_printed(first)}{more}")
-
-
-def _titled(one: SheetShare) -> str:
-    return f"{one.name} {_number(one, one.measured)}"
+               f"of what its sheet says: {measured} beside {_printed(first)}{more}")
 
 
 def _printed(one: SheetShare) -> str:

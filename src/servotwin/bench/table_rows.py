@@ -114,16 +114,14 @@ class InstrumentPair:
             wrong.append(f"the zero is off by {abs(self.line.intercept / self.zero_error):.0f} standard errors "
                          f"(p = {self.zero_p:.1g})")
         if "gain" in self.disagrees_in and self.expected_gain is not None:
-            wrong.append(f"the gain is {self._excess()} that of {self.expected_from}, {self.expected_gain:.5g} "
+            share = self.line.slope / (self.expected_gain or math.nan) - 1.0
+            excess = f"{100.0 * abs(share):.1f} % {'above' if share > 0.0 else 'below'}"
+            wrong.append(f"the gain is {excess} that of {self.expected_from}, {self.expected_gain:.5g} "
                          f"(p = {self.gain_p:.1g})")
         values = ", ".join(f"{value:.3f}" for value in self.restored)
         return (f"{told}: affine within {worst}, but {' and '.join(wrong)}: the two instruments disagree in "
                 f"{' and '.join(self.disagrees_in)}"
                 + (f"; {self.first} from {self.second} would be {values}" if values else ""))
-
-    def _excess(self) -> str:
-        share = self.line.slope / (self.expected_gain or math.nan) - 1.0
-        return f"{100.0 * abs(share):.1f} % {'above' if share > 0.0 else 'below'}"
 
     def _agreement(self) -> str:
         gain = "nothing to compare its gain with" if self.expected_gain is None else (

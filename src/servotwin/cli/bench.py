@@ -491,10 +491,12 @@ def video(
     from servotwin.bench.video import read_clip
     from servotwin.bench.video.film_log import film_log
     from servotwin.cli.fit_report import reading_mends
-    from servotwin.cli.output_files import check_targets
+    from servotwin.cli.output_files import Target, check_targets
+    from servotwin.logs.sidecar import sidecar_path
     from servotwin.units.quantities import quantity
 
-    targets = _targets(out)
+    targets = [Target(option="--out", path=out, endings=(".csv",)),
+               Target(option="--out, its sidecar", path=sidecar_path(out), endings=(".json",))]
     check_targets(targets, force=ending.force, inputs=[clip] if log is None else [clip, log])
     options: dict[str, Any] = {
         "mark": mark, "flip": flip, "slow": slow, "instant": _instant(instant, led), "led": _region(led),
@@ -509,14 +511,6 @@ def video(
         emit_json({"video": dict(made.sidecar["recorded"]["video"]), "remarks": remarks, "files": files})
         return
     _show(filmed, remarks, files, commanded=log is not None)
-
-
-def _targets(out: Path) -> list[Target]:
-    from servotwin.cli.output_files import Target
-    from servotwin.logs.sidecar import sidecar_path
-
-    return [Target(option="--out", path=out, endings=(".csv",)),
-            Target(option="--out, its sidecar", path=sidecar_path(out), endings=(".json",))]
 
 
 def _region(words: str | None) -> Region | None:
@@ -782,9 +776,11 @@ def check(port: PortOption = None, wiring: WiringOption = None, as_json: shared.
         return
     rows = [(name, f"{one['count']:.2f}", f"{one['std_count']:.2f}", f"{one['value']:.4g} {one['unit']}")
             for name, one in channels.items()]
+    remarks = [f"- {name} is at the end of the converter; is it wired, and its divider right?"
+               for name, one in channels.items() if (one["count"] < 1.0 and name != "shunt") or one["count"] > 1021.0]
     show(pairs([("board", rig.board.backend.name), ("firmware", identity.firmware), ("mode", identity.mode),
                 ("wire", ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in wire.items()))]), "",
-         table(("channel", "count", "noise", "which is"), rows), *_remarks(channels))
+         table(("channel", "count", "noise", "which is"), rows), *remarks)
 
 
 def _channels(rig: AnalogRig) -> dict[str, dict[str, Any]]:
@@ -796,11 +792,6 @@ def _channels(rig: AnalogRig) -> dict[str, dict[str, Any]]:
         made[name] = {"count": mean, "std_count": statistics.pstdev(counts), "value": rig.wiring.value(name, mean),
                       "unit": "A" if name == "shunt" else "V"}
     return made
-
-
-def _remarks(channels: dict[str, dict[str, Any]]) -> list[str]:
-    return [f"- {name} is at the end of the converter; is it wired, and its divider right?"
-            for name, one in channels.items() if (one["count"] < 1.0 and name != "shunt") or one["count"] > 1021.0]
 
 
 @bench.command(help="Put the firmware onto an Uno or a Nano, by avrdude.",

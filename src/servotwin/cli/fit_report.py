@@ -310,8 +310,9 @@ def calibrate_from(path: Path, servo: str | None, out: Path | None, *, change: S
 def show_table_calibration(found: TableCalibration, out: Path | None) -> None:
     """Show what a table says, and where the servo is, if it was written."""
     written = [] if out is None else ["", pairs([("written", str(out))])]
+    parameters = [] if not found.parameters else [parameter_table(found.parameters), ""]
     show(f"{found.source}: {found.table.rows} rows, " + ", ".join(c.name for c in found.table.columns), "",
-         _lines(found), "", *_parameters(found), *[f"- {text}" for text in found.findings()], *written)
+         _lines(found), "", *parameters, *[f"- {text}" for text in found.findings()], *written)
 
 
 def calibration_facts(found: TableCalibration, out: Path | None = None) -> dict[str, Any]:
@@ -363,12 +364,6 @@ def _lines(found: TableCalibration) -> Any:
                      f"{line.max_residual:.3g} {fit.unit}",
                      f"p = {fit.curvature.p_value:.2g}" + (", curved" if name in found.curved else "")))
     return table(("line", "slope", "at 0", "largest residual", "parabola"), rows)
-
-
-def _parameters(found: TableCalibration) -> list[Any]:
-    if not found.parameters:
-        return []
-    return [parameter_table(found.parameters), ""]
 
 
 def parameter_table(parameters: Mapping[str, Quantity]) -> RenderableType:

@@ -99,17 +99,13 @@ class Reading:
         lines = list(found.sentences)
         rest = iter(found.logs)
         for path, some in given:
-            lines += _kept(some, list(islice(rest, len(some))), path, said=_option(said, self.raw), force=force)
+            option = "--columns" if said is not None else "--registers" if self.raw is not None else ""
+            lines += _kept(some, list(islice(rest, len(some))), path, said=option, force=force)
         if (parts or lines) and not quiet:
             show(*parts, *lines, "")
         for line in lines if quiet else ():
             typer.echo(one_line(line), err=True)
         return of_no_robot(found.logs) if registers else list(found.logs)
-
-
-def _option(said: str | None, raw: str | None) -> str:
-    """Return the option that said something of columns; empty where none did."""
-    return "--columns" if said is not None else "--registers" if raw is not None else ""
 
 
 def _kept(read: Sequence[Log], found: Sequence[Log], path: Path, *, said: str, force: bool) -> list[str]:

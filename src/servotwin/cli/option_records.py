@@ -43,7 +43,10 @@ def with_records(command: Command) -> Command:
     fields: dict[str, list[inspect.Parameter]] = {}
     records: dict[str, type] = {}
     for name, own in inspect.signature(command).parameters.items():
-        kind, own_help = _record(hints[name])
+        hint = hints[name]
+        plain, *more = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+        texts = next((each for each in more if isinstance(each, dict)), {})
+        kind, own_help = (plain, texts) if dataclasses.is_dataclass(plain) and isinstance(plain, type) else (None, {})
         if kind is None:
             options.append(own.replace(annotation=hints[name], kind=inspect.Parameter.KEYWORD_ONLY))
         else:
@@ -63,13 +66,6 @@ def with_records(command: Command) -> Command:
     made.__signature__ = inspect.Signature(options)
     made.__annotations__ = {each.name: each.annotation for each in options}
     return expanded
-
-
-def _record(hint: Any) -> tuple[type | None, Mapping[str, str | None]]:
-    """Return the record that a parameter is, None if it is none, and what the command says of its options."""
-    plain, *more = get_args(hint) if get_origin(hint) is Annotated else (hint,)
-    texts = next((each for each in more if isinstance(each, dict)), {})
-    return (plain, texts) if dataclasses.is_dataclass(plain) and isinstance(plain, type) else (None, {})
 
 
 def _options(record: type, texts: Mapping[str, str | None]) -> list[inspect.Parameter]:

@@ -373,7 +373,8 @@ figure img,figure video{width:100%;height:auto}figure.film{max-width:44rem}
 def page(run: RobotRun, sized: Mapping[str, Sizing], found: Mapping[str, Any], files: Sequence[str],
          section: str = "", when: str = "") -> str:
     """Return the page of a run, with a section of its own; pictures and video stand beside it, those of `files`."""
-    title, count = f"{found['robot']}: {_motion_name(run)}", len(run.mounts)
+    motion_name = Path(run.motion.source).name
+    title, count = f"{found['robot']}: {motion_name}", len(run.mounts)
     servos = sorted({f"{mount.model.servo.title or mount.model.servo.name} ({type(mount.model).__name__})"
                      for mount in run.mounts.values()})
     lead = (f"{len(run.mounts)} servo{'s' * (len(run.mounts) != 1)} ({'; '.join(servos)}) follow "
@@ -392,10 +393,6 @@ def page(run: RobotRun, sized: Mapping[str, Sizing], found: Mapping[str, Any], f
                       f"and the largest; voltage at the servo; temperatures.{_heat_words(run)}")
             + f"<section><h2>How to read this page</h2>{_READING}</section>\n")
     return document(title, body, style=STYLE)
-
-
-def _motion_name(run: RobotRun) -> str:
-    return Path(run.motion.source).name
 
 
 def _supply_words(run: RobotRun) -> str:

@@ -219,9 +219,12 @@ def _do(arm: Arm, asked: Asked) -> None:
     """Do a task, write its files and tell of it."""
     from servotwin.cli import robot_report as files
     from servotwin.cli import robot_task_report as written
+    from servotwin.robots.controllers import STEERINGS
 
     check_numbers(output_step=asked.output_step, rate=written.TASK_RATE, blend=None)
-    criterion, steering = _criterion(arm, asked.redundancy), _steering(asked.controller)
+    if asked.controller not in STEERINGS:
+        raise UnknownNameError("controller", asked.controller, STEERINGS)
+    criterion, steering = _criterion(arm, asked.redundancy), STEERINGS[asked.controller]()
     path = path_of(arm, asked.task, asked.size, asked.speed)
     models = _models(arm, asked)
     picture = check_drawing(arm.model(), None, video=asked.video)
@@ -264,14 +267,6 @@ def _criterion(arm: Arm, name: str) -> Criterion:
     if not isinstance(known[name], LeastMotion):
         check_redundant(arm, name)
     return known[name]
-
-
-def _steering(name: str) -> Steering:
-    from servotwin.robots.controllers import STEERINGS
-
-    if name not in STEERINGS:
-        raise UnknownNameError("controller", name, STEERINGS)
-    return STEERINGS[name]()
 
 
 def _models(arm: Arm, asked: Asked) -> dict[str, Model]:

@@ -335,7 +335,8 @@ def lines(found: Mapping[str, Any]) -> list[tuple[str, str]]:
         by = units.to_si(1.0, unit, dimension)
         return with_span(value / by, ranges.get(name), form, unit, scale=1.0 / by, note=note)
 
-    rows.append((_angle_label(found), shown("final_angle", found["final_angle"], ".2f", "deg", "angle")))
+    angle_label = "final motor angle" if found.get("angle") == "motor_angle" else "final angle"
+    rows.append((angle_label, shown("final_angle", found["final_angle"], ".2f", "deg", "angle")))
     if "mean_speed" in found:
         rows.append(("speed", f"{shown('mean_speed', found['mean_speed'], '.1f', 'rpm', 'speed')} in the mean of the "
                               "end"))
@@ -381,10 +382,6 @@ def names(dotted: Sequence[str]) -> str:
         groups.setdefault(group, []).append(key)
     words = ", ".join(f"{group} ({', '.join(keys)})" for group, keys in groups.items())
     return f"{len(dotted)}: {words}" if dotted else "none"
-
-
-def _angle_label(found: Mapping[str, Any]) -> str:
-    return "final motor angle" if found.get("angle") == "motor_angle" else "final angle"
 
 
 def _arrival_rows(found: Mapping[str, Any], shown: Callable[..., str]) -> list[tuple[str, str]]:

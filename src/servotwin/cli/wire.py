@@ -79,7 +79,8 @@ def wire(
     from servotwin.wire.arms import arm_bus, hand_of
     from servotwin.wire.bus import read_faults
 
-    _check(duration)
+    if duration is not None and not 0.0 < duration < 1e7:
+        raise InputError("--duration", got=duration, allowed="a positive number of seconds")
     wrong = read_faults(faults, seed) if faults else None
     bus, names = arm_bus(servos.asked(arm, wrong, seed), registers=_written)
     logs = bus.record(record) if record is not None else None
@@ -163,8 +164,3 @@ def _tcp(text: str | None) -> tuple[str, int] | None:
     if not port.isdecimal() or int(port) > _MOST_PORT:
         raise InputError("--tcp", got=text, allowed=f"a port from 0 to {_MOST_PORT}, or HOST:PORT")
     return host or "127.0.0.1", int(port)
-
-
-def _check(duration: float | None) -> None:
-    if duration is not None and not 0.0 < duration < 1e7:
-        raise InputError("--duration", got=duration, allowed="a positive number of seconds")

@@ -151,16 +151,14 @@ class PredictiveControl:
         angle = smoothed(state.angle, float(measured["output_angle"]), g, T)
         voltage = held(state.voltage, state.last, g, T)
         d = disturbance(self.inverse, angle, voltage, g)
-        now = np.array([angle.last, angle.rate + 2.0 / g * self._acceleration(angle.rate, voltage.value - d)])
+        servo = self.inverse
+        acceleration = float(((voltage.value - d) / servo.volts_per_torque - servo.damping * angle.rate)
+                             / servo.total_inertia)
+        now = np.array([angle.last, angle.rate + 2.0 / g * acceleration])
         A, B = self._model(self.lag)
         x = A @ now + B * (state.last - d)
         v = clipped(self._best(x, np.asarray(reference.angle), d, state.last), -limit, limit)
         return Decision(v, PredictiveState(angle, voltage, v))
-
-    def _acceleration(self, speed: float, voltage: float) -> float:
-        """Return q̈ of the model, by which a filtered speed is brought up to now [rad/s²]."""
-        servo = self.inverse
-        return float((voltage / servo.volts_per_torque - servo.damping * speed) / servo.total_inertia)
 
     def _best(self, x: Array, wanted: Array, d: float, last: float) -> float:
         """Return the first of the voltages, in parts of the limit V and with one slack for all speeds."""

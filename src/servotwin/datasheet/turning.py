@@ -166,7 +166,10 @@ def wheel_speed_of(model: Model, load: Load | Part | None = None, *, seed: int =
     frame = servo.frame_period
     neutral = servo.neutral_pulse
     pulses = neutral + np.concatenate([-_ERRORS[::-1], [0.0], _ERRORS])
-    pulses = pulses[(pulses > 1e-5) & (pulses < frame - 1e-5) & _accepted(servo, pulses)]
+    low, high = (servo.value_or(f"electronics.pulse_width_{end}", usual)
+                 for end, usual in (("min", 0.0), ("max", math.inf)))
+    accepted = np.asarray((pulses >= low) & (pulses <= high))
+    pulses = pulses[(pulses > 1e-5) & (pulses < frame - 1e-5) & accepted]
     found = np.array([_speed_at(servo, width, load, seed) for width in pulses.tolist()])
     return SpeedMap(pulses, np.maximum.accumulate(found), neutral)  # beyond full drive they differ by rounding
 
@@ -201,12 +204,6 @@ def _speed_at(model: SwitchedServo, width: float, load: Load | Part | None, seed
                  output_times=[_SETTLE, end], seed=seed)["output_angle"]
     speed = float(q[1] - q[0]) / (end - _SETTLE)
     return 0.0 if abs(speed) < _SLOW else speed
-
-
-def _accepted(model: SwitchedServo, pulses: Array) -> NDArray[np.bool_]:
-    low, high = (model.value_or(f"electronics.pulse_width_{end}", usual) for end, usual in (
-        ("min", 0.0), ("max", math.inf)))
-    return np.asarray((pulses >= low) & (pulses <= high))
 
 
 def endless(model: Model) -> SwitchedServo:

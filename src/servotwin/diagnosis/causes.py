@@ -155,7 +155,8 @@ def parameter(cause: str, name: str, cure: str, *, rises: bool, usual: Callable[
     def now(patient: Patient) -> float | None:
         if name.startswith("electronics.frame") and not patient.own_frames:
             return None
-        value = patient.model.value_or(name, math.nan) if name in _reads(patient.model) else math.nan
+        reads = (*patient.model.requires, *patient.model.optional)
+        value = patient.model.value_or(name, math.nan) if name in reads else math.nan
         return None if math.isnan(value) else float(value)
 
     def far(patient: Patient) -> float:
@@ -165,10 +166,6 @@ def parameter(cause: str, name: str, cure: str, *, rises: bool, usual: Callable[
         return with_values(patient, {name: value})
 
     return Number(cause, name, rises, now, usual, end or far, put, cure, unit, factor)
-
-
-def _reads(model: Model) -> tuple[str, ...]:
-    return (*model.requires, *model.optional)
 
 
 def zone_name(model: Model) -> str:
@@ -579,10 +576,6 @@ def ranked(trials: Trials) -> tuple[list[Cause], tuple[Cause, Cause] | None]:
 def _rank(cause: Cause) -> tuple[float, ...]:
     if not cause.cures:
         return (1.0, -cause.share, -cause.odd)
-    return (0.0, -cause.odd, _way(cause))
-
-
-def _way(cause: Cause) -> float:
-    """Return which part of the way to its end a cause needs."""
     whole = cause.end - cause.now
-    return 1.0 if math.isnan(cause.needed) or whole == 0.0 else (cause.needed - cause.now) / whole
+    way = 1.0 if math.isnan(cause.needed) or whole == 0.0 else (cause.needed - cause.now) / whole
+    return (0.0, -cause.odd, way)

@@ -142,7 +142,7 @@ class Balance:
                 return None, math.nan
             error = Harmonic(e_0, first / abs(first) * E)
             found = Turn(Harmonic(q_0, size), error, needed, rubbed.first, pulled.first, error.first + p * size, False)
-            return found, self._mean(E, e_0) - needed.mean
+            return found, float(self._voltage(e_0 + E * _SIN).mean()) - needed.mean
 
         found, excess = at(0.0)
         if found is None:
@@ -161,9 +161,6 @@ class Balance:
         follower = self.numbers.follower
         beyond = np.sign(error) * np.maximum(np.abs(error) - follower.half_deadband, 0.0)
         return np.asarray(np.clip(follower.gain * beyond, -follower.V_max, follower.V_max))
-
-    def _mean(self, size: float, mean: float) -> float:
-        return float(self._voltage(mean + size * _SIN).mean())
 
     def _error(self, voltage: float, mean: float) -> float:
         """Return the amplitude of the error [V] whose voltage has a first harmonic [V]; nan where none has."""

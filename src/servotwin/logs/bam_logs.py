@@ -628,10 +628,15 @@ def _log(path: Path, content: object, convention: BamConvention | None = None) -
         *(ReadColumn(key, name, "V" if name == "bus_voltage" else "rad/s" if name == "output_speed" else "rad",
                      "BAM's format") for key, (name, _) in _MEASURED.items() if name in measured)))
     with in_file(path, path.stem):
+        mass = number["mass"]
+        arm = number["arm_mass"]
+        length = number["length"]
+        inertia = None if arm == 0.0 else (mass + arm / 3.0) * length**2
+        pendulum = Pendulum(mass=mass + arm / 2.0, length=length, inertia=inertia, gravity=GRAVITY)
         return Log(
             name=path.stem, source=str(path), motion=text["trajectory"], time=time, command=command, reading=reading,
             command_kind="angle", measured=measured, torque_on=None if on.all() else on,
-            load=_pendulum(number["mass"], number["arm_mass"], number["length"]).as_load(),
+            load=pendulum.as_load(),
             parameters=_loop_of_log(path, text["motor"], number["kp"], number["vin"], convention),
             conditions={"gain": number["kp"], "voltage": number["vin"],
                         **({"motor": text["motor"]} if text["motor"] else {})})
@@ -704,11 +709,6 @@ def write_bam_log(log: Log, path: str | Path, *, overwrite: bool = False) -> Non
                "motor": str(log.conditions.get("motor", "")), "trajectory": log.motion,
                "entries": [dict(zip((*columns, "torque_enable"), row, strict=True)) for row in rows]}
     write_json(path, content, overwrite=overwrite)
-
-
-def _pendulum(mass: float, arm: float, length: float) -> Pendulum:
-    inertia = None if arm == 0.0 else (mass + arm / 3.0) * length**2
-    return Pendulum(mass=mass + arm / 2.0, length=length, inertia=inertia, gravity=GRAVITY)
 
 
 def _pendulum_words(what: str, log: Log) -> dict[str, float]:

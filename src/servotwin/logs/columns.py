@@ -589,18 +589,14 @@ def _name_of(column: str, where: object, says_more: Callable[[str], object]) -> 
         raise UnitError(f"{where}: unit of column {column}", got=column[len(name) + 1:],
                         allowed=f"{', '.join(_SUFFIXES[dimension_of_signal(name)]) or 'none'}; without one it is in "
                         f"{si_unit_of(name)}")
-    near = get_close_matches(_stem(column), NAMES, n=1, cutoff=0.85)
+    suffixes = sorted({s for known in _SUFFIXES.values() for s in known}, key=len, reverse=True)
+    stem = next((column[:-len(s) - 1] for s in suffixes if column.endswith(f"_{s}")), column)
+    near = get_close_matches(stem, NAMES, n=1, cutoff=0.85)
     if near and not says_more(column):
         raise InputError(f"{where}: column", got=column,
                          allowed=f'{near[0]}, if that is meant; --columns or "columns" of a sidecar says which column '
                          "is what")
     return None
-
-
-def _stem(column: str) -> str:
-    """Return a column's name without a unit behind it."""
-    suffixes = sorted({s for known in _SUFFIXES.values() for s in known}, key=len, reverse=True)
-    return next((column[:-len(s) - 1] for s in suffixes if column.endswith(f"_{s}")), column)
 
 
 def switch_value(text: str) -> float:

@@ -77,18 +77,14 @@ def _log(path: Path, k: int, run: object) -> Log:
     action, angle = (_fractions(f"{where}, {key}", run.get(key)) for key in ("actions", "sensor_data"))
     name = f"{index:03d} {motion}"
     with in_file(path, name):
+        command = np.clip(500.0 + (1.0 + np.append(np.zeros(BEFORE), action) * 4.0 / 3.0) * 1000.0, 500.0, 2500.0) / 1e6
         return Log(
             name=name, source=str(path), motion=motion,
             time=np.asarray(PERIOD * np.arange(-BEFORE, action.size), dtype=np.float64),
-            command=_pulse_width(np.append(np.zeros(BEFORE), action)), command_kind="pulse_width",
+            command=command, command_kind="pulse_width",
             measured={"output_angle": math.pi * np.append(np.full(BEFORE, math.nan), angle)}, load=arm(),
             parameters={"electronics.frame_period": FRAME_PERIOD},
             conditions={"amplitude_deg": round(180.0 * float(np.nanmax(np.abs(action), initial=0.0)), 6)})
-
-
-def _pulse_width(action: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return pulse widths [s] of actions (fractions of 180°); nan where no pulses were sent."""
-    return np.clip(500.0 + (1.0 + action * 4.0 / 3.0) * 1000.0, 500.0, 2500.0) / 1e6
 
 
 def _fractions(what: str, values: object) -> NDArray[np.float64]:

@@ -386,7 +386,8 @@ def parameter_table(study: PaperStudy) -> str:
         metadata = next(f.metadata for f in fields(GROUPS[group]) if f.name == field_name)
         value, spread = _shown(quantity, str(metadata["dimension"]))
         read = [key for key, model in MODELS.items() if name in (*model.requires, *model.optional)]
-        rows.append([_code(name), _symbol(str(metadata["symbol"])), value, spread,
+        broken = re.sub(r"([._])", r"\1<wbr>", escape(name))
+        rows.append([f"<code>{broken}</code>", _symbol(str(metadata["symbol"])), value, spread,
                      f'<span class="{quantity.origin}">{quantity.origin}</span>',
                      escape(quantity.source or "no source: a prior to be identified"),
                      ", ".join(read) or "–"])
@@ -413,12 +414,6 @@ def _shown(quantity: Quantity, dimension: str) -> tuple[str, str]:
         low, high = ("…" if bound is None else number(shown(bound)) for bound in (quantity.lower, quantity.upper))
         spread = f"{low} to {high}"
     return f"{number(shown(value))} {printed}".rstrip(), spread
-
-
-def _code(name: str) -> str:
-    """Return the name of a parameter, to be broken between its words only."""
-    broken = re.sub(r"([._])", r"\1<wbr>", escape(name))
-    return f"<code>{broken}</code>"
 
 
 def _symbol(symbol: str) -> str:

@@ -562,7 +562,9 @@ def joint_use(joints: Sequence[str], uses: Sequence[JointUse], *, page: int = 1)
         width = 0.8 / len(uses)
         for k, use in enumerate(uses):
             at = np.arange(len(joints)) + (k - 0.5 * (len(uses) - 1)) * width
-            _bars(left, np.asarray(at), width, use, LINES[k][0])
+            low, high = use.angles.min(axis=0), use.angles.max(axis=0)
+            left.bar(np.asarray(at), np.maximum(high - low, 0.01), 0.85 * width, bottom=low, color=LINES[k][0],
+                     alpha=0.85, label=use.label)
             right.bar(at, 1e3 * use.torque, 0.85 * width, color=LINES[k][0], alpha=0.85)
         for limit in (-1.0, 1.0):
             left.axhline(limit, color=COLOURS["grey"], linewidth=1.2, linestyle=(0, (4, 2)))
@@ -572,11 +574,6 @@ def joint_use(joints: Sequence[str], uses: Sequence[JointUse], *, page: int = 1)
         handles, labels = left.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=len(uses))
     return finished(figure, foot)
-
-
-def _bars(ax: Axes, at: Array, width: float, use: JointUse, colour: str) -> None:
-    low, high = use.angles.min(axis=0), use.angles.max(axis=0)
-    ax.bar(at, np.maximum(high - low, 0.01), 0.85 * width, bottom=low, color=colour, alpha=0.85, label=use.label)
 
 
 # --- Values of several things in several conditions: a line for each thing, a mark for each condition -----------------

@@ -308,17 +308,14 @@ class ServoDrive:
         """
         told = goals_in(self._block(data), len(self._joints))
         for name, goal in goals.items():
-            k = self._number(name)
+            if name not in self.joints:
+                raise UnknownNameError("joint with a servo", name, self.joints)
+            k = self.joints.index(name)
             self._told[k].check(name, goal, self._joints[k].mount.model.value_or("electronics.frame_period", 0.02))
             told[:, k] = goal, 1.0
             if self._joints[k].command_at >= 0:
                 scale, offset = self._arrays["control_scale"][k], self._arrays["control_offset"][k]
                 data.ctrl[self._joints[k].command_at] = (goal - offset) / scale
-
-    def _number(self, name: str) -> int:
-        if name not in self.joints:
-            raise UnknownNameError("joint with a servo", name, self.joints)
-        return self.joints.index(name)
 
     # --- what shows ---------------------------------------------------------------------------------------------------
 

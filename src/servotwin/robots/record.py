@@ -288,7 +288,10 @@ class Record(Mapping[str, ServoRecord]):
         self.cause = ""
         width, first = len(_COLUMNS), len(ROW)
         parts = [rows[:, first + width * k:first + width * (k + 1)] for k in range(len(joints))]
-        still = _still_since(self.time, [part[:, _COLUMNS.index("command_angle")] for part in parts])
+        changes = [np.flatnonzero(np.diff(command)) for command in [part[:, _COLUMNS.index("command_angle")]
+                                                                    for part in parts]]
+        last = max((int(one[-1]) + 1 for one in changes if one.size), default=0)
+        still = float(self.time[last]) if len(self.time) else 0.0
         self._servos = {name: ServoRecord(self.time, mounts[name], part, still)
                         for name, part in zip(joints, parts, strict=True)}
 
@@ -410,10 +413,3 @@ class Record(Mapping[str, ServoRecord]):
                 if name in SIGNALS:
                     signals[f"{joint}.{name}"], units[f"{joint}.{name}"] = servo[name][::every], SIGNALS[name].unit
         result.save_csv(path, signals, units, overwrite=overwrite)
-
-
-def _still_since(time: Array, commands: list[Array]) -> float:
-    """Return from when on none of several commands changes [s]."""
-    changes = [np.flatnonzero(np.diff(command)) for command in commands]
-    last = max((int(one[-1]) + 1 for one in changes if one.size), default=0)
-    return float(time[last]) if len(time) else 0.0

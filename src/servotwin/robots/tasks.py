@@ -481,11 +481,6 @@ class _Solver:
             f"{path.name} at {path.time[k]:.2f} s", allowed=f"places that {self._arm.name} reaches",
             got=f"a place {1e3 * distance:.3g} mm out of its reach, {1e3 * reach:.0f} mm from the middle of its foot")
 
-    def _off(self, path: ToolPath, k: int) -> Array:
-        """Return by how much the tool is off, of the coordinates that it can place [m]."""
-        tool = self._configuration.get_transform_frame_to_world(TOOL, "site").translation()
-        return np.asarray((path.places[k] - tool)[list(self._arm.places)])
-
     def _least_distance(self, path: ToolPath, k: int) -> float:
         """Return how near the tool gets to a place without limits, however it is turned [m]."""
         mink, configuration, found = self._mink, self._configuration, math.inf
@@ -495,7 +490,9 @@ class _Solver:
             task.set_target(mink.SE3.from_rotation_and_translation(turn, path.places[k]))
             step = mink.solve_ik(configuration, [task], 1.0, _SOLVER, damping=_STIFF, limits=[])
             configuration.integrate_inplace(step, 1.0)
-            found = min(found, float(np.linalg.norm(self._off(path, k))))
+            tool = self._configuration.get_transform_frame_to_world(TOOL, "site").translation()
+            off = np.asarray((path.places[k] - tool)[list(self._arm.places)])
+            found = min(found, float(np.linalg.norm(off)))
         return found
 
     def _go(self, path: ToolPath, k: int, most: int, limits: list[Any]) -> bool:

@@ -233,7 +233,10 @@ class _Compiled:
 
     def __init__(self, plans: Sequence[Plan], states: Sequence[State], source: Source) -> None:
         count = len(plans)
-        self._lanes, self._tables = _lanes_of(plans), _tables_of(plans)
+        torques = [plan.torque.rows for plan in plans]
+        curves = [np.array(plan.curve, np.float64).reshape(-1, 2) for plan in plans]
+        self._lanes = _lanes_of(plans)
+        self._tables = Tables(np.concatenate(torques), *_places(torques), np.concatenate(curves), *_places(curves))
         self._bus = Buses(np.arange(count), np.array([0, count]), _records_of(list(map(begun, plans, states))),
                           np.full(count, -1), shared_of([source]), np.zeros(count, np.int64), np.zeros(count))
         self._room = (*room_of(count), *units_of(count))
@@ -272,8 +275,8 @@ def _lanes_of(plans: Sequence[Plan]) -> Lanes:
     edge_first, edge_count = _places(edges)
     return Lanes(_tiles_of(Numbers, [plan.numbers for plan in plans]), _tiles_of(Chip, [plan.chip for plan in plans]),
                  np.zeros((7, len(plans))), np.array([plan.external_torque for plan in plans]),
-                 np.array([_in_64_bits(plan.seed) for plan in plans]), np.concatenate(pieces), first, count,
-                 np.concatenate(edges), edge_first, np.where(regular, -1, edge_count), plans[0].accuracy,
+                 np.array([((plan.seed + 2**63) % 2**64 - 2**63) for plan in plans]), np.concatenate(pieces), first,
+                 count, np.concatenate(edges), edge_first, np.where(regular, -1, edge_count), plans[0].accuracy,
                  _programs_of(plans))
 
 
@@ -283,17 +286,6 @@ def _programs_of(plans: Sequence[Plan]) -> NDArray[Any]:
         return programs_of(None, 1)
     columns: Any = (np.array(column) for column in zip(*(plan.firmware for plan in plans), strict=True))
     return programs_of(Firmware(*columns), len(plans))
-
-
-def _in_64_bits(seed: int) -> int:
-    """Return a seed that gives the same noise, which takes the lowest 64 bits alone."""
-    return (seed + 2**63) % 2**64 - 2**63
-
-
-def _tables_of(plans: Sequence[Plan]) -> Tables:
-    torques = [plan.torque.rows for plan in plans]
-    curves = [np.array(plan.curve, np.float64).reshape(-1, 2) for plan in plans]
-    return Tables(np.concatenate(torques), *_places(torques), np.concatenate(curves), *_places(curves))
 
 
 def _places(tables: Sequence[Array]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

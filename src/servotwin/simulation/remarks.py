@@ -188,11 +188,8 @@ def drive_words(rate: float, duty: float, current: float) -> str:
     ('drives 50 times a second, duty 2.1 %, 0.031 A in the mean', 'drives all the time, duty 25 %, 0.310 A in the mean')
     """
     often = f"{rate:.3g} times a second" if rate > 0.0 else "all the time"
-    return f"drives {often}, duty {_percent(duty)} %, {current:.3f} A in the mean"
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g}" if share < 0.995 else f"{100.0 * share:.0f}"  # not 1e+02
+    percent = f"{100.0 * duty:.2g}" if duty < 0.995 else f"{100.0 * duty:.0f}"
+    return f"drives {often}, duty {percent} %, {current:.3f} A in the mean"
 
 
 def held_back_words(voltage: float, low: float, limited: float, limit: float = math.inf) -> str:

@@ -78,9 +78,13 @@ class Simulator:
 
     def __init__(self, model: Model, load: Load | Part | None = None, seed: int = 0,
                  accuracy: float = ACCURACY) -> None:
-        self.model = _model(model)
+        if not isinstance(model, Model):
+            raise InputError("model", got=model, allowed="a model of a servo, such as BoundedServo(load_servo(...))")
+        self.model = model
         self.load = as_load(load)
-        self.seed = _seed(seed)
+        if isinstance(seed, bool) or not isinstance(seed, int | np.integer):
+            raise InputError("seed", got=seed, allowed="a whole number")
+        self.seed = int(seed)
         self.accuracy = accuracy_of(accuracy)
         self._numbers = model.pack(self.load)
         self._places = model.states
@@ -333,18 +337,6 @@ def _sample(plan: Plan, state: State, mode: Mode | None) -> Samples:
     fields: Any = (state.time, *point.y, point.wiper, *(mode or (0,) * 5)[:4], drive, chip.error, chip.silent, None,
                    *told_by(plan, state.memory))
     return Samples(*fields if mode is None else (None if x is None else np.array([x]) for x in fields))
-
-
-def _model(model: Model) -> Model:
-    if not isinstance(model, Model):
-        raise InputError("model", got=model, allowed="a model of a servo, such as BoundedServo(load_servo(...))")
-    return model
-
-
-def _seed(seed: int) -> int:
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer):
-        raise InputError("seed", got=seed, allowed="a whole number")
-    return int(seed)
 
 
 # --- `simulate`: a run of one servo from start to end -----------------------------------------------------------------

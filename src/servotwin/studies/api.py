@@ -70,17 +70,13 @@ def run_plan(plan: Plan, folder: Folder | None, executor: Any, show: Callable[[i
             part = _slice(plan, k)
             for name, column in found.items():
                 table[name][part] = column
-            table["status"][part] = _NAMES[_place_of(found["status"])]
+            places = {status.code: k for k, status in enumerate(Status)}
+            table["status"][part] = _NAMES[[places[code] for code in found["status"].tolist()]]
             if folder is not None:
                 folder.write(k, {name: table[name][part] for name in names})
             done += part.stop - part.start
             show(done)
     return {name: table[name] for name in names}
-
-
-def _place_of(codes: NDArray[np.int8]) -> NDArray[np.int64]:
-    places = {status.code: k for k, status in enumerate(Status)}
-    return np.array([places[code] for code in codes.tolist()])
 
 
 def _slice(plan: Plan, k: int) -> slice:

@@ -75,7 +75,8 @@ class Folder:
                 self._check_same(own)
                 return
             versions = {"python": platform.python_version(), **{name: metadata.version(name) for name in _LIBRARIES}}
-            self._write(STUDY, _json({"sha256": _fingerprint(own), "definition": own, "versions": versions}))
+            fingerprint = hashlib.sha256(json.dumps(own, sort_keys=True).encode()).hexdigest()
+            self._write(STUDY, _json({"sha256": fingerprint, "definition": own, "versions": versions}))
 
     def _remove_empty(self) -> None:
         with contextlib.suppress(OSError, ValueError):  # it has the study, or never was
@@ -158,10 +159,6 @@ class Folder:
 
 def _json(content: Mapping[str, Any]) -> bytes:
     return (json.dumps(content, indent=1, allow_nan=False) + "\n").encode()
-
-
-def _fingerprint(definition: Mapping[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(definition, sort_keys=True).encode()).hexdigest()
 
 
 def _short(content: Mapping[str, Any], name: str) -> str:

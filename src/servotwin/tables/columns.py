@@ -48,7 +48,8 @@ def encoded(columns: Mapping[str, Column], file_format: str) -> bytes:
 
         pyarrow.parquet.write_table(arrow.table({name: arrow.array(x) for name, x in columns.items()}), file)
         return file.getvalue()
-    return csv_text({name: _signless(column).tolist() for name, column in columns.items()}).encode()
+    return csv_text({name: (column + 0.0 if column.dtype.kind == "f" else column).tolist()
+                     for name, column in columns.items()}).encode()
 
 
 def csv_text(columns: Mapping[str, Iterable[object]], *, digits: int | None = None) -> str:
@@ -73,11 +74,6 @@ def csv_text(columns: Mapping[str, Iterable[object]], *, digits: int | None = No
     writer.writerows(rows if digits is None else (
         [f"{cell:.{digits}g}" if isinstance(cell, float) else cell for cell in row] for row in rows))
     return text.getvalue()
-
-
-def _signless(column: Column) -> Column:
-    """Return a column with 0 for -0."""
-    return column + 0.0 if column.dtype.kind == "f" else column
 
 
 def read_columns(path: str | Path) -> dict[str, Column]:

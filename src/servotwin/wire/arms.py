@@ -196,7 +196,11 @@ def _read(path: Path) -> _Arm:
             raise InputError(f"{path}: id of a servo", got=f"{id} twice", allowed="each ID once")
         servos[id] = one["servo"]
         joints[id] = checked_name(f"{path}: joint of servo {id}", str(one.get("joint", "")))
-        angles[id] = _degrees(path, one.get("angle_deg", 0.0))
+        value = one.get("angle_deg", 0.0)
+        import math
+        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= 36000.0:
+            raise InputError(f"{path}: angle_deg", got=value, allowed="a number of degrees")
+        angles[id] = math.radians(value)
         words = one.get("registers", [])
         if not isinstance(words, str | list):
             raise InputError(f"{path}: registers of servo {id}", got=words, allowed='such as ["P_Coefficient=16"]')
@@ -209,14 +213,6 @@ def _read(path: Path) -> _Arm:
         beside = path.parent / body
         body = str(beside) if beside.exists() else body
     return _Arm(joints=joints, servos=servos, registers=registers, angles=angles, supply=found.get("supply"), body=body)
-
-
-def _degrees(path: Path, value: Any) -> float:
-    import math
-
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= 36000.0:
-        raise InputError(f"{path}: angle_deg", got=value, allowed="a number of degrees")
-    return math.radians(value)
 
 
 def _known(what: str, found: Mapping[str, Any], names: tuple[str, ...]) -> None:

@@ -370,7 +370,9 @@ class Bus:
             replies = self._talk.replies(packet, listening, BITS / (self.rate or self._rate(listening)))
             if self.faults.all:
                 for reply in replies:
-                    self._answer(reply.after, reply.data)
+                    self.counts.answers += 1
+                    for late, part in self.faults.on_answer(reply.data):
+                        self._send(self.time + reply.after + late, part)
             else:
                 self.counts.answers += len(replies)
                 for reply in replies:
@@ -384,11 +386,6 @@ class Bus:
     @staticmethod
     def _rate(listening: Sequence[Any]) -> float:
         return float(next((one.baud for one in listening if one.baud), 1_000_000))
-
-    def _answer(self, after: float, data: bytes) -> None:
-        self.counts.answers += 1
-        for late, part in self.faults.on_answer(data):
-            self._send(self.time + after + late, part)
 
     def _send(self, time: float, data: bytes) -> None:
         self._number += 1

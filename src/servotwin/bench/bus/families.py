@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from servotwin import plugins
 from servotwin.errors import BenchError
-from servotwin.parameters.registers.dynamixel_one import AX_MODELS, AX_REGISTERS, MX_MODELS, MX_REGISTERS, OneModel
+from servotwin.parameters.registers.dynamixel_one import AX_MODELS, AX_REGISTERS, MX_MODELS, MX_REGISTERS
 from servotwin.parameters.registers.dynamixel_x import FULL, SPEED, X_MODELS, XModel
 from servotwin.parameters.registers.dynamixel_x import REGISTERS as X_REGISTERS
 from servotwin.parameters.registers.feetech import REGISTERS as STS_REGISTERS
@@ -217,14 +217,6 @@ def _of_x(model: XModel) -> BusFamily:
     return _x(X, Channel("armature_current_A", "Present_Current", model.current_unit))
 
 
-def _of_mx(model: OneModel) -> BusFamily:
-    return _one("dynamixel-mx", MX, _TURN, 2048, model.speed_unit)
-
-
-def _of_ax(model: OneModel) -> BusFamily:
-    return _one("dynamixel-ax", AX, 300.0 / 1023.0, 512, model.speed_unit)
-
-
 class BusModel(NamedTuple):
     """A model of bus servo.
 
@@ -244,8 +236,8 @@ class BusModel(NamedTuple):
 def _known() -> Iterator[tuple[RegisterModel, BusFamily]]:
     yield from ((model, _STS) for model in STS_MODELS)
     yield from ((model, _of_x(model)) for model in X_MODELS)
-    yield from ((model, _of_mx(model)) for model in MX_MODELS)
-    yield from ((model, _of_ax(model)) for model in AX_MODELS)
+    yield from ((model, _one("dynamixel-mx", MX, _TURN, 2048, model.speed_unit)) for model in MX_MODELS)
+    yield from ((model, _one("dynamixel-ax", AX, 300.0 / 1023.0, 512, model.speed_unit)) for model in AX_MODELS)
 
 
 def _models() -> dict[tuple[str, int], BusModel]:

@@ -95,7 +95,10 @@ def scan(port: str, *, bauds: Sequence[int] = BAUDS, ids: Iterable[int] = IDS, t
         backend = connect(port, baud)
         backend.open()
         try:
-            found += [*_twos(backend, baud), *_others(backend, baud, asked, patience)]
+            wire = dynamixel_wire(backend, baud=baud)
+            twos = [FoundServo(one, "dynamixel-2", number, known_models().get(("dynamixel-2", number)), baud)
+                    for one, number in wire.ping(range(253)).items()]
+            found += [*twos, *_others(backend, baud, asked, patience)]
         finally:
             backend.close()
         if found and not thorough:
@@ -116,12 +119,6 @@ def identified(wire: BusWire, protocol: str, servo: int) -> BusModel:
     if model is None:
         raise BenchError(f"servo {servo} at {wire.name}", f"its model number {number} is none that can be recorded")
     return model
-
-
-def _twos(backend: Backend, baud: int) -> list[FoundServo]:
-    wire = dynamixel_wire(backend, baud=baud)
-    return [FoundServo(one, "dynamixel-2", number, known_models().get(("dynamixel-2", number)), baud)
-            for one, number in wire.ping(range(253)).items()]
 
 
 def _others(backend: Backend, baud: int, ids: Sequence[int], patience: float) -> list[FoundServo]:

@@ -285,7 +285,10 @@ def chain_rows(command_voltages: Sequence[float], model: Model | None = None) ->
 
 
 def _row(model: Model, voltage: float) -> ChainRow:
-    target = float(model.start_angle(model.command(constant(_pulse_of(voltage), unit="s")).table[0].value))
+    from servotwin.bench.generator import PulseGenerator
+
+    pulse = PulseGenerator().width(INPUT_CONVERTER.count(voltage))
+    target = float(model.start_angle(model.command(constant(pulse, unit="s")).table[0].value))
     (below, shown_below, pulses), (above, shown_above, _) = (
         _settled(model, voltage, target + side * _APPROACH) for side in (-1.0, 1.0))
     middle = 0.5 * (below.output_angle + above.output_angle)
@@ -296,12 +299,6 @@ def _row(model: Model, voltage: float) -> ChainRow:
         pulse_width=below.pulse_width)
     return ChainRow(reading=mean, from_below=below, from_above=above, displays=(shown_below, shown_above),
                     pulses=pulses)
-
-
-def _pulse_of(voltage: float) -> float:
-    from servotwin.bench.generator import PulseGenerator
-
-    return PulseGenerator().width(INPUT_CONVERTER.count(voltage))
 
 
 def _settled(model: Model, voltage: float,

@@ -315,7 +315,8 @@ class Microcontroller:
                     at += b
                     text = data[at + _HEAD.size - b:at + _HEAD.size]
                     if kind == 65:
-                        self._convert(text, a)
+                        counts = [self._pins.convert(cycle, channel, a) for cycle, channel in _HELD.iter_unpack(text)]
+                        self._order(_COUNTS.pack(b"v", len(counts)) + pack(f"<{len(counts)}H", *counts))
                     elif kind == 84:
                         self._heard += text
                     else:
@@ -326,10 +327,6 @@ class Microcontroller:
                 ends = ends or kind == last
                 self.cycle = cycle if kind == 104 else self.cycle
             data = data[at:]
-
-    def _convert(self, asked: bytes, reference: int) -> None:
-        counts = [self._pins.convert(cycle, channel, reference) for cycle, channel in _HELD.iter_unpack(asked)]
-        self._order(_COUNTS.pack(b"v", len(counts)) + pack(f"<{len(counts)}H", *counts))
 
     def _seldom(self, cycle: int, kind: int, a: int) -> None:
         if kind == 76:  # L

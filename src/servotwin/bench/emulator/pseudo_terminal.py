@@ -105,7 +105,10 @@ class Terminal:
         if written:
             self.backend.send(written)
         self._waiting = (self._waiting + self.backend.read(_STEP))[-_FULL:]
-        if not self._opened():
+        poll = select.poll()
+        poll.register(self._master, select.POLLHUP)
+        opened = not any(event & select.POLLHUP for _, event in poll.poll(0))
+        if not opened:
             self._waiting = b""  # nobody listens: a program that comes later hears what comes then
             return
         try:
@@ -121,9 +124,3 @@ class Terminal:
             if error.errno in (errno.EAGAIN, errno.EIO):
                 return b""
             raise BenchError(self.port, error.strerror or str(error)) from None
-
-    def _opened(self) -> bool:
-        """Say whether a program has opened the port."""
-        poll = select.poll()
-        poll.register(self._master, select.POLLHUP)
-        return not any(event & select.POLLHUP for _, event in poll.poll(0))

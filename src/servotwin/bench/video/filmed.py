@@ -428,7 +428,10 @@ def fit_plane(corners: NDArray[np.float64]) -> Plane:
         shared, angle, damping = shared + step, angle + turn, 0.1 * damping
         error, by_shared, by_angle = tried
         small = cost - new < _PLANE_SMALL * cost
-        weight = _weights(error)
+        size = np.sqrt(np.mean(error**2, axis=1))
+        usual = float(np.median(size))
+        weight = np.asarray(np.minimum(1.0, _HUBER * usual / np.maximum(size, 1e-300))) if usual > 0.0 else np.ones(
+            len(size))
         cost = _cost(error, weight)
         if small:
             break
@@ -524,12 +527,6 @@ def _step(error: NDArray[np.float64], by_shared: NDArray[np.float64], by_angle: 
 
 def _cost(error: NDArray[np.float64], weight: NDArray[np.float64]) -> float:
     return float(np.sum(weight[:, None] * error**2))
-
-
-def _weights(error: NDArray[np.float64]) -> NDArray[np.float64]:
-    size = np.sqrt(np.mean(error**2, axis=1))
-    usual = float(np.median(size))
-    return np.asarray(np.minimum(1.0, _HUBER * usual / np.maximum(size, 1e-300))) if usual > 0.0 else np.ones(len(size))
 
 
 def _plane(shared: NDArray[np.float64], angle: NDArray[np.float64], error: NDArray[np.float64],

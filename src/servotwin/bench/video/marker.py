@@ -108,7 +108,9 @@ class Lights:
         """
         seen = np.array(self._seen)
         stay = max(2, min(round(_STAY / float(np.median(np.diff(time)))), (len(time) - 2) // 2))
-        steps = _steps(seen, stay)
+        sums = np.concatenate([np.zeros((1, *seen.shape[1:]), np.float32), np.cumsum(seen, axis=0, dtype=np.float32)])
+        mean = (sums[stay:] - sums[:-stay]) / stay  # of pictures k to k + stay - 1
+        steps = np.asarray(mean[stay + 1:] - mean[:-stay - 1])
         if self._region is None:
             rows, columns = np.indices(seen.shape[1:]) + 0.5
             near = np.hypot(columns * self.block - axis[0], rows * self.block - axis[1]) < reach
@@ -125,14 +127,6 @@ class Lights:
                 raise InputError("LED: more than one thing in the picture becomes brighter",
                                  allowed="--led x,y,w,h around it, or --instant jump")
         return _switched(time, seen[:, row, column].astype(float), k + stay, stay)
-
-
-def _steps(seen: NDArray[np.uint8], stay: int) -> NDArray[np.float32]:
-    """Return by how much blocks are brighter after a picture than before it, shape (n - 2 stay, rows, columns)."""
-    sums = np.concatenate([np.zeros((1, *seen.shape[1:]), np.float32), np.cumsum(seen, axis=0, dtype=np.float32)])
-    mean = (sums[stay:] - sums[:-stay]) / stay  # of pictures k to k + stay - 1
-    # picture k + stay itself is in neither: the light may go on while it is taken
-    return np.asarray(mean[stay + 1:] - mean[:-stay - 1])
 
 
 def _switched(time: NDArray[np.float64], level: NDArray[np.float64], k: int, stay: int) -> Instant:

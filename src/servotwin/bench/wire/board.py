@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from servotwin.bench.backends.board_backend import Backend
-from servotwin.bench.wire.frames import Clock, Frame, Kind, Splitter, protocol, to_wire
+from servotwin.bench.wire.frames import Clock, Frame, Splitter, protocol, to_wire
 from servotwin.errors import BenchError, InputError
 
 NAME = "servotwn"  # of the firmware, as it says it
@@ -171,7 +171,9 @@ class Board:
     def _asked(self, name: str, values: Mapping[str, Any]) -> Message | None:
         """Send a message and return the answer to it, None where there is none in time."""
         kind = protocol().kinds[name]
-        sequence = self._send(kind, values)
+        self._sequence = (self._sequence + 1) % 256
+        self.backend.send(to_wire(Frame(kind.number, self._sequence, 0, kind.pack(values))))
+        sequence = self._sequence
         waited = 0.0
         while waited < _ANSWER:
             found = None
@@ -184,11 +186,6 @@ class Board:
                 return found
             waited += _ANSWER / 5
         return None
-
-    def _send(self, kind: Kind, values: Mapping[str, Any]) -> int:
-        self._sequence = (self._sequence + 1) % 256
-        self.backend.send(to_wire(Frame(kind.number, self._sequence, 0, kind.pack(values))))
-        return self._sequence
 
     def _read(self, timeout: float) -> list[Message]:
         found = []

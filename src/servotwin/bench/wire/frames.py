@@ -333,8 +333,12 @@ class Splitter:
                 if frame is None:
                     self.bad += 1
                 else:
-                    found.append(self._counted(frame))
-        if len(self._rest) > _longest():
+                    if self._last is not None:
+                        self.lost += (frame.sequence - self._last - 1) % 256
+                    self._last = frame.sequence
+                    found.append(frame)
+        whole = _HEAD.size + int(protocol().numbers["longest_payload"]) + _CRC.size
+        if len(self._rest) > (whole + whole // _BLOCK + 1):
             self.bad += not self._overlong
             self._rest, self._overlong = b"", True
         return found
@@ -342,18 +346,6 @@ class Splitter:
     def again(self) -> None:
         """Forget the sender's last number: it begins anew, after a reset say."""
         self._last = None
-
-    def _counted(self, frame: Frame) -> Frame:
-        if self._last is not None:
-            self.lost += (frame.sequence - self._last - 1) % 256
-        self._last = frame.sequence
-        return frame
-
-
-def _longest() -> int:
-    """Return the most bytes of a stuffed frame."""
-    whole = _HEAD.size + int(protocol().numbers["longest_payload"]) + _CRC.size
-    return whole + whole // _BLOCK + 1
 
 
 class Clock:

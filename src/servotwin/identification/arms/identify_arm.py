@@ -74,6 +74,8 @@ _MASS, _REACH, _SPREAD = 0.2, 0.1, 1e-3  # kg, m, kg m²: of the pendulum that s
 
 def plant_of(robot: Any, joints: Sequence[str]) -> tuple[Any, tuple[str, ...]]:
     """Return the MjModel of a robot, and what was assumed; "unknown" gives every joint a pendulum of its own."""
+    from servotwin.robots.places import load_mujoco
+
     if robot != UNKNOWN:
         return robot_model(robot), ()
     root = Xml.Element("mujoco", model=UNKNOWN)
@@ -86,15 +88,10 @@ def plant_of(robot: Any, joints: Sequence[str]) -> tuple[Any, tuple[str, ...]]:
         Xml.SubElement(body, "inertial", pos=f"{_REACH} 0 0", mass=str(_MASS), diaginertia="1e-6 1e-6 1e-6")
         wheel = Xml.SubElement(body, "body", name=f"{joint}_inertia")
         Xml.SubElement(wheel, "inertial", pos="0 0 0", mass="1e-3", diaginertia=f"{_SPREAD} {_SPREAD} {_SPREAD}")
-    return robot_model(_spec(Xml.tostring(root, encoding="unicode"))), (
+    spec = load_mujoco().MjSpec.from_string(Xml.tostring(root, encoding="unicode"))
+    return robot_model(spec), (
         "no robot file: each joint is a bare servo with an unknown arm, a weight that hangs at an unknown angle and an "
         "inertia; what joints do to each other is not in it",)
-
-
-def _spec(xml: str) -> Any:
-    from servotwin.robots.places import load_mujoco
-
-    return load_mujoco().MjSpec.from_string(xml)
 
 
 def mounts_of(servos: Any, robot: Any, plant: Any, motions: Sequence[Motion]) -> tuple[dict[str, Mount],

@@ -665,7 +665,9 @@ def strange_windows(episodes: Sequence[Episode], residuals: Sequence[Array], use
             mean = np.abs(np.convolve(np.where(mask[:, j], residual[:, j], 0.0), kernel, mode="same"))
             usual = float(np.median(mean[mask[:, j]])) if mask[:, j].any() else 0.0
             strange = mean > max(_FAR * float(noise.positions[j]), _WINDOWS_LEAST, _USUAL * usual)
-            for a, b in _stretches(strange):
+            ends = np.flatnonzero(np.diff(np.concatenate(([False], strange, [False]))))
+            stretches = list(zip(ends[::2].tolist(), (ends[1::2] - 1).tolist(), strict=True))
+            for a, b in stretches:
                 start, stop = episode.time[a] - _BESIDE, episode.time[b] + _BESIDE
                 found.append(LeftOut(number, episode.name, max(float(start), 0.0), float(stop), joint))
                 size += float(stop - start)
@@ -681,9 +683,3 @@ def without(used: Sequence[Mask], episodes: Sequence[Episode], windows: Sequence
         time = episodes[window.number].time
         found[window.number][(time >= window.start) & (time <= window.stop), :joints.index(window.joint) + 1] = False
     return found
-
-
-def _stretches(mask: Mask) -> list[tuple[int, int]]:
-    """Return first and last index of each stretch."""
-    ends = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False]))))
-    return list(zip(ends[::2].tolist(), (ends[1::2] - 1).tolist(), strict=True))

@@ -79,17 +79,13 @@ def usual_free(model: Model, logs: Sequence[Log] = ()) -> tuple[str, ...]:
         if not model.takes_goals:
             return (*_PLANT, _LOOP_GAIN, "firmware.derivative_gain", "firmware.deadband_angle",
                     "potentiometer.feedback_gain")
-        known = _knows_gain(model.servo) or any(_LOOP_GAIN in with_loop_gain(log, model).parameters for log in logs)
+        said = model.servo.source(_LOOP_GAIN) if model.servo.get(_LOOP_GAIN) is not None else None
+        knows_gain = said is not None and said.origin in ("literature", "datasheet", "measured")
+        known = knows_gain or any(_LOOP_GAIN in with_loop_gain(log, model).parameters for log in logs)
         return (*_PLANT, "motor.motor_viscous_friction", *(() if known else (_LOOP_GAIN,)))
     gain, deadband = (("electronics.bridge_gain", "electronics.voltage_deadband") if isinstance(model, BoundedServo)
                       else ("electronics.stretcher_gain", "electronics.deadband"))
     return (*_PLANT, gain, deadband, "potentiometer.feedback_gain")
-
-
-def _knows_gain(servo: Servo) -> bool:
-    """Tell whether a servo's registers say the gain of its loop."""
-    said = servo.source(_LOOP_GAIN) if servo.get(_LOOP_GAIN) is not None else None
-    return said is not None and said.origin in ("literature", "datasheet", "measured")
 
 
 def checked_sensors(logs: Sequence[Log], sensors: Sequence[str] | None, model: Model) -> tuple[str, ...]:

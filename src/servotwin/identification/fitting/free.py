@@ -220,7 +220,8 @@ def _check_names(model: Model, free: Sequence[str]) -> None:
     seen: dict[str, str] = {}
     for name in free:
         if name not in LUMPED and name not in LOAD_NAMES and name not in read:
-            if name in _names_of_servo():
+            names = {f"{group}.{key}" for group, kind in GROUPS.items() for key in kind.__dataclass_fields__}
+            if name in names:
                 raise ParameterError(f"free: {type(model).__name__} does not read {name!r}",
                                      allowed=", ".join((*LUMPED, *read, *LOAD_NAMES)))
             raise UnknownNameError("free parameter", name, (*LUMPED, *read, *LOAD_NAMES))
@@ -237,10 +238,6 @@ def _check_names(model: Model, free: Sequence[str]) -> None:
             if name in JUMPS:
                 raise ParameterError(f"free: {name}", got="a number that acts by jumps",
                                      allowed="one that acts smoothly; compare fits to choose such a number")
-
-
-def _names_of_servo() -> set[str]:
-    return {f"{group}.{key}" for group, kind in GROUPS.items() for key in kind.__dataclass_fields__}
 
 
 def unit_of_free(name: str) -> str:

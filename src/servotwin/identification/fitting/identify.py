@@ -640,7 +640,8 @@ def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: fl
     dropped, wide = yielded(task, found, left, doubts), widened(task, found, left)
     with task.nearly(found.point):
         point = with_pulses_of(forecast, task.loss, found.point, held_out, task.fitted)
-    traces = _traces(forecast, point, held_out)
+    traces = tuple(trace_of(forecast, point, k, part, held_out=k in held_out)
+                   for k, part in enumerate(forecast.at(point, derivatives=False)))
     final = identified_servo(forecast.model.servo, forecast.space, found.point.shared, doubts, level,
                              [one.name for one in dropped])
     final = with_what_logs_say(final, [forecast.cases[k].log for k in task.fitted], forecast.space.names)
@@ -762,12 +763,6 @@ def _said_of(task: Task, point: Point, numbers: Sequence[Assumption]) -> str:
     return "the logs want " + " and ".join(
         f"{one.name} of {values[one.name]:.3g}{one.unit_shown} where the servo file assumes {one.assumed:z.3g} "
         f"({one.wanted:.2g} standard errors)" for one in numbers) + ": searched too"
-
-
-def _traces(forecast: Forecast, point: Point, held_out: Sequence[int]) -> tuple[Trace, ...]:
-    """Return every log beside the simulation; a log that was held out starts as it was measured."""
-    return tuple(trace_of(forecast, point, k, part, held_out=k in held_out)
-                 for k, part in enumerate(forecast.at(point, derivatives=False)))
 
 
 def _explained(task: Task, dropped: Sequence[Yielded]) -> tuple[str, ...]:

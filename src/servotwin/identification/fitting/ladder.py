@@ -152,14 +152,11 @@ def with_criterion(rungs: Sequence[Rung]) -> list[Rung]:
     """
     least = min(rungs, key=lambda rung: rung.training)
     fitted = [trace for trace in least.fit.traces if not trace.held_out]
-    samples = sum(len(trace.time) for trace in fitted) / _memory([trace.residual for trace in fitted])
+    memory = widening([LogPart(residual, residual, residual) for residual in [trace.residual for trace in fitted]],
+                      Loss())
+    samples = sum(len(trace.time) for trace in fitted) / memory
     return [replace(rung, criterion=samples * math.log(max(rung.training, 1e-300) ** 2)
                     + len(rung.fit.names) * math.log(max(samples, 1.0))) for rung in rungs]
-
-
-def _memory(residuals: Sequence[NDArray[np.float64]]) -> float:
-    """Return how many residuals stand for one that is independent, if each follows the one before it."""
-    return widening([LogPart(residual, residual, residual) for residual in residuals], Loss())
 
 
 class _Told(NamedTuple):

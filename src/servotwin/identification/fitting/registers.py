@@ -401,8 +401,10 @@ class _LogBench(Bench):
                 said = {GAIN: log.parameters[GAIN]} if GAIN in log.parameters and not one.own_gain else {}
                 copies.append(replace(log, name=f"{log.name} {k}", parameters={**log.parameters, **own, **said}))
         model = self.kind(base)
-        forecast = Forecast(copies, model, Space(model, [_any_of(model, copies)]), ("initial_state", "log_delay"),
-                            ("output_angle",))
+        taken = {name for log in copies for name in log.parameters}
+        unused = next(name for name in ("motor.armature_resistance", "motor.rotor_inertia", "motor.torque_constant",
+                                        "gear.gear_reduction") if name not in taken)
+        forecast = Forecast(copies, model, Space(model, [unused]), ("initial_state", "log_delay"), ("output_angle",))
         forecast.strict, forecast.nearly = False, forecast.bent
         n = len(self.logs)
         where = [forecast.names_of_own(case).index("log_delay") for case in forecast.cases]
@@ -456,12 +458,6 @@ def _form(servo: Servo) -> tuple[str, ...]:
     """Return what lanes of one call share: which numbers of the program there are, and its words."""
     return tuple(name if isinstance(servo.get(name), int | float) else f"{name}={servo.get(name)}"
                  for name in servo.names() if name.startswith("firmware."))
-
-
-def _any_of(model: Model, logs: Sequence[Log]) -> str:
-    taken = {name for log in logs for name in log.parameters}
-    return next(name for name in ("motor.armature_resistance", "motor.rotor_inertia", "motor.torque_constant",
-                                  "gear.gear_reduction") if name not in taken)
 
 
 def _words(changed: Mapping[str, int | None], varied: Iterable[Varied]) -> str:

@@ -65,7 +65,9 @@ class TimeLeft:
         for k in range(stage + 1):
             self._begun[k] = min(self._begun[k], now)
         inner = (share - STAGES[stage]) / (STAGES[stage + 1] - STAGES[stage])
-        left = self._ahead(stage, inner, now)
+        left = self._of_stage(stage, inner, now)
+        for later in range(stage + 1, TRIALS + 1):
+            left += self._usual(later, now + left)
         if now < _FROM:  # little was measured yet
             return 2.0 * left
         said = min(left, _RISES * self._least)
@@ -73,13 +75,6 @@ class TimeLeft:
             now - self._begun[stage] > self._usual(stage, self._begun[stage]))
         self._least = min(self._least, said)
         return said
-
-    def _ahead(self, stage: int, inner: float, now: float) -> float:
-        """Return what all stages from this one on are about to take [s]."""
-        left = self._of_stage(stage, inner, now)
-        for later in range(stage + 1, TRIALS + 1):
-            left += self._usual(later, now + left)
-        return left
 
     def _of_stage(self, stage: int, inner: float, now: float) -> float:
         spent = now - self._begun[stage]

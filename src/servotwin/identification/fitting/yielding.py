@@ -270,7 +270,8 @@ def _remedies(forecast: Forecast, point: Point, item: Unidentifiable, names: Seq
              if sensor not in forecast.sensors and sensor in forecast.model.available
              and _tells(forecast, [_measuring(log, sensor) for log in logs], sensor, here, direction)]
     sensor = forecast.sensors[0]
-    inertia = _output_inertia(forecast)
+    reduction = forecast.model.value("gear.gear_reduction")
+    inertia = float(reduction**2) * forecast.model.value("motor.rotor_inertia")
     loads: dict[str, Inertia | Pendulum] = {"a known inertia at the horn": Inertia(inertia),
              "a known weight on an arm": Pendulum(mass=inertia / 0.1**2, length=0.1)}
     for text, load in loads.items():
@@ -278,11 +279,6 @@ def _remedies(forecast: Forecast, point: Point, item: Unidentifiable, names: Seq
                                 direction):
             found.append(text)
     return tuple(found[:2]) or ((f"a known {item.parameters[0]}",) if len(item.parameters) > 1 else ())
-
-
-def _output_inertia(forecast: Forecast) -> float:
-    reduction = forecast.model.value("gear.gear_reduction")
-    return float(reduction**2) * forecast.model.value("motor.rotor_inertia")
 
 
 def _measuring(log: Log, sensor: str) -> Log:
@@ -466,7 +462,9 @@ def settle(task: Task, found: Outcome, tell: Told) -> tuple[Outcome, tuple[Dropp
             if len(going := [trial for trial in trials if math.isinf(trial.dropped.wide)]) > 1:
                 gone, point = _contradicted(task, going)
         for one in gone:
-            task.prior = _widened(task.prior, one)
+            weight = task.prior.weight.copy()
+            weight[one.which] = 1.0 / one.wide  # 0 of one that is dropped
+            task.prior = Prior(task.prior.mean, weight)
         found = task.again(point, _part_of(tell, k, count))
         left += gone
     return found, tuple(left)
@@ -555,12 +553,6 @@ def _part_of(tell: Told, k: int, count: int) -> Told:
 def _without(prior: Prior, which: Sequence[int]) -> Prior:
     weight = prior.weight.copy()
     weight[list(which)] = 0.0
-    return Prior(prior.mean, weight)
-
-
-def _widened(prior: Prior, one: Dropped) -> Prior:
-    weight = prior.weight.copy()
-    weight[one.which] = 1.0 / one.wide  # 0 of one that is dropped
     return Prior(prior.mean, weight)
 
 

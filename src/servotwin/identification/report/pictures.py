@@ -448,7 +448,7 @@ _WORDS = {"output_angle": "angle", "feedback_voltage": "feedback"}
 
 def by_error(traces: Sequence[Trace]) -> list[Trace]:
     """Return traces, those furthest off first."""
-    return sorted(traces, key=lambda trace: -_rms(trace.residual))
+    return sorted(traces, key=lambda trace: -float(np.sqrt(np.mean(trace.residual**2))))
 
 
 def shown_first(traces: Sequence[Trace]) -> list[Trace]:
@@ -537,7 +537,8 @@ def residuals(traces: Sequence[Trace], noise: Mapping[str, float], command: Cros
             if members:
                 _over_time(over_time, members, noise, words, colour, dash)
                 _spread(spread, members, noise, words, colour, dash)
-                _follows(follows, members, words, colour, dash)
+                found = autocorrelation([t.residual for t in members])
+                follows.plot(np.arange(len(found)), found, color=colour, linestyle=dash, label=words)
         over_time.axhline(0.0, color=COLOURS["grey"], linewidth=0.8)
         over_time.set(xlabel="time since the start of a log (s)", ylabel="residual (σ)")
         x = np.linspace(-5.0, 5.0, 201)
@@ -573,12 +574,6 @@ def _spread(ax: Axes, traces: Sequence[Trace], noise: Mapping[str, float], words
     counts, edges = np.histogram(value, bins=np.linspace(-5.0, 5.0, 61))
     density = counts / (len(value) * np.diff(edges))
     ax.stairs(density, edges, color=colour, linestyle=dash, linewidth=1.4, label=label)
-
-
-def _follows(ax: Axes, traces: Sequence[Trace], words: str, colour: str, dash: Any) -> None:
-    """Draw the mean autocorrelation of the logs, up to a third of the longest."""
-    found = autocorrelation([t.residual for t in traces])
-    ax.plot(np.arange(len(found)), found, color=colour, linestyle=dash, label=words)
 
 
 def _command(ax: Axes, found: CrossCorrelation) -> None:
@@ -618,7 +613,3 @@ def _broken(time: Array, *values: Array) -> tuple[Array, ...]:
     steps = np.diff(time)
     gaps = np.flatnonzero(steps > _GAP * float(np.median(steps))) + 1
     return tuple(np.insert(x, gaps, math.nan) for x in (time, *values))
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -588,7 +588,11 @@ def _sheet(path: Path, title: str, rows: list[tuple[int, Mapping[str, str]]]) ->
                              if row["type"].startswith("analog") else "")
         for column, (ends, by, allowed) in _RANGES.items():
             if row.get(column):
-                for name, value in zip(ends, _two(f"{where}, {column}", row[column], allowed), strict=True):
+                text = row[column]
+                found = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*-\s*(\d+(?:\.\d+)?)\s*", text)
+                if found is None:
+                    raise InputError(f"{where}, {column}", got=text, allowed=allowed)
+                for name, value in zip(ends, (float(found[1]), float(found[2])), strict=True):
                     whole.setdefault(name, value * by)
         if row["V"]:
             points.append(_point(where, row, source))
@@ -618,13 +622,6 @@ def _number(where: str, column: str, text: str) -> float:
     if not math.isfinite(value):
         raise InputError(f"{where}, {column}", got=text, allowed="a number")
     return value
-
-
-def _two(what: str, text: str, allowed: str) -> tuple[float, float]:
-    found = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*-\s*(\d+(?:\.\d+)?)\s*", text)
-    if found is None:
-        raise InputError(what, got=text, allowed=allowed)
-    return float(found[1]), float(found[2])
 
 
 def _rows(path: Path) -> list[tuple[int, Mapping[str, str]]]:

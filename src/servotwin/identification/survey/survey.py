@@ -349,14 +349,10 @@ def motion_of(log: Log) -> Motion:
     x = command[np.maximum(np.searchsorted(time, time - (lag if math.isfinite(lag) else 0.0), side="right") - 1, 0)]
     at = _rests(time, changes) if steps else np.ones(len(time), np.bool_)
     gain, zero, correlation = _line(x[at], angle[at])
-    onset = _onset(time - log.start, angle, noise)
-    return Motion(gain, zero, correlation, lag, steps, speed, onset, still=log.is_constant)
-
-
-def _onset(time: Array, angle: Array, noise: float) -> float:
     way = np.abs(angle - np.median(angle[:3]))
     away = way > max(_SEEN * float(way.max()), _SIGMAS * noise)
-    return float(time[int(np.argmax(away))]) if away.any() else math.nan
+    onset = float((time - log.start)[int(np.argmax(away))]) if away.any() else math.nan
+    return Motion(gain, zero, correlation, lag, steps, speed, onset, still=log.is_constant)
 
 
 def _rests(time: Array, changes: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -93,7 +93,9 @@ def bounds_of(model: Model) -> dict[str, list[dict[str, Any]]]:
     goals = isinstance(model, DigitalServo) and model.takes_goals
     found: dict[str, list[dict[str, Any]]] = {}
     if not goals and ("pulse_width" in model.available):
-        found["us"] = [*_positive(), *_pulses(model, accepted=not isinstance(model, SwitchedServo))]
+        positive = [{"of": "command", "low": 0.0, "open": True, "factor": 1.0,
+                     "words": "pulse width: got {got}, allowed: a positive width [s]"}]
+        found["us"] = [*positive, *_pulses(model, accepted=not isinstance(model, SwitchedServo))]
     if "command_angle" in model.available:
         digital = isinstance(model, DigitalServo)
         found["deg"] = [*(_angles("the goals", "firmware.lower_goal", "firmware.upper_goal") if digital else ()),
@@ -102,11 +104,6 @@ def bounds_of(model: Model) -> dict[str, list[dict[str, Any]]]:
     if not goals and "command_voltage" in model.available:
         found["V"] = [*_pulses(model, accepted=False)]
     return found
-
-
-def _positive() -> list[dict[str, Any]]:
-    return [{"of": "command", "low": 0.0, "open": True, "factor": 1.0,
-             "words": "pulse width: got {got}, allowed: a positive width [s]"}]
 
 
 def _angles(which: str, low: str, high: str) -> list[dict[str, Any]]:
@@ -384,6 +381,10 @@ def world(first: Scene) -> dict[str, Any]:
         If that bench is one that the page cannot have.
     """
     example = facts_of(models_of(Scene(servos=(SceneServo(id=catalog_names()[0]),)))[0], first)
+    load = load_of(Scene(servos=(SceneServo(id=catalog_names()[0]),)))
+    of_load = {name: float(getattr(load.pendulum if "pendulum" in name else load, name.rpartition(".")[2]))
+               for name in _LOADS}
+    no_load = {_LOADS[name]: value for name, value in of_load.items()}
     return {
         "first": first.text(), "lessons": [{**one.listed(), "text": one.scene.text()} for one in lessons()],
         "servos": {name: _servo(name) for name in catalog_names()}, "catalog": catalog_list(), "curves": _curves(),
@@ -403,7 +404,7 @@ def world(first: Scene) -> dict[str, Any]:
         "file": {"groups": [*GROUPS], "spread": _SPREAD, "no_play": NO_PLAY, "usual": KINDS_OF_SERVOS[0], "units": {
             name: {unit: units.factor(unit, name) for unit in known} for name, known in units.DIMENSIONS.items()}},
         "files": _files(), "csv": csv_rules(),
-        "no_load": _no_load(), "made": ["", "no_inertia"],
+        "no_load": no_load, "made": ["", "no_inertia"],
         "set": {"origin": "assumed", "source": SET_BY_USER, "spread": ""},
         "slider": SLIDER, "ranges": {name: _ends(one) for name, one in RULES.items()},
         "less": [[f"{title}.{name}" for name in pair] for title, group in GROUPS.items() for pair in group.less],
@@ -431,14 +432,6 @@ def _load_rule(name: str) -> dict[str, Any]:
     if name.rpartition(".")[2] in part.not_negative:
         return {"is": "number", "what": name, "low": 0.0, "allowed": "a finite number of at least 0"}
     return {"is": "number", "what": name, "allowed": "a finite number"}
-
-
-def _no_load() -> dict[str, float]:
-    """Return what hangs on a shaft where a scene says nothing."""
-    load = load_of(Scene(servos=(SceneServo(id=catalog_names()[0]),)))
-    of_load = {name: float(getattr(load.pendulum if "pendulum" in name else load, name.rpartition(".")[2]))
-               for name in _LOADS}
-    return {_LOADS[name]: value for name, value in of_load.items()}
 
 
 def _model(name: str) -> dict[str, Any]:

@@ -164,7 +164,8 @@ def page(first: Scene) -> str:
     """
     code = module()
     known = world(first)
-    text = {"modules": modules(), "css": _css(), "world": {**known, "layout": layout()}}
+    css = "\n".join((_PAGE / name).read_text("utf-8") for name in ("vendor/uPlot.min.css", "css/page.css"))
+    text = {"modules": modules(), "css": css, "world": {**known, "layout": layout()}}
     pieces = {"text": json.dumps(text, ensure_ascii=False, separators=(",", ":"), allow_nan=False).encode(),
               "code": code}
     html = (_PAGE / "index.html").read_text("utf-8")
@@ -190,10 +191,6 @@ def modules() -> dict[str, str]:
                  *sorted((_HERE / "vendor").glob("*.js")), *sorted((_HERE / "js").glob("*.js"))):
         found[f"bench/{path.name}"] = _IMPORT.sub(r'\1"bench/\2"', path.read_text("utf-8"))
     return found
-
-
-def _css() -> str:
-    return "\n".join((_PAGE / name).read_text("utf-8") for name in ("vendor/uPlot.min.css", "css/page.css"))
 
 
 def _packed(data: bytes) -> str:

@@ -285,16 +285,12 @@ def _voltages_of(model: Model) -> list[float] | None:
 def _angle_of(model: Model, width: float, usual: float) -> float:
     import numpy as np
 
-    if "command_angle" not in model.available:
-        return usual
-    drive = model.command(_constant(width)).table[0].value
-    return float(model.command_signal("command_angle", np.float64(drive)))  # type: ignore[arg-type]
-
-
-def _constant(width: float) -> Any:
     from servotwin import signals
 
-    return signals.constant(width, unit="s")
+    if "command_angle" not in model.available:
+        return usual
+    drive = model.command(signals.constant(width, unit="s")).table[0].value
+    return float(model.command_signal("command_angle", np.float64(drive)))  # type: ignore[arg-type]
 
 
 def _loop_of(model: Model) -> dict[str, float] | None:

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Any, NoReturn
+from typing import Any
 
 from servotwin.errors import HIDDEN, InputError, UnknownNameError
 from servotwin.models.engine.live.posts import UNITS
@@ -75,13 +75,9 @@ def checked(rule: Rule, value: Any, name: str = "", table: Mapping[str, Any] | N
     """
     found = _KINDS[rule["is"]](rule, value, name, table or {})
     if found is None:
-        _refuse(rule, value, name)
+        what, allowed = (rule[key].replace("{name}", name) for key in ("what", "allowed"))
+        raise InputError(what, got=_told(rule, value), allowed=allowed)
     return found
-
-
-def _refuse(rule: Rule, value: Any, name: str) -> NoReturn:
-    what, allowed = (rule[key].replace("{name}", name) for key in ("what", "allowed"))
-    raise InputError(what, got=_told(rule, value), allowed=allowed)
 
 
 def _told(rule: Rule, value: Any) -> Any:

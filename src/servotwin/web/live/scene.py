@@ -348,8 +348,8 @@ def read_scene(text: str) -> Scene:
         raise InputError("actions of a scene", got="times that go back", allowed="the order of their times")
     own = {key: checked(rule, content[key]) if key in content else rule.get("usual", {})
            for key, rule in SCENE.items()}
-    return Scene(servos=tuple(read_scene_servo(servo) for servo in servos), actions=done, view=_view(content),
-                 lesson=_lesson(content), **own)
+    return Scene(servos=tuple(read_scene_servo(servo) for servo in servos), actions=done,
+                 view=checked_view(_table(content, "view")), lesson=_lesson(content), **own)
 
 
 def checked_view(view: Any) -> dict[str, Any]:
@@ -392,10 +392,6 @@ def _lesson(content: Mapping[str, Any]) -> dict[str, Any]:
     if not all(isinstance(one, str) for one in listed):
         raise InputError("lesson of a scene", got="other values", allowed="texts and lists of texts")
     return found
-
-
-def _view(content: Mapping[str, Any]) -> dict[str, Any]:
-    return checked_view(_table(content, "view"))
 
 
 # --- Which servos stand on the bench, as a page asks for them: of the catalog, or kept as they are --------------------

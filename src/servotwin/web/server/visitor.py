@@ -64,7 +64,10 @@ async def _do(visitor: Visitor, message: dict[str, Any]) -> Answer:
 
 
 async def _run(visitor: Visitor, message: dict[str, Any]) -> Answer:
-    visitor.room.run(_truth(message, "run"))
+    value = message["run"]
+    if not isinstance(value, bool):
+        raise InputError("run", got=value, allowed="true or false")
+    visitor.room.run(value)
     return {"time": visitor.room.bench.time}
 
 
@@ -173,13 +176,6 @@ def _text(message: dict[str, Any], key: str) -> str:
     value = message[key]
     if not isinstance(value, str):
         raise InputError(key, got=type(value).__name__, allowed="a text")
-    return value
-
-
-def _truth(message: dict[str, Any], key: str) -> bool:
-    value = message[key]
-    if not isinstance(value, bool):
-        raise InputError(key, got=value, allowed="true or false")
     return value
 
 

@@ -222,7 +222,8 @@ def _standing(one: Look) -> Iterator[tuple[float, float]]:
     rest = max(6.0 * one.noise, 0.01)
     first = 0
     while first < len(time) - 1:
-        last = _stands_until(angle, first, rest)
+        away = np.flatnonzero(np.abs(angle[first:] - angle[first]) > rest)
+        last = first + int(away[0]) - 1 if len(away) else len(angle) - 1
         if time[last] - time[first] > _STILL + _DELAY:
             here = np.flatnonzero((time >= time[first]) & (time <= time[last] - _DELAY))
             off = np.abs(asked[here] - asked[first]) > large
@@ -230,12 +231,6 @@ def _standing(one: Look) -> Iterator[tuple[float, float]]:
                 yield (float(time[here][np.argmax(off)] + one.log.start),
                        float(time[last] + _MORE + one.log.start))
         first = max(last, first + 1)
-
-
-def _stands_until(angle: Array, first: int, rest: float) -> int:
-    """Return the last sample up to which the angle stays where it is at the first."""
-    away = np.flatnonzero(np.abs(angle[first:] - angle[first]) > rest)
-    return first + int(away[0]) - 1 if len(away) else len(angle) - 1
 
 
 def _lasting(time: Array, off: Mask) -> bool:

@@ -111,7 +111,8 @@ def look(log: Log, model: Model) -> Look | None:
             here = type(model)(model.servo.replace(own)) if own else model
             made = log.signal(own.get("electronics.frame_period", getattr(here, "frame_period", None)))
             drives = here.command(replace(made, edges=None) if not has_pulses(here) else made)
-            speed = _top_speed(here)
+            gain: float = here.value("gear.gear_reduction") * here.value("motor.back_emf_constant")
+            speed = float(here.value("supply.open_circuit_voltage") / gain)
     except ServotwinError:
         return None
     time = log.time - log.time[0]
@@ -194,11 +195,6 @@ def _offset(model: Model) -> float:
     return model.value_or("potentiometer.feedback_offset", 0.0)
 
 
-def _top_speed(model: Model) -> float:
-    gain: float = model.value("gear.gear_reduction") * model.value("motor.back_emf_constant")
-    return float(model.value("supply.open_circuit_voltage") / gain)
-
-
 # --- The beat of a log's time stamps ----------------------------------------------------------------------------------
 
 _BEAT_FEWEST = 20  # stamps
@@ -256,7 +252,7 @@ def beat_of(time: Array) -> Beat | None:
         on = ~off
     if scale > _STEADY or off.mean() > _MOST_OFF or not on[[0, -1]].any():
         return None
-    rough = _whole(time / period - slip)
+    rough = np.concatenate([[0], np.cumsum(np.round(np.diff(time / period - slip)))]).astype(np.int64)
     off[[k + int(abs(slip[k + 1]) > abs(slip[k])) for k in np.flatnonzero(np.diff(rough) < 1)]] = True
     number = _numbered(rough, off)
     place = _places(time, number, ~off, period)
@@ -284,11 +280,6 @@ def _local(hand: NDArray[np.complex128], parts: NDArray[np.int64]) -> NDArray[np
         k = np.arange(len(here))
         sums[here] = total[np.minimum(k + _ROUND + 1, len(here))] - total[np.maximum(k - _ROUND, 0)]
     return sums
-
-
-def _whole(beats: Array) -> NDArray[np.int64]:
-    """Return whole numbers of beats; the local beat drifts, so they come from step to step."""
-    return np.concatenate([[0], np.cumsum(np.round(np.diff(beats)))]).astype(np.int64)
 
 
 def _numbered(rough: NDArray[np.int64], off: Mask) -> NDArray[np.int64]:

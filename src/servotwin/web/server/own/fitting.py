@@ -99,11 +99,8 @@ def _prepared(log: Log, notes: dict[str, None]) -> Log:
             measured[name] = values + size * random.standard_normal(len(values))
     step = -(-len(log) // MOST_VALUES)
     if step > 1:
-        notes[f"every {_th(step)} value is fitted, of {len(log)}"] = None
+        th = {2: "second", 3: "third"}.get(step, f"{step}th")
+        notes[f"every {th} value is fitted, of {len(log)}"] = None
         there = np.arange(len(log)) % step == 0
         measured = {name: np.where(there, values, np.nan) for name, values in measured.items()}
     return replace(log, measured=measured)
-
-
-def _th(number: int) -> str:
-    return {2: "second", 3: "third"}.get(number, f"{number}th")
