@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.case import LogPart
+from servotwin.identification.fitting.case import NORMAL, LogPart, robust_deviation
 from servotwin.identification.fitting.checks import usual_free
 from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.registers import busiest
@@ -456,7 +456,6 @@ Mask = NDArray[np.bool_]
 _MOST, _MOST_ZERO, _LEAST_STEP = 0.1, 0.03, 1e-3  # of a number on its scale, of a zero [rad]; of either
 _SEEN = 1.0  # times the noise: what a step for a derivative is to change
 _BEGIN = 0.6  # s: until then an episode still shows how it began
-_MAD = 1.4826
 _LEAST = 2.0e-4  # rad
 _FAST = 0.3  # rad/s
 _SURE = 2.0  # times its noise, of a derivative's power: nothing below
@@ -500,12 +499,12 @@ def noise_of(episodes: Sequence[Episode], residuals: Sequence[Array], used: Sequ
         r = np.concatenate([one[mask[:, j], j] for one, mask in zip(residuals, used, strict=True)])
         v = np.concatenate([e.speed[mask[:, j], j] for e, mask in zip(episodes, used, strict=True)])
         still = np.abs(v) < _FAST
-        sigma = max(_MAD * float(np.median(np.abs(r[still] if still.sum() > 20 else r))), _LEAST,
+        sigma = max(robust_deviation(r[still] if still.sum() > 20 else r), _LEAST,
                     quantum_of([e.measured[:, j] for e in episodes]) / math.sqrt(12.0))
         positions.append(sigma)
         if (~still).sum() > 20:
             more = np.maximum(r[~still]**2 - sigma**2, 0.0) / v[~still]**2
-            off.append(np.sqrt(float(np.median(more))) * _MAD)
+            off.append(np.sqrt(float(np.median(more))) * NORMAL)
     return Noise(np.array(positions), min(float(np.median(off)) if off else 0.0, _MOST_OFF))
 
 

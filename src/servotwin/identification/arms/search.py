@@ -26,8 +26,8 @@ from servotwin.identification.arms.rows import (
     used_rows,
     usual_steps,
 )
-from servotwin.identification.fitting.arrow import Loss, Prior, block
-from servotwin.identification.fitting.task import HUBER
+from servotwin.identification.fitting.case import HUBER
+from servotwin.identification.fitting.least_squares import Loss, Prior, block, bounded_step
 from servotwin.robots import ServoDrive
 from servotwin.robots.coupling import couple, couplings_of
 from servotwin.robots.places import load_mujoco
@@ -399,7 +399,9 @@ class ArmSearch:
     def tried(self, x: Array, g: Array, H: Array, scale: float) -> list[Trial]:
         """Return points of steps that are damped more and more, their costs and residuals."""
         lower, upper = self.simulated.numbers.lower, self.simulated.numbers.upper
-        points = np.stack([stepped(x, g, H, scale * damping, lower, upper, self.held) for damping in _DAMPINGS])
+        own = np.diag(np.maximum(np.diag(H), 1e-9))
+        points = np.stack([np.clip(x + bounded_step(x, g, H + scale * damping * own, lower, upper, self.held), lower,
+                                   upper) for damping in _DAMPINGS])
         return [Trial(point, self.cost(point, found), found)
                 for point, found in zip(points, self.left(points), strict=True)]
 
@@ -440,25 +442,6 @@ class ArmSearch:
             if gain < _LEAST_GAIN * best:
                 break
         return x
-
-
-def stepped(x: Array, g: Array, H: Array, damping: float, lower: Array, upper: Array, held: Mask) -> Array:
-    """Return the next point of a damped step within bounds."""
-    damped = H + damping * np.diag(np.maximum(np.diag(H), 1e-9))
-    stays = held | ((x <= lower) & (g > 0.0)) | ((x >= upper) & (g < 0.0))
-    change = np.zeros(len(x))
-    for _ in range(len(x) + 1):
-        moves = ~stays
-        if not moves.any():
-            break
-        fixed = damped[np.ix_(moves, stays)] @ change[stays]
-        change[moves] = -np.linalg.lstsq(damped[np.ix_(moves, moves)], g[moves] + fixed, rcond=1e-14)[0]
-        over = moves & ((x + change < lower) | (x + change > upper))
-        if not over.any():
-            break
-        change[over] = np.clip(x + change, lower, upper)[over] - x[over]
-        stays = stays | over
-    return np.asarray(np.clip(x + change, lower, upper))
 
 
 # --- What is fitted in the fit of a robot, and how far simulated joints are off it ------------------------------------

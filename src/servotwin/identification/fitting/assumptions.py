@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import ServotwinError
-from servotwin.identification.fitting.arrow import Ask, Outcome, Prior, Search, together
 from servotwin.identification.fitting.case import STEP, Case, LogPart, Point, command_of, has_pulses
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Space, nominal
+from servotwin.identification.fitting.least_squares import Ask, Outcome, Prior, Search, together
 from servotwin.identification.fitting.task import Task
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty
 from servotwin.models import DigitalServo

@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.arrow import Loss, NormalEquations, Prior, block, by_sensor, safe
 from servotwin.identification.fitting.case import DELAY_SCALE, PERIOD_SCALE, Case, LogPart, Point, gap_of, near_edges
 from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.least_squares import Loss, NormalEquations, Prior, block, by_sensor, safe
 from servotwin.identification.fitting.phases import PulseChoice, Scan, drifts, likely_periods, settled, with_period
 from servotwin.identification.fitting.residual_noise import SensorSeries, noise_of
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.arrow import Begin, Loss, by_sensor
 from servotwin.identification.fitting.case import DELAY_SCALE, STEP, LogPart, Point, latency, widest
 from servotwin.identification.fitting.forecast import Forecast, LogLanes
 from servotwin.identification.fitting.free import LUMPED, Space
+from servotwin.identification.fitting.least_squares import Begin, Loss, by_sensor
 from servotwin.identification.fitting.phases import PulseChoice, Scan, settled
 from servotwin.identification.fitting.slew_lag import fit_slew_lag
 from servotwin.identification.fitting.task import Task

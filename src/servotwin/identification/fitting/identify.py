@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, PlausibilityWarning, ServotwinError
 from servotwin.identification.fitting import checks
-from servotwin.identification.fitting.arrow import Begin, Loss, Outcome, Prior, Search
 from servotwin.identification.fitting.assumptions import (
     HINTED,
     WANTED,
@@ -31,6 +30,7 @@ from servotwin.identification.fitting.assumptions import (
 from servotwin.identification.fitting.case import (
     DELAY_SCALE,
     FINE,
+    HUBER,
     NUISANCES,
     OFFSET_SCALE,
     SHARED,
@@ -56,11 +56,12 @@ from servotwin.identification.fitting.fit import (
 )
 from servotwin.identification.fitting.forecast import FIT_ACCURACY, Forecast, Running
 from servotwin.identification.fitting.free import Bounds, Priors, Space
+from servotwin.identification.fitting.least_squares import Begin, Loss, Outcome, Prior, Search
 from servotwin.identification.fitting.phases import credible, settled
 from servotwin.identification.fitting.registers import RegisterSearch, as_logs_say, register_search
 from servotwin.identification.fitting.residual_noise import SensorSeries, noise_of
 from servotwin.identification.fitting.stopping import Course, Within
-from servotwin.identification.fitting.task import HUBER, Task
+from servotwin.identification.fitting.task import Task
 from servotwin.identification.fitting.traces import ErrorTables, Trace
 from servotwin.identification.fitting.uncertainty import (
     Counts,

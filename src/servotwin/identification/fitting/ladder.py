@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.identification.fitting import checks
-from servotwin.identification.fitting.arrow import Begin, Loss
 from servotwin.identification.fitting.case import LogPart
 from servotwin.identification.fitting.fit import Fit, Ladder, Rung, begin_after
 from servotwin.identification.fitting.free import LUMPED, nominal, stated
 from servotwin.identification.fitting.identify import identify
+from servotwin.identification.fitting.least_squares import Begin, Loss
 from servotwin.identification.fitting.phases import widening
 from servotwin.identification.fitting.stopping import Within
 from servotwin.identification.fitting.traces import LogError, Trace, pooled

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.arrow import Loss
 from servotwin.identification.fitting.case import (
     DELAY_SCALE,
     Frames,
@@ -30,6 +29,7 @@ from servotwin.identification.fitting.case import (
     latency,
 )
 from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.least_squares import Loss
 
 if TYPE_CHECKING:
     from servotwin.identification.fitting.forecast import Forecast

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import ServotwinError
-from servotwin.identification.fitting.case import DELAY_SCALE, GAIN, Point, with_loop_gain
+from servotwin.identification.fitting.case import DELAY_SCALE, GAIN, HUBER, Point, robust_deviation, with_loop_gain
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.stopping import Within
@@ -437,10 +437,10 @@ def _later(residual: Array, later: Array) -> float:
     """Return by how much more delay (scaled) fits best to first order, errors of most samples counting."""
     if not np.isfinite(residual).all():
         return 0.0
-    step, size = 0.0, 1.4826 * float(np.median(np.abs(residual))) or 1.0
+    step, size = 0.0, robust_deviation(residual) or 1.0
     for _ in range(4):
         left = np.abs(residual + later * step)
-        weight = np.minimum(1.0, 1.345 * size / np.maximum(left, 1e-12))
+        weight = np.minimum(1.0, HUBER * size / np.maximum(left, 1e-12))
         power = float(weight @ later**2)
         if power <= 0.0:
             return 0.0

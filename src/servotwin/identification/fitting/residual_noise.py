@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.identification.fitting.case import robust_deviation
 from servotwin.identification.fitting.uncertainty import Rows
 from servotwin.logs.columns import step_of
 from servotwin.logs.log import Log
@@ -28,7 +29,6 @@ _SETTLED = 0.2  # s after the last change of the command: a servo of 60°/0.1 s 
 _LEAST, _MOST = 8, 40  # samples of a stretch in which the shaft stands
 _FAR = 5.0  # robust standard deviations beyond which a stretch or a sample is not like the others
 _ENOUGH = 24  # samples at rest, from which on they tell the noise's memory
-_NORMAL = 1.4826  # standard deviation over median magnitude of a normal law
 _BENT = 0.3  # of what is measured: how far a simulation that stands may leave a line
 _GUESSES = 9
 _COUNTED = 0.9  # memory of counts of a shaft that stands
@@ -160,14 +160,14 @@ def _jitter(series: Sequence[SensorSeries]) -> float:
         seen.append(bends(one)[fast] / speed[fast])
     if not uneven or not len(np.concatenate(seen)):
         return 0.0
-    stamps, shaft = (_NORMAL * float(np.median(np.abs(np.concatenate(x)))) for x in (uneven, seen))
+    stamps, shaft = (robust_deviation(np.concatenate(x)) for x in (uneven, seen))
     return min(stamps, shaft)
 
 
 def _white(series: Sequence[SensorSeries]) -> float:
     """Return white noise from second differences; nan of too few samples."""
     every = np.concatenate([bends(one) for one in series if len(one.time) >= 5] or [np.zeros(0)])
-    return _NORMAL * float(np.median(np.abs(every))) if len(every) >= _LEAST else math.nan
+    return robust_deviation(every) if len(every) >= _LEAST else math.nan
 
 
 def bends(one: SensorSeries) -> Array:
@@ -241,7 +241,7 @@ def isolated(one: SensorSeries, jitter: float = 0.0) -> NDArray[np.bool_]:
     middle = np.median(around, axis=0)
     apart = np.sort(np.abs(around - middle), axis=0)[2]  # of the third nearest: one more outlier may be beside
     rough = bends(one)
-    usual = _NORMAL * float(np.median(np.abs(rough))) if len(rough) else 0.0
+    usual = robust_deviation(rough) if len(rough) else 0.0
     return np.asarray(np.abs(r - middle) > _FAR * np.hypot(1.3 * usual, one.speed * jitter) + 3.0 * apart)
 
 
@@ -318,7 +318,7 @@ def _repeats(series: Sequence[SensorSeries]) -> float:
     if not found:
         return math.nan
     every = np.concatenate(found)
-    return _NORMAL * float(np.median(np.abs(every)))
+    return robust_deviation(every)
 
 
 # --- Do residuals follow the command of some time before? Their cross-correlation with its past changes ---------------

@@ -1,15 +1,12 @@
 """A servo as a delay, a slew rate, a lag and a deadband: its motion in closed form, for many logs at once.
 
-Levenberg-Marquardt on the normal equations, residuals weighted as a loss asks. Orthogonal decompositions of tall
-matrices would cost more than the residuals do: libraries spread them over all cores, which then wait for each other.
-
 ArduPilot's simulated servo is of this kind.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, get_args
 
@@ -17,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
+from servotwin.identification.fitting.case import robust_deviation
 from servotwin.logs.log import ANGLES, Log
 from servotwin.units import is_finite
 
@@ -239,114 +237,6 @@ def _left(error: Array, span: Array, numbers: LagNumbers) -> tuple[Array, Array,
     return size, (size - rate * slewing) * np.exp((slewing - span) / numbers.lag), way, rate
 
 
-# --- Small bounded least squares from several starts at once ----------------------------------------------------------
-
-Seen = tuple[Array, Array]  # residuals (N,) and their derivatives (N, p)
-Ask = Callable[[list[Array]], list[Seen]]
-_MOST = 60  # steps
-_NOTHING = 1e-30  # of the squares of the first residuals: all is explained
-_MOST_DAMPING = 1e9
-_PATIENCE = 8  # trials
-_SMALL = 2**17  # products of numbers
-
-
-def solved(starts: Sequence[Array], lower: Array, upper: Array, ask: Ask, loss: str, scale: float,
-           gain: float) -> list[tuple[float, Array]]:
-    """Return the cost and the point where the search from each start ends.
-
-    Parameters
-    ----------
-    starts : sequence of ndarray, shape (p,)
-    lower, upper : ndarray, shape (p,)
-    ask : callable
-        Returns residuals and derivatives at several points.
-    loss : {"linear", "soft_l1", "huber"}
-    scale : float
-        Residual from which a loss counts less than squares.
-    gain : float
-        Of the cost: where a step promises less, or several trials in a row gain less, a search ends.
-    """
-    ways = [_way(np.clip(start, lower, upper), lower, upper, loss, scale, gain) for start in starts]
-    ends: dict[int, tuple[float, Array]] = {}
-    asked = {k: next(way) for k, way in enumerate(ways)}
-    while asked:
-        now = list(asked)
-        for k, seen in zip(now, ask([asked[k] for k in now]), strict=True):
-            try:
-                asked[k] = ways[k].send(seen)
-            except StopIteration as end:
-                del asked[k]
-                ends[k] = end.value
-    return [ends[k] for k in range(len(starts))]
-
-
-def _counted(r: Array, loss: str, scale: float) -> tuple[float, Array]:
-    """Return the cost of residuals, and the weight of the square of each."""
-    if loss == "linear":
-        return 0.5 * float(r @ r), np.ones(len(r))
-    z = (r / scale) ** 2
-    if loss == "huber":
-        beyond = z > 1.0
-        root = np.sqrt(np.maximum(z, 1.0))
-        return 0.5 * scale**2 * float(np.where(beyond, 2.0 * root - 1.0, z).sum()), 1.0 / root
-    root = np.sqrt(1.0 + z)
-    return scale**2 * float((root - 1.0).sum()), 1.0 / root
-
-
-def _way(x: Array, lower: Array, upper: Array, loss: str, scale: float,
-         gain: float) -> Generator[Array, Seen, tuple[float, Array]]:
-    r, J = yield x
-    cost, weight = _counted(r, loss, scale)
-    nothing, damping, size, vain = _NOTHING * max(cost, 1e-300), 1e-3, np.zeros(len(x)), 0
-    for _ in range(_MOST):
-        g, H = _normal(r, J, weight)
-        size = np.maximum(size, np.diag(H))
-        while True:
-            step = _step(x, g, H + damping * np.diag(np.maximum(size, 1e-300)), lower, upper)
-            promised = -float(g @ step) - 0.5 * float(step @ H @ step)
-            if promised <= gain * cost or cost <= nothing or vain > _PATIENCE:
-                return cost, x
-            seen = yield x + step
-            found, weighed = _counted(seen[0], loss, scale)
-            vain = 0 if found < (1.0 - gain) * cost else vain + 1
-            if found < cost:
-                break
-            damping *= 6.0
-            if damping > _MOST_DAMPING:
-                return cost, x
-        x, (r, J), cost, weight, damping = x + step, seen, found, weighed, max(damping / 10.0, 1e-12)
-    return cost, x
-
-
-def _normal(r: Array, J: Array, weight: Array) -> tuple[Array, Array]:
-    """Return gradient and matrix of the normal equations, from pieces so small that no library spreads them."""
-    A = np.column_stack([J, r])
-    rows = max(_SMALL // A.shape[1] ** 2, 1)
-    H = np.zeros((A.shape[1], A.shape[1]))
-    for first in range(0, len(A), rows):
-        piece = slice(first, first + rows)
-        H += (A[piece] * weight[piece, None]).T @ A[piece]
-    return H[:-1, -1], H[:-1, :-1]
-
-
-def _step(x: Array, g: Array, H: Array, lower: Array, upper: Array) -> Array:
-    """Return a step within the bounds: what would cross its bound goes to it, and the rest is solved again."""
-    step = np.zeros(len(x))
-    stays = ((x <= lower) & (g > 0.0)) | ((x >= upper) & (g < 0.0))
-    for _ in range(len(x) + 1):
-        moves = np.flatnonzero(~stays)
-        if not len(moves):
-            break
-        step[moves] = -np.linalg.solve(H[np.ix_(moves, moves)], g[moves] + H[np.ix_(moves, stays)] @ step[stays])
-        there = x + step
-        over = ~stays & ((there < lower) | (there > upper))
-        if not over.any():
-            break
-        step[over] = np.clip(there, lower, upper)[over] - x[over]
-        stays = stays | over
-    return np.clip(x + step, lower, upper) - x
-
-
 # --- The model without physics that every servo model has to beat -----------------------------------------------------
 
 Loss = Literal["linear", "soft_l1", "huber"]
@@ -356,7 +246,7 @@ _LEAST_LAG, _MOST_LAG, _MOST_DELAY = 1e-4, 5.0, 0.5  # s
 _DELAYS = (0.0, 0.02, 0.04, 0.06, 0.09, 0.13, 0.2, 0.3)  # s, of the starts
 _LAGS = (0.01, 0.04, 0.15)  # s
 _SLEWS = (0.7, 1.0, 1.4)  # of what the logs show
-_STARTS = 4
+_STARTS, _MOST = 4, 60  # searches, steps of each
 _ROUGHLY, _CLOSELY = 1e-2, 3e-6  # of the cost: less is an end, of several starts and of the best
 
 
@@ -407,7 +297,7 @@ def fit_slew_lag(logs: Sequence[Log], *, loss: Loss = "linear", loss_scale: floa
     fitted = _Fitted(logs, signal, gain=kind != "angle" or signal != "output_angle")
     x = fitted.solve(fitted.starts(), "linear", 1.0, _ROUGHLY)
     spread = 1.0 if loss == "linear" else loss_scale or max(
-        1.4826 * 1.5 * float(np.median(np.abs(fitted.residual(x)))), 1e-9)
+        1.5 * robust_deviation(fitted.residual(x)), 1e-9)
     x = fitted.solve([x], loss, spread, _CLOSELY)
     values = {name: float(value.item()) for name, value in fitted.numbers(x[None, :])._asdict().items()}
     return SlewLag(**values, command_kind=kind, signal=signal)
@@ -466,27 +356,23 @@ class _Fitted:
         residual: Array = self.courses.angles(self.numbers(x[None, :]))[0][0] - self.measured
         return residual
 
-    def seen(self, points: Sequence[Array]) -> list[tuple[Array, Array]]:
-        """Return residuals and derivatives at points: by copies that differ a little, by the delay from the speed."""
-        several, steps = [], []
-        for x in points:
-            copies = np.repeat(x[None, :], len(x), axis=0)
-            step = np.where(x + _STEP > self.upper, -_STEP, _STEP)
-            copies[np.arange(1, len(x)), np.arange(1, len(x))] += step[1:]
-            several.append(copies)
-            steps.append(step)
-        found = []
-        numbers = [self.numbers(copies) for copies in several]
-        for (angle, speed), step in zip(self.courses.angles_of(numbers), steps, strict=True):
-            columns = (angle[1:] - angle[0]) / step[1:, None]
-            found.append((angle[0] - self.measured, np.column_stack([-speed[0] * self.scale["delay"], columns.T])))
-        return found
+    def slopes(self, x: Array) -> Array:
+        """Return the derivatives of the residuals: by copies that differ a little, by the delay from the speed."""
+        copies = np.repeat(x[None, :], len(x), axis=0)
+        step = np.where(x + _STEP > self.upper, -_STEP, _STEP)[1:]
+        copies[np.arange(1, len(x)), np.arange(1, len(x))] += step
+        angle, speed = self.courses.angles(self.numbers(copies))
+        return np.column_stack([-speed[0] * self.scale["delay"], ((angle[1:] - angle[0]) / step[:, None]).T])
 
     def solve(self, starts: Sequence[Array], loss: Loss, scale: float, gain: float) -> Array:
         """Return where the best of the searches from some starts ends."""
+        from scipy.optimize import least_squares
+
         inside = [np.clip(start, self.lower + 1e-9, self.upper - 1e-9) for start in starts]
-        ends = solved(inside, self.lower, self.upper, self.seen, loss, scale, gain)
-        return min(ends, key=lambda end: end[0])[1]
+        ends = [least_squares(self.residual, start, self.slopes, (self.lower, self.upper), x_scale="jac", loss=loss,
+                              f_scale=scale, ftol=gain, max_nfev=_MOST) for start in inside]
+        best: Array = min(ends, key=lambda end: float(end.cost)).x
+        return best
 
     def starts(self) -> list[Array]:
         """Return the best of a grid over delay, lag and slew rates; gain and offset by a straight line."""

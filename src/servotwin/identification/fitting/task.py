@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.arrow import Begin, Loss, Outcome, Prior, Search, scatter_of, together
 from servotwin.identification.fitting.case import (
     DELAY_SCALE,
     MOST_DELAY,
@@ -27,12 +26,12 @@ from servotwin.identification.fitting.case import (
 )
 from servotwin.identification.fitting.clocks import DELAYS, at_likely_delay, first_offset, ticking, with_clocks
 from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.least_squares import Begin, Loss, Outcome, Prior, Search, scatter_of, together
 from servotwin.identification.fitting.phases import Scan, widening
 from servotwin.logs.log import ANGLES
 
 Array = NDArray[np.float64]
 
-HUBER = 1.345  # of the noise: as good as least squares to 5 % where the noise is normal (Huber 1964)
 _TRIED = 8  # random points for each search that is begun
 _FIRST_LOGS = 8  # of the first, rough searches
 _ALIKE, _NEARLY = 1.03, 1.3  # times the least cost of the rough searches, in which pulses do not come when they do

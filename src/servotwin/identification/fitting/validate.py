@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, ServoFileError
 from servotwin.identification.fitting import checks
-from servotwin.identification.fitting.arrow import Begin, Loss, Prior, scatter_of
 from servotwin.identification.fitting.case import (
     DELAY_SCALE,
+    HUBER,
     NUISANCES,
     OFFSET_SCALE,
     SHARED,
@@ -38,8 +38,9 @@ from servotwin.identification.fitting.comparison import trace_of, with_pulses_of
 from servotwin.identification.fitting.fit import Validation
 from servotwin.identification.fitting.forecast import Forecast, Running
 from servotwin.identification.fitting.free import Space
+from servotwin.identification.fitting.least_squares import Begin, Loss, Prior, scatter_of
 from servotwin.identification.fitting.registers import as_logs_say, register_search
-from servotwin.identification.fitting.task import HUBER, Task
+from servotwin.identification.fitting.task import Task
 from servotwin.identification.fitting.traces import ErrorTable, Trace
 from servotwin.logs.log import Log
 from servotwin.models import MODELS, Model

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.arrow import Begin, Search, by_sensor
-from servotwin.identification.fitting.case import LogPart, Point, joined
+from servotwin.identification.fitting.case import LogPart, Point, joined, robust_deviation
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Space
+from servotwin.identification.fitting.least_squares import Begin, Search, by_sensor
 from servotwin.identification.fitting.phases import settled
 from servotwin.identification.fitting.task import Task
 from servotwin.logs.log import ANGLES, Log
@@ -100,7 +100,6 @@ _ROUNDS = 4  # of search and noise
 _COPY = 4.0  # s of one lane: about what a log takes that is made ready to be simulated once
 _LEAST = 2e-3  # of the cost: what a step has to gain
 _FINER = 0.7  # of the noise: then a search goes on with less
-_NORMAL = 1.4826  # standard deviation over median magnitude of a normal law
 _FELT, _FORETOLD = 0.02, 0.02  # of the root of what is left, and of its cost: what an effect has to reach to be tried
 _SOON = 4  # steps of a search that show whether it gains
 _REACH = 0.5  # of a searched number: how far the others are moved before a trial is searched
@@ -371,12 +370,7 @@ class TrialBench:
             return math.inf
         if len(J) != len(r):
             return loss.cost(r)
-        step = np.zeros(J.shape[1])
-        for _ in range(3):
-            w = loss.weight(r + J @ step)
-            H = (J * w[:, None]).T @ J + np.eye(len(step)) / _REACH**2
-            step = -np.linalg.solve(H, (J * w[:, None]).T @ r)
-        return loss.cost(r + J @ step)
+        return loss.linear_step(r, J, np.full(J.shape[1], _REACH**-2.0))[1]
 
     def may_gain(self, setting: Setting) -> bool:
         """Tell whether a setting can gain enough to count, as far as its effect at its start tells: in proportion.
@@ -395,12 +389,9 @@ class TrialBench:
         if not setting.values:
             return float(d @ d) > _FELT**2 * float(r @ r)
         loss, A = self.task.loss, np.column_stack([J, d])
-        ridge = np.diag(np.append(np.full(J.shape[1], _REACH**-2.0), 1e-9 * float(d @ d) + 1e-300))
-        step = np.zeros(A.shape[1])
-        for _ in range(3):
-            w = loss.weight(r + A @ step)
-            step = -np.linalg.solve((A * w[:, None]).T @ A + ridge, (A * w[:, None]).T @ r)
-        return step[-1] > 0.0 and loss.cost(r + A @ step) < (1.0 - _FORETOLD) * loss.cost(r)
+        ridge = np.append(np.full(J.shape[1], _REACH**-2.0), 1e-9 * float(d @ d) + 1e-300)
+        step, cost = loss.linear_step(r, A, ridge)
+        return bool(step[-1] > 0.0) and cost < (1.0 - _FORETOLD) * loss.cost(r)
 
     def gains_soon(self, setting: Setting) -> bool:
         """Tell whether a few steps of its search gain enough: what acts out of proportion is not foretold."""
@@ -424,7 +415,7 @@ def _finer(forecast: Watched, point: Point) -> bool:
     for k, part in enumerate(forecast.at(point, derivatives=False)):
         for name, residual in by_sensor(forecast, k, part).items():
             left.setdefault(name, []).append(residual[residual != 0.0])
-    new = {name: _NORMAL * float(np.median(np.abs(np.concatenate(some)))) for name, some in left.items()
+    new = {name: robust_deviation(np.concatenate(some)) for name, some in left.items()
            if sum(map(len, some))}
     if not all(math.isfinite(value) and value > 0.0 for value in new.values()):
         return False

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.case import Point, has_pulses, joined
+from servotwin.identification.fitting.case import Point, has_pulses, joined, robust_deviation
 from servotwin.identification.fitting.diagnosis.bench import Gain, Spent, Told, TrialBench, Watched, gain, teaching
 from servotwin.identification.fitting.free import Space, nominal
 from servotwin.identification.fitting.traces import Trace
@@ -161,13 +161,9 @@ class _Drift:
         """Return the cost of a shape to first order, and the step of all numbers, its change the last."""
         column = np.concatenate([d * self._on_residuals(k, x) for k, (d, x) in
                                  enumerate(zip(slope, shape.samples, strict=True))])
-        A, loss = np.column_stack([self.J, column]), self.bench.task.loss
-        step = np.zeros(A.shape[1])
-        for _ in range(4):
-            w = loss.weight(r + A @ step)
-            H = (A * w[:, None]).T @ A + np.eye(len(step)) / _REACH**2
-            step = -np.linalg.solve(H, (A * w[:, None]).T @ r)
-        return loss.cost(r + A @ step), step
+        A = np.column_stack([self.J, column])
+        step, cost = self.bench.task.loss.linear_step(r, A, np.full(A.shape[1], _REACH**-2.0), rounds=4)
+        return cost, step
 
     def _on_residuals(self, k: int, x: NDArray[Any]) -> NDArray[Any]:
         """Return what is told at the instants of a log at its residuals: sensor by sensor."""
@@ -274,7 +270,6 @@ _PAYS = 8.0  # in units of noise: what one of some hundred places has to gain (t
 _LEFT = 0.25  # of what is left in a log, where that is more than noise: a model that lacks something takes any event
 MOST_LEFT = 0.5  # of the error
 _FIRST_LEFT = math.sqrt(MOST_LEFT)  # of the error, before any number has moved: half of the way
-_NORMAL = 1.4826  # standard deviation over median magnitude of a normal law
 
 
 @dataclass(frozen=True)
@@ -413,7 +408,7 @@ def _chosen(bench: TrialBench, point: Point, k: int, kind: _Kind, before: _Chose
     log, used, (already, here) = bench.setting.logs[k], bench.counted(k), before
     if not _like(here, used):
         return before
-    scale = max(bench.noise, _LEFT * _NORMAL * float(np.median(np.abs(here))))
+    scale = max(bench.noise, _LEFT * robust_deviation(here))
     known = {abs(one) for one in already}
     places = [place for place in kind.places(log) if abs(place) not in known]
     most = _most(bench, scale, here, here + log.measured[log.angle_name][used] if kind.delays else None)
@@ -563,5 +558,5 @@ def _lateness(residual: Array, speed: Array, noise: float) -> float | None:
     moves = np.abs(speed) > max(_MOVES * float(np.abs(speed).max()), 1e-12)
     if moves.sum() < _FEWEST:
         return None
-    off = _NORMAL * float(np.median(np.abs(residual[moves] / speed[moves])))
+    off = robust_deviation(residual[moves] / speed[moves])
     return math.sqrt(max(off**2 - (noise / float(np.median(np.abs(speed[moves]))))**2, 0.0))

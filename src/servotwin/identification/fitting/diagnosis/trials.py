@@ -17,9 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import ServotwinError
-from servotwin.identification.fitting.arrow import Prior
 from servotwin.identification.fitting.assumptions import assumptions
-from servotwin.identification.fitting.case import Point, has_pulses, joined
+from servotwin.identification.fitting.case import HUBER, Point, has_pulses, joined, robust_deviation
 from servotwin.identification.fitting.checks import findings
 from servotwin.identification.fitting.diagnosis.bench import (
     DEAR,
@@ -39,6 +38,7 @@ from servotwin.identification.fitting.diagnosis.drifts import (
     warming,
 )
 from servotwin.identification.fitting.free import LUMPED, nominal
+from servotwin.identification.fitting.least_squares import Prior
 from servotwin.identification.fitting.task import Task
 from servotwin.identification.fitting.traces import Trace
 from servotwin.identification.fitting.uncertainty import rows_of
@@ -103,7 +103,7 @@ def _robust(x: Array, y: Array, power: int) -> Array:
     for _ in range(_ROUNDS):
         c = np.linalg.lstsq(A * weight[:, None], y * weight, rcond=None)[0]
         left = np.abs(y - A @ c)
-        weight = np.sqrt(np.minimum(1.0, 1.345 * 1.4826 * float(np.median(left)) / np.maximum(left, 1e-12)))
+        weight = np.sqrt(np.minimum(1.0, HUBER * robust_deviation(left) / np.maximum(left, 1e-12)))
     return np.asarray(c)
 
 

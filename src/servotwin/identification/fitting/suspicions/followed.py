@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
+from servotwin.identification.fitting.case import HUBER, robust_deviation
 from servotwin.identification.fitting.suspicions.look import Array, Finding, Look, Mask, aligned, said_times
 from servotwin.identification.survey.survey import motion_of
 from servotwin.logs.column_words import SAID
@@ -187,10 +188,10 @@ def _habit(one: Look, error: float) -> _Habit | None:
         counted = known * (weight**2)[:, None]
         line = np.linalg.solve(counted.T @ known + little, counted.T @ y)  # a decomposition of so many rows is slow
         residual, before = y - known @ line, scale
-        scale = 1.4826 * float(np.median(np.abs(residual)))
+        scale = robust_deviation(residual)
         if abs(scale - before) < _SETTLED * scale:
             break
-        weight = np.sqrt(np.minimum(1.0, 1.345 * scale / np.maximum(np.abs(residual), 1e-12)))
+        weight = np.sqrt(np.minimum(1.0, HUBER * scale / np.maximum(np.abs(residual), 1e-12)))
     gains = line[-drives.shape[1]:]
     around = np.pad(np.abs(speed), _AROUND, mode="edge")[k[:, None] + _AHEAD + np.arange(2 * _AROUND + 1)]
     possible = (around < _TOO_FAST * one.top_speed).all(axis=1)

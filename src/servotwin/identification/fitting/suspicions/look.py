@@ -13,7 +13,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from servotwin.errors import ServotwinError
-from servotwin.identification.fitting.case import has_pulses
+from servotwin.identification.fitting.case import NORMAL, has_pulses, robust_deviation
 from servotwin.logs.log import Log
 from servotwin.models import Model
 
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _AROUND = 5  # samples
 _SIGMAS = 6.0
-_NORMAL_D2 = 1.4826 / math.sqrt(6.0)  # of the median magnitude of second differences of white noise
+_NORMAL_D2 = NORMAL / math.sqrt(6.0)  # of the median magnitude of second differences of white noise
 
 
 @dataclass(frozen=True)
@@ -247,7 +247,7 @@ def beat_of(time: Array) -> Beat | None:
     on = np.ones(len(time), np.bool_)
     for _ in range(3):
         slip = np.angle(hand * np.conj(_local(hand * on, parts))) / (2.0 * np.pi)  # of a period, -0.5 to 0.5
-        scale = 1.4826 * float(np.median(np.abs(slip)))
+        scale = robust_deviation(slip)
         off = np.abs(slip) > max(_SIGMAS * scale, _OFF)
         on = ~off
     if scale > _STEADY or off.mean() > _MOST_OFF or not on[[0, -1]].any():

@@ -7,7 +7,8 @@ import pytest
 from scipy.optimize import least_squares
 
 from identification.toy_forecast import Toy
-from servotwin.identification.fitting.arrow import (
+from servotwin.identification.fitting.case import STEP, LogPart, Point
+from servotwin.identification.fitting.least_squares import (
     _LEAST_GAIN,
     Block,
     Loss,
@@ -17,7 +18,6 @@ from servotwin.identification.fitting.arrow import (
     block,
     together,
 )
-from servotwin.identification.fitting.case import STEP, LogPart, Point
 
 T = np.linspace(0.0, 4.0, 31)
 WAVE = np.cos(7.0 * T)

@@ -14,7 +14,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.case import STEP, LogPart, Point
+from servotwin.identification.fitting.case import STEP, LogPart, Point, robust_deviation
 from servotwin.identification.fitting.forecast import Forecast
 
 # --- How far residuals scatter, told so that a few outliers change it little ------------------------------------------
@@ -22,7 +22,6 @@ from servotwin.identification.fitting.forecast import Forecast
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-NORMAL = 1.4826  # standard deviation over median magnitude of a normal law
 _MOVING = 0.05  # of the fastest change of a simulated signal
 _SHARE = 0.3  # of the rms, that the noise is at least
 _FEWEST = 20  # values of a part, below which its median says too little
@@ -71,12 +70,8 @@ def scatter(residual: Array, moves: Mask) -> float:
     True
     """
     parts = [part for part in (residual[moves], residual[~moves]) if len(part) >= _FEWEST] or [residual]
-    squares = sum(len(part) * _deviation(part) ** 2 for part in parts)
-    return max(_deviation(residual), _SHARE * math.sqrt(squares / sum(map(len, parts))))
-
-
-def _deviation(residual: Array) -> float:
-    return NORMAL * float(np.median(np.abs(residual)))
+    squares = sum(len(part) * robust_deviation(part) ** 2 for part in parts)
+    return max(robust_deviation(residual), _SHARE * math.sqrt(squares / sum(map(len, parts))))
 
 
 def moving(time: Array, simulated: Array) -> Mask:
@@ -127,6 +122,25 @@ class Loss:
     def weight(self, residual: Array) -> Array:
         """Return the weight of each squared residual."""
         return np.asarray(np.minimum(1.0, self.limit / np.maximum(np.abs(residual), 1e-300)))
+
+    def linear_step(self, residual: Array, slopes: Array, ridge: Array, rounds: int = 3) -> tuple[Array, float]:
+        """Return the step of numbers in which residuals are linear, and the cost after it, by reweighted least squares.
+
+        Parameters
+        ----------
+        residual : ndarray, shape (n,)
+            Before the step.
+        slopes : ndarray, shape (n, p)
+        ridge : ndarray, shape (p,)
+            One over the variance of each number about 0.
+        rounds : int
+            Of weights.
+        """
+        step: Array = np.zeros(slopes.shape[1])
+        for _ in range(rounds):
+            weighted = slopes * self.weight(residual + slopes @ step)[:, None]
+            step = np.asarray(-np.linalg.solve(weighted.T @ slopes + np.diag(ridge), weighted.T @ residual))
+        return step, self.cost(residual + slopes @ step)
 
 
 @dataclass(frozen=True)
@@ -252,6 +266,31 @@ def together(forecast: Forecast, cases: Sequence[int], searches: Sequence[Genera
     return [ended[k] for k in range(len(searches))]
 
 
+def staying(x: Array, g: Array, lower: Array, upper: Array, held: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which numbers are held, or at a bound over which the cost falls."""
+    return np.asarray(held | ((x <= lower) & (g > 0.0)) | ((x >= upper) & (g < 0.0)))
+
+
+def bounded_step(x: Array, g: Array, H: Array, lower: Array, upper: Array, held: NDArray[np.bool_]) -> Array:
+    """Return the change of numbers x that solves H·change = −g; a number that would cross its bound goes to it.
+
+    The others are solved for again then. H may be singular.
+    """
+    stays, change = staying(x, g, lower, upper, held), np.zeros(len(x))
+    for _ in range(len(x) + 1):
+        moves = ~stays
+        if not moves.any():
+            break
+        of_fixed = H[np.ix_(moves, stays)] @ change[stays]
+        change[moves] = -np.linalg.lstsq(H[np.ix_(moves, moves)], g[moves] + of_fixed, rcond=1e-14)[0]
+        over = moves & ((x + change < lower) | (x + change > upper))
+        if not over.any():
+            break
+        change[over] = np.clip(x + change, lower, upper)[over] - x[over]
+        stays = stays | over
+    return change
+
+
 class Search:
     """A least-squares problem over a forecast.
 
@@ -347,14 +386,10 @@ class Search:
             parts = yield Ask(trial, True)
         return best
 
-    def _stays(self, x: Array, g: Array) -> NDArray[np.bool_]:
-        """Tell which numbers are held, or at a bound over which the cost falls."""
-        return np.asarray(self.held | ((x <= self.lower) & (g > 0.0)) | ((x >= self.upper) & (g < 0.0)))
-
     def _promise(self, point: Point, normal: NormalEquations) -> float:
         """Return by how much the cost would fall in a whole step, if it were a parabola."""
         g, H = normal.reduced()
-        moves = ~self._stays(point.shared, g)
+        moves = ~staying(point.shared, g, self.lower, self.upper, self.held)
         gain = 0.5 * float(g[moves] @ np.linalg.lstsq(H[np.ix_(moves, moves)], g[moves], rcond=1e-14)[0])
         for b in normal.blocks:
             if b.g_o.size:
@@ -372,20 +407,7 @@ class Search:
         blocks = tuple(b._replace(H_oo=b.H_oo + damping * np.diag(np.diag(b.H_oo))) for b in normal.blocks)
         damped = NormalEquations(blocks, normal.g, normal.H + damping * np.diag(scale))
         g, H = damped.reduced()
-        x = point.shared
-        stays = self._stays(x, g)
-        change = np.zeros(len(x))
-        for _ in range(len(x) + 1):  # what a step would push over its bound goes to it, and the rest is solved again
-            moves = ~stays
-            if not moves.any():
-                break
-            of_fixed = H[np.ix_(moves, stays)] @ change[stays]
-            change[moves] = -np.linalg.lstsq(H[np.ix_(moves, moves)], g[moves] + of_fixed, rcond=1e-14)[0]
-            over = moves & ((x + change < self.lower) | (x + change > self.upper))
-            if not over.any():
-                break
-            change[over] = np.clip(x + change, self.lower, self.upper)[over] - x[over]
-            stays = stays | over
+        change = bounded_step(point.shared, g, H, self.lower, self.upper, self.held)
         own = list(point.own)
         largest = float(np.abs(change).max(initial=0.0))
         for k, b, belief, reach in zip(self.cases, damped.blocks, self.own, self.own_reach, strict=True):
@@ -394,7 +416,7 @@ class Search:
                 step = np.clip(point.own[k] + step, belief.mean - reach, belief.mean + reach) - point.own[k]
                 own[k] = point.own[k] + step
                 largest = max(largest, float(np.abs(step).max()))
-        return point._replace(shared=x + change, own=tuple(own)), largest
+        return point._replace(shared=point.shared + change, own=tuple(own)), largest
 
 
 # --- How a search begins ----------------------------------------------------------------------------------------------
