@@ -96,7 +96,7 @@ WRITERS = {
     "bench/recording/bench_wiring.py", "bench/recording/recorder.py", "bench/video/film_log.py",
     "bench/video/marker.py", "cli/bench.py", "cli/curves.py", "cli/curves_report.py", "cli/linear.py",
     "cli/linear_report.py", "cli/log.py", "cli/output_files.py", "cli/robot.py", "cli/robot_report.py",
-    "cli/robot_task_report.py", "cli/robot_tasks.py", "cli/web.py", "export/c_writing.py", "export/fmu.py",
+    "cli/robot_task_report.py", "cli/web.py", "export/c_writing.py", "export/fmu.py",
     "identification/report/page.py", "identification/sheets/sheet.py", "logs/csv_logs.py", "logs/sidecar.py",
     "look/reports.py", "look/style.py", "paper/report.py", "parameters/output_file.py", "parameters/servo_file.py",
     "plotting/block_diagrams.py", "plotting/files.py", "simulation/compile/building.py",

@@ -21,20 +21,19 @@ from servotwin.cli.robot_options import (
     as_options,
     check_drawing,
     check_numbers,
-    degrees,
     overlap_of,
     packages_of,
     servos_at,
     units_of,
-    validation_head,
-    validation_rows,
 )
 from servotwin.cli.robot_tasks import add_to, compare, mobile
-from servotwin.cli.terminal import emit_help, emit_json, pairs, patience, show, table
+from servotwin.cli.terminal import emit_help, pairs, patience, table
 from servotwin.text import file_stems
 
 if TYPE_CHECKING:
-    from servotwin.cli.output_files import Target
+    from rich.console import RenderableType
+
+    from servotwin.cli.robot_report import RobotResult
     from servotwin.identification.arms import ArmFit
     from servotwin.robots import Motion, RobotRun, RobotValidation, Sizing
 
@@ -63,30 +62,21 @@ def validate(
 ) -> None:
     """Replay recorded goals, and compare with the measured joints."""
     from servotwin.cli import robot_report as files
+    from servotwin.cli.robot_task_report import validation_result
     from servotwin.robots import validate_robot
     from servotwin.robots.replay import measured_joints
 
-    asked, force, as_json = options.asked_robot(model_file, dataset, servos, recorded), ending.force, ending.as_json
+    asked = options.asked_robot(model_file, dataset, servos, recorded)
 
-    def done(targets: Sequence[Target]) -> dict[str, Any]:
+    def compared() -> files.RobotResult:
         with as_options():
             found = validate_robot(asked.plant, asked.mounts, asked.motions, bus=asked.bus, joint_friction=friction,
                                    timestep=timestep, latency=latency, progress=True)
-        told = facts(found, model_file, asked.said)
-        _write(found, told, targets, force=force)
-        told["files"] = [str(target.path) for target in targets]
-        if not as_json:
-            _show(found, told)
-        return told
+        return validation_result(found, facts(found, model_file, asked.said))
 
-    if out is None:
-        told = done([])
-    else:
-        with files.folder(out):
-            windows = files.joint_pages(WINDOWS, len(measured_joints(asked.mounts, asked.motions)))
-            told = done(files.targets_of(out, [SUMMARY, ERRORS, *windows, PAGE], force=force, inputs=[dataset]))
-    if as_json:
-        emit_json(told)
+    windows = files.joint_pages(WINDOWS, len(measured_joints(asked.mounts, asked.motions)))
+    files.carried_out(compared, out, [SUMMARY, ERRORS, *windows, PAGE], force=ending.force, as_json=ending.as_json,
+                      inputs=[dataset])
 
 
 def facts(found: RobotValidation, robot: str, said: Sequence[str]) -> dict[str, Any]:
@@ -100,36 +90,6 @@ def facts(found: RobotValidation, robot: str, said: Sequence[str]) -> dict[str, 
         "worst": [{**window._asdict(), "episode": found.replays[window.replay].run.motion.source}
                   for window in found.windows],
         "notes": list(dict.fromkeys((*said, *found.said)))}
-
-
-def _show(found: RobotValidation, told: dict[str, Any]) -> None:
-    from servotwin.robots.replay import SERVOS
-
-    worst = found.windows[0]
-    late = ", ".join(f"{name} {1e3 * value:.0f} ms" for name, value in found.latency.items())
-    servos, rivals = [row[:6] for row in validation_rows(found)], [[row[0], *row[6:]] for row in validation_rows(found)]
-    titles = validation_head(found)
-    show(f"{told['robot']} beside {', '.join(told['episodes'][:3])}{' ...' if len(told['episodes']) > 3 else ''}: "
-         f"simulated less measured joints, rms {degrees(found.rms(SERVOS))} deg", "",
-         table(titles[:6], servos), "", "the same with other actuators, rms (deg)",
-         table([titles[0], *titles[6:]], rivals), "",
-         pairs([("goals act later by", late),
-                ("worst second", f"{worst.joint}, {worst.start:.2f} s of {told['worst'][0]['episode']}, {worst.kind}: "
-                 f"{degrees(worst.rms)} deg rms"),
-                *(("note", text) for text in told["notes"]),
-                *((("written", told["files"][-1]),) if told["files"] else ())]))
-
-
-def _write(found: RobotValidation, told: dict[str, Any], targets: Sequence[Target], *, force: bool) -> None:
-    if not targets:
-        return
-    from servotwin import plotting
-    from servotwin.cli.output_files import json_of, text_of, write_files
-    from servotwin.cli.robot_task_report import errors_picture, validation_page, window_writers
-
-    write_files(targets, {
-        SUMMARY: json_of(told), ERRORS: lambda path: plotting.save(errors_picture(found), path),
-        **window_writers(found), PAGE: text_of(lambda: validation_page(found, told))}, force=force)
 
 
 # --- `servotwin robot fit`: servos, supply, links, zeros and latency of a robot from its episodes ---------------------
@@ -165,69 +125,51 @@ def fit(
     from servotwin.identification.arms.identify_arm import UNKNOWN, mounts_of, plant_of
     from servotwin.robots.motion import joints_of_dataset
 
-    limit, force, as_json = duration("--within", within), ending.force, ending.as_json
+    limit = duration("--within", within)
     plant, unknown = plant_of(UNKNOWN, joints_of_dataset(logs)) if model_file == UNKNOWN else (None, ())
     asked = options.asked_robot(model_file, logs, servos, recorded, plant)
 
-    def done(names: Sequence[str]) -> tuple[ArmFit, dict[str, Any]]:
-        targets = files.targets_of(out, names, force=force, inputs=[logs]) if out is not None else []
-        with as_options(), best_kept(shown=not as_json) as progress:
+    def fitted() -> files.RobotResult:
+        with as_options(), best_kept(shown=not ending.as_json) as progress:
             found = identify_arm(asked.motions, UNKNOWN if unknown else asked.plant, asked.mounts, bus=asked.bus,
                                  each=each, masses=masses, holdout=holdout, intervals=intervals, diagnose=diagnose,
                                  within=limit, progress=progress)
         told = {"robot": model_file, "episodes": [one.source for one in asked.motions], **found.facts()}
         told["warnings"] = [*asked.said, *told["warnings"]]
-        _write_fit(found, told, targets, stems, force=force)
-        told["files"] = [str(target.path) for target in targets]
-        if not as_json:
-            _show_fit(found, told)
-        return found, told
+        return _fit_result(found, told, stems)
 
     with as_options():  # of the servos at recorded joints, the only ones that are fitted
         stems = file_stems(mounts_of(asked.mounts, model_file, asked.plant, asked.motions)[0])
-    written = [f"{stem}.toml" for stem in stems.values()]
-    windows = files.joint_pages(WINDOWS, len(stems))
-    if out is None:
-        found, told = done([])
-    else:
-        with files.folder(out):
-            found, told = done([*written, SUMMARY, ERRORS, *windows, PAGE])
-    if as_json:
-        emit_json(told)
-    end_if_stopped(found, timed=within is not None)
+    names = [*(f"{stem}.toml" for stem in stems.values()), SUMMARY, ERRORS,
+             *files.joint_pages(WINDOWS, len(stems)), PAGE]
+    result = files.carried_out(fitted, out, names, force=ending.force, as_json=ending.as_json, inputs=[logs])
+    end_if_stopped(result.source, timed=within is not None)
 
 
-def _show_fit(found: ArmFit, told: dict[str, Any]) -> None:
-    from servotwin.identification.report.page import error_rows, estimate_rows
-
-    head, rows = error_rows(found)
-    said = [*map(str, found.unidentifiable), *map(str, found.left_out), *told["warnings"]]
-    show(f"{told['robot']}: {told['sentence']}", *(f"! {cause.sentence}" for cause in found.causes), "",
-         "simulated less measured, rms (deg)", table(head, rows), "",
-         table(("number", "value", f"{100 * found.level:g} % interval", "known"), estimate_rows(found)), "",
-         pairs([*(("note", text) for text in said),
-                *((("written", told["files"][-1]),) if told["files"] else ())]))
-
-
-def _write_fit(found: ArmFit, told: dict[str, Any], targets: Sequence[Target], stems: dict[str, str], *,
-           force: bool) -> None:
-    if not targets:
-        return
-    from servotwin import plotting
-    from servotwin.cli.output_files import json_of, text_of, write_files
-    from servotwin.cli.robot_report import joint_pages
-    from servotwin.cli.robot_task_report import errors_picture, window_writers
-    from servotwin.identification.report.page import arm_page
+def _fit_result(found: ArmFit, told: dict[str, Any], stems: dict[str, str]) -> RobotResult:
+    from servotwin.cli.output_files import Writers, json_of, text_of
+    from servotwin.cli.robot_report import RobotResult, joint_pages
+    from servotwin.cli.robot_task_report import validation_pictures
+    from servotwin.identification.report.page import arm_page, error_rows, estimate_rows
     from servotwin.look.reports import Beside
 
     judged = found.holdout or found.training
     pictures = [Beside([ERRORS], "The same beside ideal actuators."), Beside(
         joint_pages(WINDOWS, len(judged.windows)), "The second of each joint in which the fitted servos are furthest "
         "off, the worst joint first.")]
-    write_files(targets, {
-        **{f"{stems[joint]}.toml": partial(servo.save, overwrite=True) for joint, servo in found.servos.items()},
-        SUMMARY: json_of(told), ERRORS: lambda path: plotting.save(errors_picture(judged), path),
-        **window_writers(judged), PAGE: text_of(lambda: arm_page(found, pictures))}, force=force)
+    said = [*map(str, found.unidentifiable), *map(str, found.left_out), *told["warnings"]]
+
+    def writers() -> Writers:
+        return {**{f"{stems[joint]}.toml": partial(servo.save, overwrite=True)
+                   for joint, servo in found.servos.items()}, SUMMARY: json_of(told), **validation_pictures(judged),
+                PAGE: text_of(lambda: arm_page(found, pictures))}
+
+    return RobotResult(
+        facts=told, title=f"{told['robot']}: {told['sentence']}", writers=writers, source=found, lines=lambda more: [
+            *(f"! {cause.sentence}" for cause in found.causes), "", "simulated less measured, rms (deg)",
+            table(*error_rows(found)), "",
+            table(("number", "value", f"{100 * found.level:g} % interval", "known"), estimate_rows(found)), "",
+            pairs([*(("note", text) for text in said), *more])])
 
 
 # --- `servotwin robot`: robots whose joints are servos ----------------------------------------------------------------
@@ -309,9 +251,9 @@ def run(
         followed = replace(followed, robot="")
     picture = check_drawing(plant.model, camera, video=video)
     inputs = [Path(model_file), motion, *([] if recorded.calibration is None else [recorded.calibration])]
-    with files.folder(out):
-        targets = files.targets_in(out, servos=len(mounts), picture=picture, video=video, force=ending.force,
-                                   inputs=inputs)
+    names = files.run_names(len(mounts), picture=picture, video=video)
+
+    def follow() -> files.RobotResult:
         with as_options():
             done = run_motion(plant, mounts, followed, bus=servos.bus, joint_friction=friction, timestep=timestep,
                               settle=settle, hold=hold or ("previous" if is_dataset(motion) else "linear"),
@@ -319,13 +261,13 @@ def run(
             done = replace(done, said=(*done.said, *left))
             sized = sizing_of(done)
         found = facts(done, sized, model_file)
-        files.write_all(done, sized, targets, found, force=ending.force, output_step=output_step, camera=camera,
-                        rate=rate)
-    found["files"] = [str(target.path) for target in targets]
-    if ending.as_json:
-        emit_json(found)
-    else:
-        _show_run(done, sized, found)
+        return files.RobotResult(
+            facts=found, title=f"{found['robot']} follows {done.motion.source}, {done.motion.duration:.4g} s",
+            lines=lambda more: _lines(done, sized, found, more), source=done,
+            writers=lambda: files.run_writers(done, sized, names, found, output_step),
+            draw=lambda places: files.draw_run(places, done, camera, rate))
+
+    files.carried_out(follow, out, names, force=ending.force, as_json=ending.as_json, inputs=inputs)
 
 
 def _read(path: Path, joints: dict[str, str], ranges: dict[str, tuple[float, float]], **options: Any) -> Motion:
@@ -335,7 +277,8 @@ def _read(path: Path, joints: dict[str, str], ranges: dict[str, tuple[float, flo
         return read_motion(path, joints, ranges=ranges, **options)
 
 
-def _show_run(done: RobotRun, sized: dict[str, Sizing], found: dict[str, Any]) -> None:
+def _lines(done: RobotRun, sized: dict[str, Sizing], found: dict[str, Any],
+           more: Sequence[tuple[str, str]]) -> list[RenderableType]:
     from servotwin.cli.robot_report import HEAD, heat_is_assumed, place, row
 
     servos: dict[str, list[str]] = {}
@@ -343,19 +286,17 @@ def _show_run(done: RobotRun, sized: dict[str, Sizing], found: dict[str, Any]) -
         servos.setdefault(f"{mount.model.servo.name}, model {found['joints'][joint]['model']}", []).append(joint)
     assumed = [joint for joint in done.mounts if heat_is_assumed(done, joint) and sized[joint].heating is not None]
     unknown = [joint for joint in done.mounts if sized[joint].heating is None]
-    show(f"{found['robot']} follows {done.motion.source}, {done.motion.duration:.4g} s",
-         pairs([(name, ", ".join(joints)) for name, joints in servos.items()]), "",
-         table(HEAD, [row(done, each) for each in sized.values()]), "",
-         "are the servos big enough?",
-         pairs([(joint, each.verdict) for joint, each in sized.items()]), "",
-         pairs([*([("assumed", f"thermal numbers by mass: {', '.join(assumed)}")] if assumed else []),
+    return [pairs([(name, ", ".join(joints)) for name, joints in servos.items()]), "",
+            table(HEAD, [row(done, each) for each in sized.values()]), "", "are the servos big enough?",
+            pairs([(joint, each.verdict) for joint, each in sized.items()]), "",
+            pairs([*([("assumed", f"thermal numbers by mass: {', '.join(assumed)}")] if assumed else []),
                 *([("not known", f"temperatures, for neither thermal numbers nor a mass are given: "
                     f"{', '.join(unknown)}")] if unknown else []),
                 *([("off the measured joints", ", ".join(
                     f"{joint} {place(done.measured_error(joint), done.slides(joint))}" for joint in done.mounts
                     if joint in done.motion.measured) + ", rms")] if done.motion.measured else []),
                 *(("note", text) for text in found["notes"][:_MOST_NOTES]),
-                ("written", found["files"][-1])]))
+                *more])]
 
 
 add_to(robot)

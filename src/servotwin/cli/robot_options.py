@@ -408,6 +408,7 @@ def asked_robot(model_file: str, dataset: Path, servos: Servos, recorded: Record
     said = (f"registers assumed as LeRobot writes them for {model_file} (sets {', '.join(own)})",) if own else ()
     return Asked(plant=found.model, mounts=mounts, bus=servos.bus, motions=motions, said=(*found.said, *said, *left))
 
+
 _RATES = (1.0, 120.0)  # pictures a second
 
 

@@ -5,23 +5,26 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from servotwin.cli.output_files import Target, check_targets, json_of, page_name, text_of, write_files
+from servotwin.cli.output_files import Target, Writers, check_targets, json_of, page_name, text_of, write_files
 from servotwin.cli.summary import model_name, supply_facts
+from servotwin.cli.terminal import emit_json, show
 from servotwin.errors import OutputError
-from servotwin.look import document, escape, table
-from servotwin.look.reports import Beside, cards, notes, signs
+from servotwin.look import escape
+from servotwin.look.reports import Beside, Cards, Html, Report, Section, Table, notes, signs
 from servotwin.parameters.output_file import undone
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
+    from rich.console import RenderableType
 
     from servotwin.robots import RobotRun, Sizing
     from servotwin.robots.camera import Trail
@@ -161,17 +164,74 @@ def _remove_if_empty(path: Path) -> None:
         path.rmdir()
 
 
-def targets_in(out: Path, *, servos: int, picture: bool, video: bool, force: bool,
-               inputs: Sequence[Path] = ()) -> list[Target]:
-    """Return the files to be written of so many servos into a folder that is there, checked.
+@dataclass(frozen=True, kw_only=True)
+class RobotResult:
+    """The result of a command of robots: for JSON, for files, and for the terminal.
+
+    Parameters
+    ----------
+    facts : dict
+        Plain numbers in SI, for JSON.
+    title : str
+        The terminal's first line.
+    lines : callable
+        Returns what the terminal shows below it, with rows on the files at the end of a list of pairs.
+    writers : callable
+        Returns what writes the files, by their names.
+    draw : callable, optional
+        Writes what takes longest, as of `write_files`.
+    source : object
+        What was simulated, compared or fitted.
+    """
+
+    facts: dict[str, Any]
+    title: str
+    lines: Callable[[Sequence[tuple[str, str]]], Iterable[RenderableType]]
+    writers: Callable[[], Writers]
+    draw: Callable[[Mapping[str, Path]], object] | None = None
+    source: Any = None
+
+
+def carried_out(work: Callable[[], RobotResult], out: Path | None, names: Sequence[str], *, force: bool,
+                as_json: bool, inputs: Sequence[Path] = ()) -> RobotResult:
+    """Check where files go, do the work of a command, write all of its files or none, and show what it found.
+
+    Parameters
+    ----------
+    work : callable
+    out : Path, optional
+        Folder; no files unless given.
+    names : sequence of str
+        Of the files; the last is shown.
+    force : bool
+        Whether files that are there may be replaced.
+    as_json : bool
+    inputs : sequence of Path
+        Files that are read, and may not be written.
 
     Raises
     ------
     OutputExistsError, OutputError
         As `check_targets` does.
     """
-    names = [SERVOS, JOINTS, SUMMARY, *servo_pictures(servos), *drawn_names(picture=picture, video=video)]
-    return targets_of(out, [*names, PAGE], force=force, inputs=inputs)
+    with folder(out) if out is not None else nullcontext():
+        targets = [] if out is None else [
+            Target(option=_OPTION, path=out / name, endings=(Path(name).suffix,)) for name in names]
+        check_targets(targets, force=force, inputs=inputs)
+        result = work()
+        if targets:
+            write_files(targets, result.writers(), force=force, draw=result.draw)
+    written = result.facts["files"] = [str(target.path) for target in targets]
+    if as_json:
+        emit_json(result.facts)
+    else:
+        show(result.title, *result.lines([("written", written[-1])] if written else []))
+    return result
+
+
+def run_names(servos: int, *, picture: bool, video: bool) -> list[str]:
+    """Return the names of the files of a motion that so many servos have followed."""
+    return [SERVOS, JOINTS, SUMMARY, *servo_pictures(servos), *drawn_names(picture=picture, video=video), PAGE]
 
 
 def servo_pictures(servos: int) -> list[str]:
@@ -191,62 +251,34 @@ def drawn_names(*, picture: bool, video: bool) -> list[str]:
     return [*([PICTURE] if picture else []), *([VIDEO] if video else [])]
 
 
-def targets_of(out: Path, names: Iterable[str], *, force: bool, inputs: Sequence[Path] = ()) -> list[Target]:
-    """Return files of these names in a folder, checked.
-
-    Raises
-    ------
-    OutputExistsError, OutputError
-        As `check_targets` does.
-    """
-    found = [Target(option=_OPTION, path=out / name, endings=(Path(name).suffix,)) for name in names]
-    check_targets(found, force=force, inputs=inputs)
-    return found
-
-
-def write_all(run: RobotRun, sized: Mapping[str, Sizing], targets: Sequence[Target], found: Mapping[str, Any], *,
-              force: bool, output_step: float, camera: str | None, rate: float,
-              more: Mapping[str, Callable[[Path], object]] | None = None, section: str = "",
-              trails: Trails | None = None, still: int | None = None) -> None:
-    """Write all files, or after an error none.
+def run_writers(run: RobotRun, sized: Mapping[str, Sizing], names: Sequence[str], found: Mapping[str, Any],
+                output_step: float, sections: Sequence[Section] = (), still: int | None = None) -> Writers:
+    """Return what writes the files of a run that are not drawn of the robot.
 
     Parameters
     ----------
     run : RobotRun
     sized : mapping of str to Sizing
-    targets : sequence of Target
+    names : sequence of str
+        Of all files.
     found : mapping
-        What `facts` says of the run.
-    force : bool
-        Whether files that are there may be replaced.
+        What `run_facts` says of the run.
     output_step : float
         Between the rows of tables [s]
-    camera : str, optional
-        By which the robot is seen.
-    rate : float
-        Pictures of the video a second [Hz]
-    more : mapping of str to callable
-        Writers of further files, by name.
-    section : str
-        HTML on them, for the page.
-    trails : callable
-        Lines that are drawn in pictures, by the number of the row.
+    sections : sequence of Section
+        Of the page, on further files.
     still : int, optional
         Row that the picture is of; that of the largest error unless given.
     """
     when = "At the time of the largest error." if still is None else f"At {run.time[still]:.2f} s."
-    names = [target.path.name for target in targets]
-    write_files(targets, {
-        SERVOS: lambda path: run.record.save(path, every=_every(run, output_step)),
-        JOINTS: text_of(lambda: _joint_table(run, output_step)), SUMMARY: json_of(found),
-        PAGE: text_of(lambda: page(run, sized, found, names, section, when)),
-        **_pictures(run, sized), **(more or {})}, force=force,
-        draw=lambda places: _robot(run, places[PICTURE], places.get(VIDEO), camera, rate, trails or (lambda k: ()),
-                                   still) if PICTURE in places else None)
+    return {SERVOS: lambda path: run.record.save(path, every=every(run.time, output_step)),
+            JOINTS: text_of(lambda: _joint_table(run, output_step)), SUMMARY: json_of(found),
+            PAGE: text_of(lambda: page(run, sized, found, names, sections, when)), **_pictures(run, sized)}
 
 
-def _every(run: RobotRun, output_step: float) -> int:
-    return max(round(output_step / float(run.time[1] - run.time[0])), 1)
+def every(time: NDArray[np.float64], step: float) -> int:
+    """Return which rows of evenly spaced times [s] a table with a step [s] has: each so many-th."""
+    return max(round(step / float(time[1] - time[0])), 1)
 
 
 def _joint_table(run: RobotRun, output_step: float) -> str:
@@ -254,7 +286,7 @@ def _joint_table(run: RobotRun, output_step: float) -> str:
     from servotwin.tables import csv_text
     from servotwin.units import from_si
 
-    every, columns = _every(run, output_step), {"time_s": run.time}
+    rows, columns = every(run.time, output_step), {"time_s": run.time}
     for joint in run.mounts:
         slides = run.slides(joint)
         unit, dimension = ("mm", "length") if slides else ("deg", "angle")
@@ -267,7 +299,7 @@ def _joint_table(run: RobotRun, output_step: float) -> str:
             columns[f"{joint}.{name}_{unit}"] = np.asarray(from_si(values, unit, dimension))
         columns[f"{joint}.needed_{'force_N' if slides else 'torque_Nm'}"] = run.ideal.torque[joint]
         columns[f"{joint}.delivered_{'force_N' if slides else 'torque_Nm'}"] = run.record[joint]["joint_torque"]
-    return csv_text({name: (values[::every] + 0.0).tolist() for name, values in columns.items()}, digits=9)
+    return csv_text({name: (values[::rows] + 0.0).tolist() for name, values in columns.items()}, digits=9)
 
 
 def _pictures(run: RobotRun, sized: Mapping[str, Sizing]) -> dict[str, Callable[[Path], object]]:
@@ -311,11 +343,16 @@ def _shaft(sized: Sizing, inside: Any) -> Any:
                                sized.rms_torque, sized.lasting_torque)
 
 
-def _robot(run: RobotRun, picture: Path, video: Path | None, camera: str | None, rate: float, trails: Trails,
-           still: int | None) -> None:
-    """Draw the robot where it is furthest off, or at a row, and all of it as a video."""
+def draw_run(places: Mapping[str, Path], run: RobotRun, camera: str | None, rate: float,
+             trails: Trails = lambda k: (), still: int | None = None) -> None:
+    """Draw the robot where it is furthest off, or at a row, and all of it as a video of a rate [Hz].
+
+    `trails` returns the lines that are drawn at a row; nothing is drawn where there is no place for a picture.
+    """
     from servotwin.robots.camera import Camera
 
+    if PICTURE not in places:
+        return
     errors = np.max([np.abs(run.goal(joint) - run.record[joint]["joint_angle"]) for joint in run.mounts], axis=0)
     inside = np.flatnonzero((run.time >= 0.0) & (run.time <= run.motion.duration))
 
@@ -325,12 +362,12 @@ def _robot(run: RobotRun, picture: Path, video: Path | None, camera: str | None,
                                 note="pale: with ideal actuators", trails=trails(k))
 
         worst = int(inside[np.argmax(errors[inside])])
-        picture_and_video(drawn, run.time, worst if still is None else still, picture, video, rate)
+        picture_and_video(drawn, run.time, worst if still is None else still, places, rate)
 
 
-def picture_and_video(drawn: Callable[[int], Any], time: NDArray[np.float64], still: int, picture: Path,
-                      video: Path | None, rate: float) -> None:
-    """Write one picture, and all as a video.
+def picture_and_video(drawn: Callable[[int], Any], time: NDArray[np.float64], still: int, places: Mapping[str, Path],
+                      rate: float) -> None:
+    """Write one picture, and all as a video if there is a place for one.
 
     Parameters
     ----------
@@ -340,20 +377,20 @@ def picture_and_video(drawn: Callable[[int], Any], time: NDArray[np.float64], st
         Of the rows [s]
     still : int
         Which row the picture is of.
-    picture, video : Path
-        None: no video.
+    places : mapping of str to Path
+        Of both, by name.
     rate : float
         [Hz]
     """
     from servotwin.robots.camera import Video, png
     from servotwin.simulation.progress import shown
 
-    picture.write_bytes(png(drawn(still)))
-    if video is None:
+    places[PICTURE].write_bytes(png(drawn(still)))
+    if VIDEO not in places:
         return
     times = np.arange(0.0, time[-1], 1.0 / rate)
     frames = np.minimum(np.searchsorted(time, times), len(time) - 1).tolist()
-    with Video(video, *SIZE, rate) as written, shown(True, len(frames), "drawing the video") as tell:
+    with Video(places[VIDEO], *SIZE, rate) as written, shown(True, len(frames), "drawing the video") as tell:
         for done, k in enumerate(frames):
             written.add(drawn(k))
             tell(done + 1)
@@ -371,28 +408,30 @@ figure img,figure video{width:100%;height:auto}figure.film{max-width:44rem}
 
 
 def page(run: RobotRun, sized: Mapping[str, Sizing], found: Mapping[str, Any], files: Sequence[str],
-         section: str = "", when: str = "") -> str:
-    """Return the page of a run, with a section of its own; pictures and video stand beside it, those of `files`."""
+         sections: Sequence[Section] = (), when: str = "") -> str:
+    """Return the page of a run, with sections of its own; pictures and video stand beside it, those of `files`."""
     motion_name = Path(run.motion.source).name
     title, count = f"{found['robot']}: {motion_name}", len(run.mounts)
     servos = sorted({f"{mount.model.servo.title or mount.model.servo.name} ({type(mount.model).__name__})"
                      for mount in run.mounts.values()})
     lead = (f"{len(run.mounts)} servo{'s' * (len(run.mounts) != 1)} ({'; '.join(servos)}) follow "
             f"{run.motion.source}, {run.motion.duration:.4g} s{_supply_words(run)}.")
-    body = (f'<h1>{escape(title)}</h1>\n<p class="lead">{escape(lead)}</p>\n{_answer(sized)}{_notes(run)}'
-            f"{_cards(run, sized)}{film(files, when)}{section}<h2>Is the servo big enough</h2>\n{_sizes(run, sized)}"
-            + figures(joint_pages(SIZING, count), "Torque over speed of each servo: what the motion takes, rotor and "
-                      "gear included, and what the servo gave, as means over 20 ms, in its curve at full drive. "
-                      "Filled: the servo drives the motion; open: it holds it back. The number is the margin.")
-            + f"<h2>Following the motion</h2>\n{_tracking(run)}"
-            + figures(joint_pages(TRACKING, count), "Goal, servo and ideal actuator"
-                      f"{', and the measured joint' if run.motion.measured else ''}. Dashed lines: the motion "
-                      "begins and ends; before and after it the robot holds its goal.")
-            + "<h2>Currents, supply, temperatures</h2>\n"
-            + figures(joint_pages(ELECTRICAL, count), "Motor current as its mean and, pale, all between the smallest "
-                      f"and the largest; voltage at the servo; temperatures.{_heat_words(run)}")
-            + f"<section><h2>How to read this page</h2>{_READING}</section>\n")
-    return document(title, body, style=STYLE)
+    measured = ", and the measured joint" if run.motion.measured else ""
+    return Report(title, escape(lead), [
+        Section("", [Html(_answer(sized)), Html(notes([signs(text) for text in run.notes])), _cards(run, sized),
+                     Html(film(files, when))]),
+        *sections,
+        Section("Is the servo big enough", [_sizes(sized), Beside(
+            joint_pages(SIZING, count), "Torque over speed of each servo: what the motion takes, rotor and gear "
+            "included, and what the servo gave, as means over 20 ms, in its curve at full drive. Filled: the servo "
+            "drives the motion; open: it holds it back. The number is the margin.")]),
+        Section("Following the motion", [_tracking(run), Beside(
+            joint_pages(TRACKING, count), f"Goal, servo and ideal actuator{measured}. Dashed lines: the motion begins "
+            "and ends; before and after it the robot holds its goal.")]),
+        Section("Currents, supply, temperatures", [Beside(
+            joint_pages(ELECTRICAL, count), "Motor current as its mean and, pale, all between the smallest and the "
+            f"largest; voltage at the servo; temperatures.{_heat_words(run)}")]),
+        Section("How to read this page", [Html(_READING)])], style=STYLE).page
 
 
 def _supply_words(run: RobotRun) -> str:
@@ -400,10 +439,6 @@ def _supply_words(run: RobotRun) -> str:
         return ", each on its own supply"
     R = run.bus.internal_resistance
     return f", all on {run.bus.open_circuit_voltage:g} V" + (f" behind {R:g} Ω" if R else "")
-
-
-def _notes(run: RobotRun) -> str:
-    return notes([signs(text) for text in run.notes])
 
 
 def _answer(sized: Mapping[str, Sizing]) -> str:
@@ -417,11 +452,11 @@ def _answer(sized: Mapping[str, Sizing]) -> str:
     return f'<div class="no"><p>Not all servos are big enough:</p><ul>{said}</ul></div>\n'
 
 
-def _cards(run: RobotRun, sized: Mapping[str, Sizing]) -> str:
+def _cards(run: RobotRun, sized: Mapping[str, Sizing]) -> Cards:
     least = min(sized.values(), key=lambda each: each.margin)
     furthest = max(run.tracking, key=lambda joint: (not run.slides(joint), run.tracking[joint].rms))
     shown = [(margin_words(least.margin), f"least margin, {least.joint}"),
-             (signs(place(run.tracking[furthest].rms, run.slides(furthest))), f"error, rms, {furthest}")]
+             (place(run.tracking[furthest].rms, run.slides(furthest)), f"error, rms, {furthest}")]
     currents = {joint: found.peak_current for joint, found in run.tracking.items()}
     most = max(currents, key=lambda joint: currents[joint])
     shown.append((f"{currents[most]:.2f} A", f"peak motor current, {most}"))
@@ -431,8 +466,8 @@ def _cards(run: RobotRun, sized: Mapping[str, Sizing]) -> str:
     warm = {joint: found.winding for joint, found in run.tracking.items() if not math.isnan(found.winding)}
     if warm:
         hottest = max(warm, key=lambda joint: warm[joint])
-        shown.append((signs(celsius(warm[hottest])), f"hottest winding, {hottest}"))
-    return cards([(escape(value), escape(words)) for value, words in shown])
+        shown.append((celsius(warm[hottest]), f"hottest winding, {hottest}"))
+    return Cards(shown)
 
 
 def film(files: Sequence[str], when: str = "") -> str:
@@ -442,21 +477,11 @@ def film(files: Sequence[str], when: str = "") -> str:
         return (f'<figure class="film"><video controls loop muted poster="robot.png" src="robot.webm"></video>'
                 f"<figcaption>{words}</figcaption></figure>\n")
     if "robot.png" in files:
-        return figure("robot.png", f"{words} {when}", kind="film")
+        return Beside(["robot.png"], f"{words} {when}", "film").html
     return ""
 
 
-def figure(name: str, words: str, *, kind: str = "wide") -> str:
-    """Return a picture with words below it."""
-    return figures([name], words, kind=kind)
-
-
-def figures(names: Sequence[str], words: str, *, kind: str = "wide") -> str:
-    """Return the pages of a picture, one below the other, with words below them."""
-    return Beside(names, words, kind).html
-
-
-def _sizes(run: RobotRun, sized: Mapping[str, Sizing]) -> str:
+def _sizes(sized: Mapping[str, Sizing]) -> Table:
     head = ["joint", "margin", "at", "needs", "has", "speed", "needs, rms", "lifts without end", "repeated: winding",
             "verdict"]
     rows = []
@@ -465,13 +490,11 @@ def _sizes(run: RobotRun, sized: Mapping[str, Sizing]) -> str:
         rows.append([
             each.joint, margin_words(each.margin), f"{worst.time:.2f} s", f"{worst.torque:.3g} N m",
             f"{worst.available:.3g} N m", f"{math.degrees(worst.speed):.0f}°/s", f"{each.rms_torque:.3g} N m",
-            _or_dash(each.lasting_torque, "{:.3g} N m"), "–" if heat is None else signs(celsius(heat.winding)),
-            signs(each.verdict)])
-    drawn = table(head, [[escape(cell) for cell in row] for row in rows], text_columns=len(head))
-    return f'<div class="joints">{drawn}</div>\n'
+            _or_dash(each.lasting_torque, "{:.3g} N m"), "–" if heat is None else celsius(heat.winding), each.verdict])
+    return Table(head, rows, text_columns=len(head), kind="joints")
 
 
-def _tracking(run: RobotRun) -> str:
+def _tracking(run: RobotRun) -> Table:
     measured = bool(run.motion.measured)
     head = ["joint", "servo", *(["off the measured joint, rms"] if measured else []), "error, rms", "largest",
             "late by", "error left", "stands off before", "after",
@@ -481,14 +504,12 @@ def _tracking(run: RobotRun) -> str:
         slides = run.slides(joint)
         rows.append([
             joint, run.mounts[joint].model.servo.name,
-            *([signs(place(run.measured_error(joint), slides)) or "–"] if measured else []),
-            *(signs(place(value, slides)) for value in (found.rms, found.largest)),
+            *([place(run.measured_error(joint), slides) or "–"] if measured else []),
+            *(place(value, slides) for value in (found.rms, found.largest)),
             _or_dash(1e3 * found.delay, "{:.0f} ms"),
-            *(signs(place(value, slides)) or "–" for value in (
-                found.rms_delayed, found.droop_before, found.droop_after)),
+            *(place(value, slides) or "–" for value in (found.rms_delayed, found.droop_before, found.droop_after)),
             f"{found.peak_current:.2f} A", f"{found.mean_current:.3f} A", _or_dash(found.lowest_voltage, "{:.2f} V")])
-    drawn = table(head, [[escape(cell) for cell in row] for row in rows], text_columns=len(head))
-    return f'<div class="joints">{drawn}</div>\n'
+    return Table(head, rows, text_columns=len(head), kind="joints")
 
 
 def _or_dash(value: float, form: str) -> str:

@@ -13,13 +13,14 @@ import numpy as np
 
 from servotwin import plotting
 from servotwin.cli import robot_report as files
-from servotwin.cli.output_files import json_of, text_of, write_files
+from servotwin.cli.output_files import json_of, text_of
 from servotwin.cli.robot_options import ERRORS, WINDOWS, degrees, validation_head, validation_rows
 from servotwin.cli.robot_report import STYLE, film, joint_pages
 from servotwin.cli.robot_report import run_facts as facts
+from servotwin.cli.terminal import pairs, table
 from servotwin.errors import InputError
 from servotwin.look import escape
-from servotwin.look.reports import Beside, Cards, Html, Report, Section, Table, report_html
+from servotwin.look.reports import Beside, Cards, Html, Report, Section, Table
 from servotwin.robots.controllers import STEERINGS
 from servotwin.robots.replay import ALL, SERVOS
 from servotwin.robots.task_run import CONDITIONS, FIDELITIES, NOMINAL
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from servotwin.cli.output_files import Target
+    from servotwin.cli.output_files import Writers
     from servotwin.robots import RobotValidation, Sizing, WaypointRun
     from servotwin.robots.arm import Arm
     from servotwin.robots.camera import Trail
@@ -41,8 +42,8 @@ if TYPE_CHECKING:
 
 # --- What the page of an arm says of its task: contour error, and the use of a redundant joint ------------------------
 
-def task_section(found: Mapping[str, Any], ways: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return the section on tool and redundancy, for the page of servos that did a task.
+def task_sections(found: Mapping[str, Any], ways: Sequence[str], rows: Sequence[Sequence[str]]) -> list[Section]:
+    """Return the sections on tool and redundancy, for the page of servos that did a task.
 
     Parameters
     ----------
@@ -58,12 +59,12 @@ def task_section(found: Mapping[str, Any], ways: Sequence[str], rows: Sequence[S
               f"{math.degrees(metrics['angle_rms']):.2f}°", f"{metrics['effort']:.2f} V",
               _chatter(metrics["chatter"], bypassed=found["chips_bypassed"]), _joules(metrics["energy"])],
              ["ideal", _mm(ideal["rms"]), _mm(ideal["largest"]), "–", "–", "–", "–", "–"]]
-    return report_html([
+    return [
         Section("The tool", ["The contour error is the distance of the tool from its path, however late it is.",
                              Table(head, lines, text_columns=len(head), kind="joints"),
                              Beside(["tool.png"], "The tool's path, asked for and done, and its distance from the path "
                                     "over time.")]),
-        *_redundancy(ways, rows)])
+        *_redundancy(ways, rows)]
 
 
 def ideal_page(found: Mapping[str, Any], files: Sequence[str], ways: Sequence[str],
@@ -164,23 +165,26 @@ def mobile_pairs(found: dict[str, Any]) -> list[tuple[str, str]]:
              f"{math.degrees(found['turned_astray']):z.2g} deg at the end")]
 
 
-def write(run: WaypointRun, found: dict[str, Any], targets: Sequence[Any], output_step: float, *, force: bool) -> None:
-    """Write all files, or after an error none."""
+def mobile_result(run: WaypointRun, found: dict[str, Any], names: Sequence[str],
+                  output_step: float) -> files.RobotResult:
+    """Return what is told and written of a drive."""
     label, record = "ideal wheels" if run.record is None else "servos", run.record
-    writers: dict[str, Callable[[Path], object]] = {
-        PATHS: lambda path: plotting.save(plotting.robot_paths(
-            [plotting.PathTrace(label, run.path, run.believed)], run.waypoints), path),
-        PATH_TABLE: text_of(lambda: _path_table(run, output_step)), files.SUMMARY: json_of(found),
-        files.PAGE: text_of(lambda: _page(found, [target.path.name for target in targets]))}
-    if record is not None:
-        every = max(round(output_step / float(record.time[1] - record.time[0])), 1)
-        writers[files.SERVOS] = lambda path: record.save(path, every=every)
-    write_files(targets, writers, force=force, draw=lambda places: _draw(
-        run, places[files.PICTURE], places.get(files.VIDEO)) if files.PICTURE in places else None)
+
+    def writers() -> Writers:
+        servos: Writers = {} if record is None else {
+            files.SERVOS: lambda path: record.save(path, every=files.every(record.time, output_step))}
+        return {PATHS: lambda path: plotting.save(plotting.robot_paths(
+                    [plotting.PathTrace(label, run.path, run.believed)], run.waypoints), path),
+                PATH_TABLE: text_of(lambda: _path_table(run, output_step)), files.SUMMARY: json_of(found),
+                files.PAGE: text_of(lambda: _page(found, names)), **servos}
+
+    return files.RobotResult(facts=found, title=f"mobile: {len(run.waypoints)} waypoints", writers=writers,
+                             lines=lambda more: [pairs([*mobile_pairs(found), *more])],
+                             draw=lambda places: _draw(places, run), source=run)
 
 
 def _path_table(run: WaypointRun, step: float) -> str:
-    rows = slice(None, None, max(round(step / float(run.time[1] - run.time[0])), 1))
+    rows = slice(None, None, files.every(run.time, step))
     columns: dict[str, Any] = {"time_s": run.time}
     for who, values in (("is", run.path), ("believes", run.believed)):
         columns |= {f"{who}_x_m": values[:, 0], f"{who}_y_m": values[:, 1],
@@ -190,19 +194,21 @@ def _path_table(run: WaypointRun, step: float) -> str:
     return csv_text({name: values[rows].tolist() for name, values in columns.items()}, digits=9)
 
 
-def _draw(run: WaypointRun, picture: Path, video: Path | None) -> None:
+def _draw(places: Mapping[str, Path], run: WaypointRun) -> None:
     from servotwin.robots.camera import Camera, Trail
 
+    if files.PICTURE not in places:
+        return
     corners = np.column_stack([run.waypoints, np.full(len(run.waypoints), _ABOVE)])
-    places = np.column_stack([run.path[:, :2], np.full(len(run.path), 2.0 * _ABOVE)])
+    driven = np.column_stack([run.path[:, :2], np.full(len(run.path), 2.0 * _ABOVE)])
     asked = Trail(corners, _ASKED)
 
     def trails(k: int) -> list[Trail]:
-        return [asked, Trail(places[:k + 1][::max(k // _SPARSE, 1)], _REAL)]
+        return [asked, Trail(driven[:k + 1][::max(k // _SPARSE, 1)], _REAL)]
 
     with Camera(run.model, *files.SIZE, None, run.poses) as view:
         files.picture_and_video(lambda k: view.picture(run.poses[k], words=f"{run.time[k]:.2f} s", trails=trails(k)),
-                                run.time, len(run.time) - 1, picture, video, MOBILE_RATE)
+                                run.time, len(run.time) - 1, places, MOBILE_RATE)
 
 
 def _page(found: dict[str, Any], names: Sequence[str]) -> str:
@@ -298,6 +304,7 @@ def millimetres(value: float) -> str:
 
 # --- The page of `servotwin robot compare`: HTML that needs nothing but the picture beside it -------------------------
 
+COMPARED, COMPARED_PICTURE = "compare.csv", "conditions.png"
 _STYLE = "figure img{width:100%;height:auto;max-width:48rem}td:nth-child(n+2){white-space:nowrap}"
 
 
@@ -309,6 +316,18 @@ def conditions_picture(done: Sequence[Outcome]) -> Figure:
                 for condition in CONDITIONS})
 
 
+def comparison_result(found: dict[str, Any], done: Sequence[Outcome]) -> files.RobotResult:
+    """Return what is told and written of a comparison."""
+    columns = {name: [case[name] for case in found["cases"]] for name in found["cases"][0]}
+    return files.RobotResult(
+        facts=found, title="distance of the tool from where it should be, rms, by pulse servos, mean of all tasks",
+        lines=lambda more: [table(CONDITION_HEAD, condition_rows(done)), "", *losses(done), "", pairs(more)],
+        writers=lambda: {
+            COMPARED: text_of(csv_text(columns, digits=9)), files.SUMMARY: json_of(found),
+            COMPARED_PICTURE: lambda path: plotting.save(conditions_picture(done), path),
+            files.PAGE: text_of(lambda: comparison_page(found, done))})
+
+
 def comparison_page(found: dict[str, Any], done: Sequence[Outcome]) -> str:
     """Return the page of a comparison."""
     lead = (f"{len(done)} runs: every task under every controller, by servos <code>{escape(found['servo'])}</code> of "
@@ -317,7 +336,7 @@ def comparison_page(found: dict[str, Any], done: Sequence[Outcome]) -> str:
     cost = ("controller", "motor voltage, rms", "commands go up and down by", "energy", "times better than plain")
     sections = [
         Section("When it gets hard", [
-            Beside(["conditions.png"], "How far the tool is from where it should be, mean of all tasks, pulse servos."),
+            Beside([COMPARED_PICTURE], "How far the tool is from where it should be, mean of all tasks, pulse servos."),
             Table(CONDITION_HEAD, condition_rows(done), "Tool behind, rms, mean of all tasks, pulse servos")]),
         Section("Where each loses", [f"{text}." for text in losses(done)]),
         Section("What it takes", [Table(cost, cost_rows(done, servos), f"Nominal, mean of all tasks, {servos} servos")
@@ -376,6 +395,28 @@ def window_writers(found: RobotValidation) -> dict[str, Callable[[Path], object]
 
 def _save_windows(traces: Sequence[plotting.ReplayTrace], page: int, path: Path) -> None:
     plotting.save(plotting.replay_windows(traces, page=page), path)
+
+
+def validation_result(found: RobotValidation, told: dict[str, Any]) -> files.RobotResult:
+    """Return what is told and written of a validation."""
+    worst, titles, rows = found.windows[0], validation_head(found), validation_rows(found)
+    late = ", ".join(f"{name} {1e3 * value:.0f} ms" for name, value in found.latency.items())
+    first = [("goals act later by", late),
+             ("worst second", f"{worst.joint}, {worst.start:.2f} s of {told['worst'][0]['episode']}, {worst.kind}: "
+              f"{degrees(worst.rms)} deg rms"), *(("note", text) for text in told["notes"])]
+    return files.RobotResult(
+        facts=told, title=f"{told['robot']} beside {', '.join(told['episodes'][:3])}"
+        f"{' ...' if len(told['episodes']) > 3 else ''}: simulated less measured joints, rms "
+        f"{degrees(found.rms(SERVOS))} deg", lines=lambda more: [
+            "", table(titles[:6], [row[:6] for row in rows]), "", "the same with other actuators, rms (deg)",
+            table([titles[0], *titles[6:]], [[row[0], *row[6:]] for row in rows]), "", pairs([*first, *more])],
+        writers=lambda: {files.SUMMARY: json_of(told), **validation_pictures(found),
+                         files.PAGE: text_of(lambda: validation_page(found, told))})
+
+
+def validation_pictures(found: RobotValidation) -> dict[str, Callable[[Path], object]]:
+    """Return what draws the errors of all joints, and the worst second of each."""
+    return {ERRORS: lambda path: plotting.save(errors_picture(found), path), **window_writers(found)}
 
 
 def validation_page(found: RobotValidation, told: dict[str, Any]) -> str:
@@ -490,35 +531,43 @@ def way_rows(found: Mapping[str, Any]) -> list[tuple[str, ...]]:
 # --- files ------------------------------------------------------------------------------------------------------------
 
 
-def write_task(run: TaskRun, sized: Mapping[str, Sizing], ways: Ways, targets: Sequence[Target],
-               found: Mapping[str, Any], *, force: bool, output_step: float) -> None:
-    """Write all files of a task that servos have done, or after an error none."""
-    asked = ways.joints.path
+def task_result(run: TaskRun, sized: Mapping[str, Sizing], ways: Ways, names: Sequence[str], controller: str,
+                output_step: float) -> files.RobotResult:
+    """Return what is told and written of a task that servos have done."""
+    found, asked = task_facts(run, sized, ways, controller), ways.joints.path
     inside = run.moving
     time = run.run.time[inside]
-    more = _writers(asked, ways, [("servos", time, run.tool[inside], run.contour.error)], output_step)
-    shown = _line(asked)
-    places = run.tool
+    still = int(np.searchsorted(run.run.time, 0.85 * asked.duration))
+    shown, tool = _line(asked), run.tool
 
     def trails(k: int) -> list[Trail]:
-        return [shown, _trail(places[inside & (run.run.time <= run.run.time[k])])]
+        return [shown, _trail(tool[inside & (run.run.time <= run.run.time[k])])]
 
-    files.write_all(run.run, sized, targets, found, force=force, output_step=output_step, camera=None, rate=TASK_RATE,
-                    more=more, section=task_section(found, WAYS, way_rows(found)), trails=trails,
-                    still=int(np.searchsorted(run.run.time, 0.85 * asked.duration)))
+    return _result(found, ways, lambda: {
+        **files.run_writers(run.run, sized, names, found, output_step, task_sections(found, WAYS, way_rows(found)),
+                            still),
+        **_writers(asked, ways, [("servos", time, tool[inside], run.contour.error)], output_step)},
+        lambda places: files.draw_run(places, run.run, None, TASK_RATE, trails, still))
 
 
-def write_ideal(done: IdealTask, ways: Ways, targets: Sequence[Target], found: Mapping[str, Any], *, force: bool,
-                output_step: float) -> None:
-    """Write all files of a task that ideal actuators have done, or after an error none."""
-    names = [target.path.name for target in targets]
-    traces = [("ideal actuators", done.time, done.tool, done.contour.error)]
-    write_files(targets, {
-        **_writers(ways.joints.path, ways, traces, output_step),
+def ideal_result(done: IdealTask, ways: Ways, names: Sequence[str], output_step: float) -> files.RobotResult:
+    """Return what is told and written of a task that ideal actuators have done."""
+    found = ideal_facts(done, ways)
+    trace = ("ideal actuators", done.time, done.tool, done.contour.error)
+    return _result(found, ways, lambda: {
+        **_writers(ways.joints.path, ways, [trace], output_step),
         files.JOINTS: text_of(lambda: _joint_table(done, ways.joints.arm, output_step)), files.SUMMARY: json_of(found),
-        files.PAGE: text_of(lambda: ideal_page(found, names, WAYS, way_rows(found)))}, force=force,
-        draw=lambda places: _draw_ideal(done, ways.joints, places[files.PICTURE], places.get(files.VIDEO))
-        if files.PICTURE in places else None)
+        files.PAGE: text_of(lambda: ideal_page(found, names, WAYS, way_rows(found)))},
+        lambda places: _draw_ideal(places, done, ways.joints))
+
+
+def _result(found: dict[str, Any], ways: Ways, writers: Callable[[], Writers],
+            draw: Callable[[Mapping[str, Path]], object]) -> files.RobotResult:
+    path = ways.joints.path
+    return files.RobotResult(
+        facts=found, title=f"{found['robot']}: {path.name}, {path.duration:.4g} s", writers=writers, draw=draw,
+        lines=lambda more: [pairs([*task_pairs(found), *more]),
+                            *(["", table(WAYS, way_rows(found))] if found["redundant"] else [])])
 
 
 def _writers(path: ToolPath, ways: Ways, traces: Sequence[tuple[str, Array, Array, Array]],
@@ -552,7 +601,7 @@ def joint_uses(ways: Mapping[str, JointPath]) -> Any:
 
 def _tool_table(path: ToolPath, trace: Any, output_step: float) -> str:
     """Return where the tool was and should have been, in mm, as CSV."""
-    rows = _every(trace.time, output_step)
+    rows = slice(None, None, files.every(trace.time, output_step))
     wanted = np.stack([np.interp(trace.time, path.time, column) for column in path.places.T], axis=1)
     columns: dict[str, Array] = {"time_s": trace.time}
     for k, axis in enumerate("xyz"):
@@ -566,7 +615,7 @@ def _joint_table(done: IdealTask, arm: Arm, output_step: float) -> str:
     from servotwin.robots.model_file import joint_names
     from servotwin.units import from_si
 
-    rows, columns = _every(done.time, output_step), {"time_s": done.time}
+    rows, columns = slice(None, None, files.every(done.time, output_step)), {"time_s": done.time}
     for k, (joint, kind) in enumerate(joint_names(arm.model()).items()):
         unit, force = ("mm", "force_N") if kind == "length" else ("deg", "torque_Nm")
         columns[f"{joint}.ideal_{unit}"] = np.asarray(from_si(done.poses[:, k], unit, kind))
@@ -574,23 +623,21 @@ def _joint_table(done: IdealTask, arm: Arm, output_step: float) -> str:
     return csv_text({name: (values[rows] + 0.0).tolist() for name, values in columns.items()}, digits=9)
 
 
-def _every(time: Array, step: float) -> slice:
-    return slice(None, None, max(round(step / float(time[1] - time[0])), 1))
-
-
 # --- drawing ----------------------------------------------------------------------------------------------------------
 
 
-def _draw_ideal(done: IdealTask, joints: JointPath, picture: Path, video: Path | None) -> None:
+def _draw_ideal(places: Mapping[str, Path], done: IdealTask, joints: JointPath) -> None:
     """Draw the robot in the middle of its task, and all of it as a video."""
     from servotwin.robots.camera import Camera
 
+    if files.PICTURE not in places:
+        return
     shown = _line(joints.path)
     with Camera(joints.arm.model(), *files.SIZE, None, done.poses) as view:
         files.picture_and_video(
             lambda k: view.picture(done.poses[k], words=f"{done.time[k]:.2f} s", note="ideal actuators",
                                    trails=[shown, _trail(done.tool[:k + 1])]),
-            done.time, 2 * len(done.time) // 3, picture, video, TASK_RATE)
+            done.time, 2 * len(done.time) // 3, places, TASK_RATE)
 
 
 def _line(path: ToolPath) -> Trail:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,16 +21,13 @@ from servotwin.cli.robot_options import (
     named_words,
     supply_of,
 )
-from servotwin.cli.terminal import emit_json, pairs, patience, show, table
+from servotwin.cli.terminal import patience
 from servotwin.errors import UnknownNameError
 
 if TYPE_CHECKING:
-    from servotwin.cli.output_files import Target
-    from servotwin.cli.robot_task_report import Ways
     from servotwin.models import Model
     from servotwin.robots import WaypointRun
     from servotwin.robots.arm import Arm
-    from servotwin.robots.controllers import Steering
     from servotwin.robots.task_run import Comparison, Outcome
     from servotwin.robots.tasks import Criterion, ToolPath
 
@@ -89,18 +86,14 @@ def mobile(
     picture = not ideal and check_drawing(robot_model("mobile"), None, video=video)
     names = [*([] if ideal else [files.SERVOS]), written.PATH_TABLE, files.SUMMARY, written.PATHS,
              *files.drawn_names(picture=picture, video=video and picture), files.PAGE]
-    with files.folder(out):
-        targets = files.targets_of(out, names, force=ending.force)
+
+    def drive() -> files.RobotResult:
         with as_options():
             run = _run(corners, servos, _wheel(servo), speed, lookahead, encoders, supply, ideal=ideal)
         found = written.mobile_facts(run, servo, encoders, unequal=unequal, ideal=ideal)
-        written.write(run, found, targets, output_step, force=ending.force)
-    found["files"] = [str(target.path) for target in targets]
-    if ending.as_json:
-        emit_json(found)
-    else:
-        show(f"mobile: {len(run.waypoints)} waypoints",
-             pairs([*written.mobile_pairs(found), ("written", found["files"][-1])]))
+        return written.mobile_result(run, found, names, output_step)
+
+    files.carried_out(drive, out, names, force=ending.force, as_json=ending.as_json)
 
 
 def _servos(servo: str, *, unequal: bool) -> tuple[Model, Model]:
@@ -219,7 +212,9 @@ def _do(arm: Arm, asked: Asked) -> None:
     """Do a task, write its files and tell of it."""
     from servotwin.cli import robot_report as files
     from servotwin.cli import robot_task_report as written
+    from servotwin.robots import sizing_of
     from servotwin.robots.controllers import STEERINGS
+    from servotwin.robots.task_run import ideal_task, run_task
 
     check_numbers(output_step=asked.output_step, rate=written.TASK_RATE, blend=None)
     if asked.controller not in STEERINGS:
@@ -228,24 +223,22 @@ def _do(arm: Arm, asked: Asked) -> None:
     path = path_of(arm, asked.task, asked.size, asked.speed)
     models = _models(arm, asked)
     picture = check_drawing(arm.model(), None, video=asked.video)
-    with files.folder(asked.out):
-        targets = files.targets_of(asked.out, written.names(
-            len(arm.joints), ideal=asked.ideal, redundant=arm.redundant, picture=picture, video=asked.video),
-            force=asked.force)
+    names = written.names(len(arm.joints), ideal=asked.ideal, redundant=arm.redundant, picture=picture,
+                          video=asked.video)
+
+    def do() -> files.RobotResult:
         with patience("inverse kinematics"):
             joints = criterion.solve(arm, path)
             ways = written.Ways(joints, written.other_ways(arm, path, criterion, joints))
         if asked.ideal:
-            found = _ideal(ways, targets, asked)
-        else:
-            found = _driven(ways, targets, asked, models, steering)
-    found["files"] = [str(target.path) for target in targets]
-    if asked.as_json:
-        emit_json(found)
-        return
-    show(f"{found['robot']}: {path.name}, {path.duration:.4g} s",
-         pairs([*written.task_pairs(found), ("written", found["files"][-1])]),
-         *(["", table(written.WAYS, written.way_rows(found))] if arm.redundant else []))
+            return written.ideal_result(ideal_task(joints), ways, names, asked.output_step)
+        with as_options(), patience("following the path"):
+            run = run_task(arm, models, path, steering=steering, bus=supply_of(asked.supply), assume_heat=True,
+                           joint_path=joints)
+            sized = sizing_of(run.run)
+        return written.task_result(run, sized, ways, names, asked.controller, asked.output_step)
+
+    files.carried_out(do, asked.out, names, force=asked.force, as_json=asked.as_json)
 
 
 def path_of(arm: Arm, task: str, size: str | None, speed: float) -> ToolPath:
@@ -276,31 +269,6 @@ def _models(arm: Arm, asked: Asked) -> dict[str, Model]:
     return models_of(each, asked.model, asked.change, [])
 
 
-def _ideal(ways: Ways, targets: Sequence[Target], asked: Asked) -> dict[str, Any]:
-    from servotwin.cli import robot_task_report as written
-    from servotwin.robots.task_run import ideal_task
-
-    done = ideal_task(ways.joints)
-    found = written.ideal_facts(done, ways)
-    written.write_ideal(done, ways, targets, found, force=asked.force, output_step=asked.output_step)
-    return found
-
-
-def _driven(ways: Ways, targets: Sequence[Target], asked: Asked, models: Mapping[str, Model],
-            steering: Steering) -> dict[str, Any]:
-    from servotwin.cli import robot_task_report as written
-    from servotwin.robots import sizing_of
-    from servotwin.robots.task_run import run_task
-
-    with as_options(), patience("following the path"):
-        done = run_task(ways.joints.arm, models, ways.joints.path, steering=steering, bus=supply_of(asked.supply),
-                        assume_heat=True, joint_path=ways.joints)
-        sized = sizing_of(done.run)
-    found = written.task_facts(done, sized, ways, asked.controller)
-    written.write_task(done, sized, ways, targets, found, force=asked.force, output_step=asked.output_step)
-    return found
-
-
 def mass(text: str | None) -> float:
     """Return the payload of an option [kg]."""
     from servotwin.units.quantities import quantity
@@ -310,7 +278,6 @@ def mass(text: str | None) -> float:
 
 # --- `servotwin robot compare` ----------------------------------------------------------------------------------------
 
-_TABLE, _SUMMARY, _PICTURE, _PAGE = "compare.csv", "summary.json", "conditions.png", "index.html"
 _WHAT = "What to compare"
 
 
@@ -338,18 +305,13 @@ def compare(
 
     chosen = _cases(robot, task)
     comparison = Comparison(servo=servo_of(servo, []), bus_servo=servo_of(bus_servo, []), speed=speed)
-    with files.folder(out):
-        targets = files.targets_of(out, [_TABLE, _SUMMARY, _PICTURE, _PAGE], force=ending.force)
+
+    def do() -> files.RobotResult:
         done = _outcomes(comparison, chosen, quiet=ending.as_json)
-        found = words.comparison_facts(comparison, done)
-        _write(done, found, targets, force=ending.force)
-    found["files"] = [str(target.path) for target in targets]
-    if ending.as_json:
-        emit_json(found)
-        return
-    show("distance of the tool from where it should be, rms, by pulse servos, mean of all tasks",
-         table(words.CONDITION_HEAD, words.condition_rows(done)), "",
-         *words.losses(done), "", pairs([("written", found["files"][-1])]))
+        return words.comparison_result(words.comparison_facts(comparison, done), done)
+
+    files.carried_out(do, out, [words.COMPARED, files.SUMMARY, words.COMPARED_PICTURE, files.PAGE], force=ending.force,
+                      as_json=ending.as_json)
 
 
 def _cases(robots: list[str] | None, tasks: list[str] | None) -> list[Any]:
@@ -384,16 +346,3 @@ def _outcomes(comparison: Comparison, chosen: Sequence[Any], *, quiet: bool) -> 
             done.append(comparison.outcome(case, paths[key]))
             tell(len(done))
     return done
-
-
-def _write(done: Sequence[Outcome], found: dict[str, Any], targets: Sequence[Target], *, force: bool) -> None:
-    from servotwin import plotting
-    from servotwin.cli.output_files import json_of, text_of, write_files
-    from servotwin.cli.robot_task_report import comparison_page, conditions_picture
-    from servotwin.tables import csv_text
-
-    columns = {name: [case[name] for case in found["cases"]] for name in found["cases"][0]}
-    write_files(targets, {
-        _TABLE: text_of(csv_text(columns, digits=9)), _SUMMARY: json_of(found),
-        _PICTURE: lambda path: plotting.save(conditions_picture(done), path),
-        _PAGE: text_of(lambda: comparison_page(found, done))}, force=force)
