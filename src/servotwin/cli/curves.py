@@ -10,7 +10,7 @@ import typer
 
 from servotwin.cli import shared_options as shared
 from servotwin.cli.option_records import LEFT_OUT, usual, with_records
-from servotwin.cli.terminal import emit_json, pairs, patience, show, table
+from servotwin.cli.terminal import emit_json, pairs, patience, show, show_report, table
 from servotwin.errors import InputError
 
 if TYPE_CHECKING:
@@ -188,21 +188,12 @@ def _show_beside(sheets: list[DataSheet]) -> None:
 
 
 def _show(sheet: DataSheet, torque: float | None) -> None:
-    from servotwin.cli.curves_report import hot_words, lift_pairs, loop_pairs, notes, rest_pairs, rows
+    from servotwin.cli.curves_report import hot_words, notes, sections
     from servotwin.cli.summary import model_name
-    from servotwin.parameters import printed_points
+    from servotwin.look.reports import Report
 
-    servo, points = sheet.servo, printed_points(sheet.servo)
-    parts: list[Any] = [f"{servo.title or servo.name} ({servo.name}), model {model_name(sheet.model)}"]
-    parts += [f"  note: {note}" for note in notes(sheet)]
-    for part in sheet.voltages:
-        head = (f"at {part.voltage:g} V", "cold", "hot", "sheet", "off")
-        parts += ["", table(head, rows(part, points, torque))]
-        if part.buzz is not None:
-            parts += ["", pairs(rest_pairs(part))]
-        if part.loop is not None:
-            parts += ["", "the loop at rest", pairs(loop_pairs(part.loop, torque))]
-        if part.lift is not None:
-            parts += ["", pairs(lift_pairs(part.lift))]
-    parts += [f"cold: 25 deg C; hot: {hot_words(sheet.voltages[0])}", ""]
-    show(*parts)
+    servo = sheet.servo
+    head = [f"{servo.title or servo.name} ({servo.name}), model {model_name(sheet.model)}",
+            *(f"  note: {note}" for note in notes(sheet))]
+    show_report("\n".join(head), Report(servo.title or servo.name, "", sections(sheet, torque)),
+                f"cold: 25 deg C; hot: {hot_words(sheet.voltages[0])}", "")

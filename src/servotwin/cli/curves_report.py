@@ -11,7 +11,7 @@ from servotwin.cli.summary import buzz_facts, model_name, remedy_words, rest_wor
 from servotwin.cli.terminal import with_span
 from servotwin.cli.which_words import degrees, lift_cells, lift_facts, mass_cell, times
 from servotwin.datasheet.holding import Span, guesses, highest_voltage, is_below_sheet, lowest_voltage
-from servotwin.look import document, escape, reports, table
+from servotwin.look import document, escape, reports
 from servotwin.parameters import printed_fact, printed_flags, printed_points
 
 if TYPE_CHECKING:
@@ -460,7 +460,7 @@ def _servo(sheet: DataSheet, torque: float | None, *, alone: bool) -> str:
     servo = sheet.servo
     heading = "" if alone else f"<h2>{escape(servo.title or servo.name)}</h2>\n"
     said = reports.notes(notes(sheet))
-    parts = "".join(_voltage(sheet, part, torque) for part in sheet.voltages)
+    parts = reports.report_html(sections(sheet, torque))
     pages = plotting.pages(len(sheet.voltages), plotting.CURVES_A_PAGE)
     hot = escape(reports.signs(hot_words(sheet.voltages[0])))
     drawn = _figure([plotting.speed_curves(sheet, page=page) for page in pages], "At full drive over speed: cold "
@@ -486,49 +486,31 @@ def _servo(sheet: DataSheet, torque: float | None, *, alone: bool) -> str:
             f'{parts}<div class="figures">{small}</div></section>\n')
 
 
-def _voltage(sheet: DataSheet, part: VoltageSheet, torque: float | None) -> str:
-    found = rows(part, printed_points(sheet.servo), torque)
-    cells = [[escape(reports.signs(cell)) for cell in row] for row in found]
-    drawn = table(["", "cold", "hot", "the sheet prints", "off"], cells,
-                  caption=f"At {part.voltage:g} V. Cold: 25 °C. Hot: {escape(reports.signs(hot_words(part)))}.")
-    below = _rest(part) + _loop(part, torque) + _lift(part)
-    return f'<h3>At {part.voltage:g} V</h3>\n{_cards(part)}<div class="sheet">{drawn}</div>\n{below}'
+def sections(sheet: DataSheet, torque: float | None = None) -> list[reports.Section]:
+    """Return the numbers of each voltage; `torque` is a load whose point on the curves is shown as well [N m]."""
+    printed = printed_points(sheet.servo)
+    return [reports.Section(f"At {part.voltage:g} V", [
+        _cards(part), reports.Table(
+            (f"at {part.voltage:g} V", "cold", "hot", "sheet", "off"), rows(part, printed, torque),
+            f"At {part.voltage:g} V. Cold: 25 deg C. Hot: {hot_words(part)}.", kind="sheet"),
+        *([reports.Pairs(found, "at rest")] if (found := rest_pairs(part)) else []),
+        *([reports.Pairs(loop_pairs(part.loop, torque), "the loop at rest")] if part.loop is not None else []),
+        *(_lifting(part, part.lift) if part.lift is not None else [])], level=3) for part in sheet.voltages]
 
 
-def _cards(part: VoltageSheet) -> str:
+def _cards(part: VoltageSheet) -> reports.Cards:
     shown = [(f"{part.cold.stall_torque:.2f} N m", "stall torque"),
              (f"{part.cold.time_60:.2f} s", "for 60° without load"),
              (f"{part.cold.stall_current:.2f} A", "standing at full drive")]
     if not math.isnan(part.smallest_move):
-        shown.append((f"{math.degrees(part.smallest_move):.2f}°", "smallest move"))
-    return reports.cards(shown)
+        shown.append((f"{math.degrees(part.smallest_move):.2f} deg", "smallest move"))
+    return reports.Cards(shown)
 
 
-def _rest(part: VoltageSheet) -> str:
-    found = rest_pairs(part)
-    if not found:
-        return ""
-    said = table(["At rest", ""], [[escape(reports.signs(words)) for words in pair] for pair in found], text_columns=2)
-    return f'<div class="pairs">{said}</div>\n'
-
-
-def _loop(part: VoltageSheet, torque: float | None) -> str:
-    if part.loop is None:
-        return ""
-    said = table(["The loop at rest", ""], [[escape(reports.signs(words)) for words in pair]
-                                            for pair in loop_pairs(part.loop, torque)], text_columns=2)
-    return f'<div class="pairs">{said}</div>\n'
-
-
-def _lift(part: VoltageSheet) -> str:
-    if part.lift is None:
-        return ""
-    said = table(["Lifting", ""], [[escape(reports.signs(words)) for words in pair] for pair in lift_pairs(part.lift)],
-                 text_columns=2)
-    verdict = "lifts it" if part.lift.lifts else "does not lift it at all angles"
-    kind = "note yes" if part.lift.lifts else "note"
-    return (f'<div class="{kind}"><p>At {part.voltage:g} V the servo {verdict}.</p></div>\n'
-            f'<div class="pairs">{said}</div>\n')
+def _lifting(part: VoltageSheet, lift: Lift) -> list[reports.Part]:
+    verdict = "lifts it" if lift.lifts else "does not lift it at all angles"
+    box = f'<div class="note{" yes" * lift.lifts}"><p>At {part.voltage:g} V the servo {verdict}.</p></div>\n'
+    return [reports.Html(box), reports.Pairs(lift_pairs(lift), "lifting")]
 
 
 def _figure(drawn: Sequence[Figure], words: str, *, wide: bool = False) -> str:

@@ -333,8 +333,12 @@ def show_report(head: str, report: Report, *more: RenderableType) -> None:
 
     parts: list[RenderableType] = [head]
     for part in report.parts():
-        parts += ["", table(part.head, part.rows) if isinstance(part, Table) else part if isinstance(part, str)
-                  else pairs(part.rows)]
+        if isinstance(part, Table):
+            parts += ["", table(part.head, part.rows)]
+        elif isinstance(part, str):
+            parts += ["", part]
+        elif part.rows:
+            parts += ["", *([part.title] if part.title else []), pairs(part.rows)]
     show(*parts, *more)
 
 

@@ -29,20 +29,23 @@ class Table:
     def html(self) -> str:
         """It on a page, with the signs that a page can show."""
         drawn = html_table([escape(cell) for cell in self.head],
-                           [[escape(signs(cell)) for cell in row] for row in self.rows], caption=escape(self.caption),
+                           [[escape(signs(cell)) for cell in row] for row in self.rows], caption=escape(signs(self.caption)),
                            text_columns=self.text_columns)
         return f'<div class="{self.kind}">{drawn}</div>\n' if self.kind else drawn
 
 
 @dataclass(frozen=True)
 class Pairs:
-    """Names, each with what is said of it."""
+    """Names, each with what is said of it, perhaps under a title."""
 
     rows: Sequence[tuple[str, str]]
+    title: str = ""
 
     @property
     def html(self) -> str:
-        """It on a page: a sentence each."""
+        """It on a page: a sentence each, or a table below its title."""
+        if self.title:
+            return Table([self.title[:1].upper() + self.title[1:], ""], self.rows, text_columns=2, kind="pairs").html
         return "".join(f"<p>{escape(name)}: {escape(signs(text))}.</p>\n" for name, text in self.rows)
 
 
@@ -111,10 +114,11 @@ Part = str | Table | Pairs | Cards | Picture | Beside | Html
 
 @dataclass(frozen=True)
 class Section:
-    """A part of a report under a title; an empty one: no title."""
+    """A part of a report under a title of a level of HTML; an empty one: no title."""
 
     title: str
     parts: Sequence[Part]
+    level: int = 2
 
 
 @dataclass(frozen=True)
@@ -163,7 +167,7 @@ class Report:
 
 def report_html(sections: Sequence[Section]) -> str:
     """Return sections as HTML, for a page that has more."""
-    return "".join((f"<h2>{escape(section.title)}</h2>\n" if section.title else "")
+    return "".join((f"<h{section.level}>{escape(section.title)}</h{section.level}>\n" if section.title else "")
                    + "".join(f"<p>{escape(part)}</p>\n" if isinstance(part, str) else part.html
                              for part in section.parts) for section in sections)
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from servotwin.errors import ServotwinError
 from servotwin.identification.fitting.case import STEP, Case, LogPart, Point, command_of, has_pulses
 from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.free import Space, nominal
+from servotwin.identification.fitting.free import nominal
 from servotwin.identification.fitting.least_squares import Ask, Outcome, Prior, Search, together
 from servotwin.identification.fitting.task import Task
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty
@@ -546,7 +546,7 @@ def _rounded(case: Case, forecast: Forecast) -> Case:
     return replace(case, log=log, signal=command_of(log, forecast.model, {}))
 
 
-def systematic(task: Task, point: Point, parts: Sequence[LogPart], beliefs: Sequence[Prior], rows: Sequence[Rows],
+def systematic(task: Task, point: Point, parts: Sequence[LogPart], rows: Sequence[Rows],
                doubt: Uncertainty) -> Systematic:
     """Return what left-out numbers do to the fitted ones.
 
@@ -555,13 +555,13 @@ def systematic(task: Task, point: Point, parts: Sequence[LogPart], beliefs: Sequ
     task : Task
     point : Point
         Where its search ended.
-    parts, beliefs, rows
+    parts, rows
         Of its fitted logs there, with what is believed of their own numbers.
     doubt : Uncertainty
     """
     p, prior = len(point.shared), task.prior
     names = (*task.forecast.space.names, *task.forecast.extra)
-    known = _Known(task, point, parts, beliefs, rows, doubt)
+    known = _Known(task, point, parts, rows, doubt)
     effects = [(one, effect) for one in assumptions(task.forecast, point) if (effect := known.effect(one)) is not None]
     if not effects:
         return Systematic((), np.zeros(p), np.zeros((p, p)))
@@ -628,7 +628,6 @@ class _Known:
     task: Task
     point: Point
     parts: Sequence[LogPart]
-    beliefs: Sequence[Prior]
     rows: Sequence[Rows]
     doubt: Uncertainty
 
@@ -675,7 +674,7 @@ class _Known:
     def _follow(self, changes: Sequence[Array], move: Array, own: list[Array]) -> tuple[Array, list[Array]]:
         """Return how the shared numbers follow changes for a range, and what is left; own numbers move in place."""
         pull, left = self.task.prior.weight**2 * move, []
-        for k, (d, part, belief, r) in enumerate(zip(changes, self.parts, self.beliefs, self.rows, strict=True)):
+        for k, (d, part, belief, r) in enumerate(zip(changes, self.parts, self.task.beliefs, self.rows, strict=True)):
             m, weight = len(d), belief.weight
             if len(own[k]):
                 weighted = part.own * r.inside[:m, None]
@@ -788,11 +787,7 @@ def freed(task: Task, point: Point, one: Assumption) -> tuple[Task, Point]:
     old, x = task.forecast, point.shared
     n = len(old.space)
     more = {one.name: one.assumed + max(one.mean - one.assumed, 0.1 * one.width), **one.beside}
-    known = old.space.parameters
-    space = Space(old.model, (*old.space.names, *more),
-                  bounds={p.name: (p.lower, p.upper) for p in known if p.bounded} or None,
-                  priors={p.name: p.prior for p in known if p.prior is not None} or None,
-                  load={p.name: p.start for p in known if p.name.startswith("load.")})
+    space = old.space.changed(old.model, (*old.space.names, *more))
     forecast = Forecast([case.log for case in old.cases], old.model, space, old.nuisance, old.sensors)
     prior = Prior(*(np.insert(values, n, np.zeros(len(more))) for values in (task.prior.mean, task.prior.weight)))
     other = task.like(forecast, prior)

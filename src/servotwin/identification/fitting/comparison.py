@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError
 from servotwin.identification.fitting.case import DELAY_SCALE, STEP, LogPart, Point, latency, widest
 from servotwin.identification.fitting.forecast import Forecast, LogLanes
-from servotwin.identification.fitting.free import LUMPED, Space
+from servotwin.identification.fitting.free import LUMPED
 from servotwin.identification.fitting.least_squares import Begin, Loss, by_sensor
 from servotwin.identification.fitting.phases import PulseChoice, Scan, settled
 from servotwin.identification.fitting.slew_lag import fit_slew_lag
@@ -188,12 +188,8 @@ def _of_m1(whole: Task, held_out: Sequence[int], traces: Sequence[Trace], model:
     if not more and not given and len(free) == len(space.names):
         return {}
     plain = type(model)(model.servo.replace(dict.fromkeys(given)))
-    own_bounds = {p.name: (p.lower, p.upper) for p in space.parameters if p.bounded and p.name in free}
-    beliefs = {p.name: p.prior for k, p in enumerate(space.parameters)
-               if p.prior is not None and p.name in free and whole.prior.weight[k] > 0.0}  # those that did not yield
-    load = {p.name: float(p.value(point.shared[k])) for k, p in enumerate(space.parameters)
-            if p.name.startswith("load.")}
-    simple = Space(plain, [*free, *more], bounds=own_bounds, priors=beliefs or None, load=load)
+    believed = [name for k, name in enumerate(space.names) if whole.prior.weight[k] > 0.0]  # that did not yield
+    simple = space.changed(plain, [*free, *more], believed=believed, at=point.shared)
     forecast = Forecast(logs, plain, simple, whole.forecast.nuisance, whole.forecast.sensors,
                         whole.forecast.running)
     forecast.goes_on_from(whole.forecast)

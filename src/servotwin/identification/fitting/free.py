@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -170,6 +170,27 @@ class Space:
 
     def __len__(self) -> int:
         return len(self.parameters)
+
+    def changed(self, model: Model, names: Sequence[str], *, believed: Collection[str] | None = None,
+                at: Array | None = None) -> Space:
+        """Return the space of another model or other names: bounds and priors stay, and what is said of the load.
+
+        Parameters
+        ----------
+        model : Model
+        names : sequence of str
+        believed : collection of str, optional
+            Names whose priors stay; all unless given.
+        at : ndarray, shape (p,), optional
+            Where numbers of the load stand; where they began unless given.
+        """
+        kept = [(k, p) for k, p in enumerate(self.parameters) if p.name in names]
+        return Space(
+            model, names, bounds={p.name: (p.lower, p.upper) for _, p in kept if p.bounded},
+            priors={p.name: p.prior for _, p in kept
+                    if p.prior is not None and (believed is None or p.name in believed)} or None,
+            load={p.name: p.start if at is None else float(p.value(at[k]))
+                  for k, p in enumerate(self.parameters) if p.name in LOAD_NAMES})
 
     def values(self, x: Array) -> Array:
         """Return the values (SI) of points x, shape (…, p)."""

@@ -7,6 +7,7 @@ import time as clock
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -56,7 +57,7 @@ from servotwin.identification.fitting.fit import (
 )
 from servotwin.identification.fitting.forecast import FIT_ACCURACY, Forecast, Running
 from servotwin.identification.fitting.free import Bounds, Priors, Space
-from servotwin.identification.fitting.least_squares import Begin, Loss, Outcome, Prior, Search
+from servotwin.identification.fitting.least_squares import Begin, Loss, Outcome, Search
 from servotwin.identification.fitting.phases import credible, settled
 from servotwin.identification.fitting.registers import RegisterSearch, as_logs_say, register_search
 from servotwin.identification.fitting.residual_noise import SensorSeries, noise_of
@@ -68,7 +69,6 @@ from servotwin.identification.fitting.uncertainty import (
     Rows,
     Uncertainty,
     explain,
-    rows_of,
     simplest,
     uncertainty,
 )
@@ -159,7 +159,7 @@ def doubts_of(task: Task, found: Outcome, level: float, show: Told) -> Doubts:
 def assumptions_at(task: Task, found: Outcome) -> tuple[Assumption, ...]:
     """Return what a servo file leaves out or assumes, and what the logs say of it where a search ended."""
     with task.forecast.roughly():
-        return systematic(task, found.point, *_straight(task, found)[:4]).numbers
+        return systematic(task, found.point, *_straight(task, found)[:3]).numbers
 
 
 class _Straight(NamedTuple):
@@ -169,7 +169,6 @@ class _Straight(NamedTuple):
     """
 
     parts: list[LogPart]
-    beliefs: list[Prior]
     rows: list[Rows]
     doubt: Uncertainty
     information: Array
@@ -180,22 +179,20 @@ class _Straight(NamedTuple):
 def _straight(task: Task, found: Outcome) -> _Straight:
     forecast = task.forecast
     parts = forecast.at(found.point, central=True, cases=task.fitted)
-    beliefs = [Prior(*forecast.own_belief(forecast.cases[k])) for k in task.fitted]
-    rows: list[Rows] = [rows_of(part, task.loss, own, found.point.own[k], counts_of(forecast, k))
-                        for k, part, own in zip(task.fitted, parts, beliefs, strict=True)]
+    rows = task.rows(found.point, parts, counts=partial(counts_of, forecast))
     stuck = task.at_bound(found) | task.held
     doubt = uncertainty(rows, task.prior, stuck)
-    information = _information(task, found, parts, beliefs)
+    information = _information(task, found, parts)
     flags, directions = vague(information, doubt.inflation, sizes_at(task, found), ~task.held)
     directions = simplest(directions)
     if flags.any():
         doubt = uncertainty(rows, task.prior, stuck, directions)
-    return _Straight(parts, beliefs, rows, doubt, information, flags, directions)
+    return _Straight(parts, rows, doubt, information, flags, directions)
 
 
 def _doubts_of(task: Task, found: Outcome, level: float, show: Told) -> Doubts:
     forecast = task.forecast
-    parts, beliefs, rows, doubt, information, flags, directions = _straight(task, found)
+    parts, rows, doubt, information, flags, directions = _straight(task, found)
     stuck = task.at_bound(found) | task.held
     names = (*forecast.space.names, *forecast.extra)
     shares = [*forecast.space.shares(found.point.shared), *([math.nan] * len(forecast.extra))]
@@ -207,7 +204,7 @@ def _doubts_of(task: Task, found: Outcome, level: float, show: Told) -> Doubts:
     seen: list[Outcome] = []
     reaching = ends(search, found, doubt, which, level, rows=rows, deeper=seen.append,
                     tell=lambda done: show(0.76 + 0.18 * done / count, "intervals"))
-    more = systematic(task, found.point, parts, beliefs, rows, doubt)
+    more = systematic(task, found.point, parts, rows, doubt)
     return Doubts(doubt, with_assumptions(reaching, doubt, level, more),
                   with_remedies(forecast, found.point, open_, names),
                   prior_share(names, doubt, reaching, flags, directions, task.prior.weight),
@@ -230,12 +227,11 @@ def _spans(task: Task, found: Outcome, parts: Sequence[LogPart], rows: Sequence[
         reach * error + task.stamps_off.get(k, 0.0) for k, error in zip(task.fitted, errors, strict=True)])}
 
 
-def _information(task: Task, found: Outcome, central: Sequence[LogPart], beliefs: Sequence[Prior]) -> Array:
+def _information(task: Task, found: Outcome, central: Sequence[LogPart]) -> Array:
     """Return what the logs say of the shared numbers, from differences so fine that what has no effect has none."""
     jagged = task.forecast.step > STEP  # then fine differences are those of steps, not of what moves the shaft
     parts = central if jagged else task.forecast.at(found.point, step=FINE, cases=task.fitted)
-    rows = [rows_of(part, task.loss, own, found.point.own[k])
-            for k, part, own in zip(task.fitted, parts, beliefs, strict=True)]
+    rows = task.rows(found.point, parts)
     return np.asarray(np.sum([(r.slope * r.inside[:, None]).T @ r.slope for r in rows], axis=0))
 
 
@@ -362,10 +358,8 @@ def _outliers(verdict: Verdict, traces: Sequence[Trace], sensor: str) -> tuple[C
 
 def _rows(task: Task, point: Point) -> list[Rows]:
     """Return what each fitted log says of the shared numbers."""
-    forecast = task.forecast
-    (parts,) = forecast.at_all([point], derivatives=True, cases=task.fitted, leading=True)
-    return [rows_of(part, task.loss, Prior(*forecast.own_belief(forecast.cases[k])), point.own[k])
-            for k, part in zip(task.fitted, parts, strict=True)]
+    (parts,) = task.forecast.at_all([point], derivatives=True, cases=task.fitted, leading=True)
+    return task.rows(point, parts)
 
 
 def _others(task: Task) -> dict[str, float]:
@@ -404,9 +398,7 @@ def hurried(task: Task, found: Outcome, level: float) -> tuple[Outcome, Doubts]:
     try:
         task.measure(found.point)
         parts = forecast.at(found.point, central=True, cases=task.fitted)
-        beliefs = [Prior(*forecast.own_belief(forecast.cases[k])) for k in task.fitted]
-        rows: list[Rows] = [rows_of(part, task.loss, own, found.point.own[k], counts_of(forecast, k))
-                            for k, part, own in zip(task.fitted, parts, beliefs, strict=True)]
+        rows = task.rows(found.point, parts, counts=partial(counts_of, forecast))
         stuck = task.at_bound(found) | task.held
         doubt = uncertainty(rows, task.prior, stuck)
         flags, directions = vague(doubt.information, doubt.inflation, sizes_at(task, found), ~task.held)

@@ -28,6 +28,7 @@ from servotwin.identification.fitting.clocks import DELAYS, at_likely_delay, fir
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.least_squares import Begin, Loss, Outcome, Prior, Search, scatter_of, together
 from servotwin.identification.fitting.phases import Scan, widening
+from servotwin.identification.fitting.uncertainty import Counts, Rows, rows_of
 from servotwin.logs.log import ANGLES
 
 Array = NDArray[np.float64]
@@ -399,6 +400,28 @@ class Task:
             # Sampled between pulses a current is jagged over the delay: the angle alone leads near first
             new = {name: value if name in ANGLES else _BLIND * value for name, value in new.items()}
         return self.forecast.noise | new
+
+    @property
+    def beliefs(self) -> list[Prior]:
+        """Beliefs about the own numbers of each fitted log."""
+        return [Prior(*self.forecast.own_belief(self.forecast.cases[k])) for k in self.fitted]
+
+    def rows(self, point: Point, parts: Sequence[LogPart], *, loss: Loss | None = None,
+             counts: Callable[[int], Counts | None] = lambda k: None) -> list[Rows]:
+        """Return what each fitted log says of the shared numbers.
+
+        Parameters
+        ----------
+        point : Point
+        parts : sequence of LogPart
+            Of the fitted logs there, with derivatives.
+        loss : Loss, optional
+            That of the search unless given.
+        counts : callable
+            Returns where the instruments of a log count.
+        """
+        return [rows_of(part, loss or self.loss, own, point.own[k], counts(k))
+                for k, part, own in zip(self.fitted, parts, self.beliefs, strict=True)]
 
     def at_bound(self, outcome: Outcome) -> NDArray[np.bool_]:
         """Tell which shared numbers stand at a bound."""

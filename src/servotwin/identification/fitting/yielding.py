@@ -28,7 +28,6 @@ from servotwin.identification.fitting.uncertainty import (
     Rows,
     Uncertainty,
     Unidentifiable,
-    rows_of,
     uncertainty,
     vague_directions,
 )
@@ -622,10 +621,7 @@ def _values(task: Task, k: int) -> list[float]:
 
 
 def _doubt(task: Task, point: Point, prior: Prior) -> tuple[Uncertainty, list[Rows]]:
-    forecast = task.forecast
-    parts = forecast.at(point, cases=task.fitted)
-    rows = [rows_of(part, task.loss, Prior(*forecast.own_belief(forecast.cases[k])), point.own[k])
-            for k, part in zip(task.fitted, parts, strict=True)]
+    rows = task.rows(point, task.forecast.at(point, cases=task.fitted))
     stuck = task.at_bound(Outcome(point, math.inf, False, 0)) | task.held
     return uncertainty(rows, prior, stuck), rows
 
@@ -712,13 +708,11 @@ def foreseen(task: Task) -> tuple[Foreseen, ...]:
         forecast.strict = False
         with forecast.roughly():
             parts = forecast.at(point, cases=task.fitted)
-        beliefs = [Prior(*forecast.own_belief(case)) for case in cases]
+        rows = task.rows(point, parts, loss=Loss(math.inf))
     finally:
         forecast.noise, forecast.strict = noise, strict
     if not all(np.isfinite(part.residual).all() and np.isfinite(part.shared).all() for part in parts):
         return ()
-    rows = [rows_of(part, Loss(math.inf), own, point.own[k])
-            for k, part, own in zip(task.fitted, parts, beliefs, strict=True)]
     information = sum((row.slope**2).sum(axis=0) for row in rows)
     found = []
     for k, p in enumerate(forecast.space.parameters):

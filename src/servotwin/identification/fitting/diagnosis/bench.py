@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from servotwin.identification.fitting.case import LogPart, Point, joined, robust_deviation
 from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.least_squares import Begin, Search, by_sensor
 from servotwin.identification.fitting.phases import settled
 from servotwin.identification.fitting.task import Task
@@ -231,13 +230,9 @@ class TrialBench:
         InputError
             If the model cannot follow the logs so.
         """
-        space = self.old.space
-        names = [name for name in space.names if name not in setting.without]
+        names = [name for name in self.old.space.names if name not in setting.without]
         names += [name for name in setting.values if name not in names]
-        bounds = {p.name: (p.lower, p.upper) for p in space.parameters if p.bounded and p.name in names}
-        beliefs = {p.name: p.prior for p in space.parameters if p.prior is not None and p.name in names}
-        load = {p.name: p.start for p in space.parameters if p.name.startswith("load.")}
-        made = Space(setting.model, names, bounds=bounds, priors=beliefs or None, load=load)
+        made = self.old.space.changed(setting.model, names)
         nuisance = self.old.nuisance if setting.nuisance is None else setting.nuisance
         forecast = Watched(self.purse, setting.price, setting.logs, setting.model, made, nuisance, self.old.sensors)
         forecast.goes_on_from(self.old)  # a search of smaller residuals takes less noise
@@ -251,7 +246,7 @@ class TrialBench:
         known = {p.name: float(p.value(point.shared[k])) for k, p in enumerate(old.space.parameters)}
         known |= setting.values
         x = [p.scaled(min(max(known[p.name], p.lower), p.upper)) for p in forecast.space.parameters]
-        nominal = self._task(forecast).nominal()
+        nominal = self.task_of(forecast).nominal()
         shared = np.concatenate([x, nominal.shared[len(x):]])
         for name in forecast.extra:
             if name in old.extra:
@@ -264,12 +259,13 @@ class TrialBench:
         frames = point.frames if forecast.phased and old.phased else ()
         return Point(shared, tuple(own), frames)
 
-    def _task(self, forecast: Watched) -> Task:
+    def task_of(self, forecast: Watched) -> Task:
+        """Return the search of all logs of a forecast."""
         return Task(forecast, self.task.loss, list(range(len(forecast.cases))), 0, Begin(), dict(forecast.noise))
 
     def search(self, forecast: Watched, cases: Sequence[int] | None = None) -> Search:
         """Return the search over a forecast, with the bounds and priors of the fit."""
-        task = self._task(forecast)
+        task = self.task_of(forecast)
         everything = list(range(len(forecast.cases))) if cases is None else list(cases)
         return Search(forecast, task.loss, task.prior, task.lower, task.upper, everything, task.held)
 
@@ -283,7 +279,7 @@ class TrialBench:
     def afresh(self, setting: Setting) -> Trial:
         """Return a trial that is searched from the servo's values, pulses included."""
         forecast = self.forecast(setting)
-        task = self._task(forecast)
+        task = self.task_of(forecast)
         found = self._run(forecast, task.nominal())
         if forecast.phased:
             forecast.own_phases = True
@@ -297,7 +293,7 @@ class TrialBench:
         """
         forecast = self.forecast(self.setting)
         forecast.noise = dict(self.base.forecast.noise)
-        task = self._task(forecast)
+        task = self.task_of(forecast)
         search = self.search(forecast, group)
         near = search.run(self.base.point, most=_STEPS).point
         fresh = search.run(task.nominal(), most=_STEPS).point

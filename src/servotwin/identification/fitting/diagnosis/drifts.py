@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from servotwin.identification.fitting.case import Point, has_pulses, joined, robust_deviation
 from servotwin.identification.fitting.diagnosis.bench import Gain, Spent, Told, TrialBench, Watched, gain, teaching
-from servotwin.identification.fitting.free import Space, nominal
+from servotwin.identification.fitting.free import nominal
 from servotwin.identification.fitting.traces import Trace
 from servotwin.identification.fitting.verdict import Cause, shown
 from servotwin.logs.log import Log
@@ -120,10 +120,7 @@ class _Drift:
         self.r = np.concatenate([part.residual for part in self.parts])
         self.own = [part.own.shape[1] for part in self.parts]
         names = [one for one in old.space.names if one != name]
-        space = old.space
-        bounds = {p.name: (p.lower, p.upper) for p in space.parameters if p.bounded and p.name in names}
-        load = {p.name: p.start for p in space.parameters if p.name.startswith("load.")}
-        self.space = Space(bench.setting.model, names or list(space.names), bounds=bounds, priors=None, load=load)
+        self.space = old.space.changed(bench.setting.model, names or list(old.space.names), believed=())
         self.alone = not names
 
     def best(self, kinds: Sequence[Sequence[_Shape]]) -> tuple[float, tuple[Array, ...]] | None:
@@ -197,7 +194,7 @@ class _Drift:
         for values, width in zip(point.own, self.own, strict=True):
             own.append(values + step[first:first + width])
             first += width
-        task = self.bench._task(self.bench.base.forecast)
+        task = self.bench.task_of(self.bench.base.forecast)
         return point._replace(shared=np.clip(point.shared + step[:count], task.lower, task.upper), own=tuple(own))
 
     def _stretched(self, point: Point, shape: _Shape, change: float) -> list[Array] | None:

@@ -38,10 +38,8 @@ from servotwin.identification.fitting.diagnosis.drifts import (
     warming,
 )
 from servotwin.identification.fitting.free import LUMPED, nominal
-from servotwin.identification.fitting.least_squares import Prior
 from servotwin.identification.fitting.task import Task
 from servotwin.identification.fitting.traces import Trace
-from servotwin.identification.fitting.uncertainty import rows_of
 from servotwin.identification.fitting.verdict import Cause, Verdict, shown
 from servotwin.loads import Load
 from servotwin.logs.log import Log
@@ -443,8 +441,7 @@ def _groups(bench: TrialBench) -> tuple[list[int], list[int]]:
     search = bench.search(forecast)
     parts = forecast.at(point)
     pieces = []
-    for k, part in enumerate(parts):
-        rows = rows_of(part, bench.task.loss, Prior(*forecast.own_belief(forecast.cases[k])), point.own[k])
+    for rows in bench.task_of(forecast).rows(point, parts):
         pieces.append((rows.slope.T @ rows.slope, rows.slope.T @ rows.score))
     size = len(pieces[0][1])
     hold = np.diag(np.where(search.held, 1e12, 1.0))
