@@ -20,6 +20,7 @@ from servotwin.identification.report import page as report_page
 from servotwin.identification.report import pictures as report_pictures
 from servotwin.logs import Log
 from servotwin.look import on_page
+from servotwin.look.reports import Section, report_html
 
 TIME = np.linspace(0.0, 1.0, 11)
 LINE = np.stack([TIME, 0.5 * TIME, 0.0 * TIME], axis=1)
@@ -178,7 +179,8 @@ def test_a_page_says_which_it_is():
 
 @pytest.mark.parametrize(("count", "pictures"), [(1, 1), (12, 1), (13, 2)])
 def test_a_report_has_all_pages(count, pictures):
-    assert report_page.errors_section(errors(count), [], "Of all logs.").count("<img") == pictures
+    assert report_html([Section("", report_page.errors_section(errors(count), [], "Of all logs."))]).count(
+        "<img") == pictures
 
 
 def test_names_of_many_joints_do_not_overlap():

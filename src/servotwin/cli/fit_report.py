@@ -10,22 +10,14 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from servotwin.cli.summary import names as dotted
 from servotwin.cli.summary import was_set
-from servotwin.cli.terminal import emit_json, pairs, show, table
+from servotwin.cli.terminal import emit_json, pairs, renderable, show, table
 from servotwin.errors import InputError, ServotwinError, UnknownNameError
 from servotwin.identification.fitting.checks import MENDED
 from servotwin.identification.fitting.free import Space, nominal
 from servotwin.identification.fitting.stopping import Within
 from servotwin.identification.fitting.traces import LogError, fit_percent
-from servotwin.identification.report.pictures import (
-    MODELS,
-    dimension_of_free,
-    error_rows,
-    error_shown,
-    estimate_lines,
-    nominal_of,
-    percent,
-    tables_of,
-)
+from servotwin.identification.report import page
+from servotwin.identification.report.pictures import dimension_of_free, nominal_of, tables_of
 from servotwin.logs.formats import MENDS
 from servotwin.look.plain_data import facts_of
 from servotwin.studies.kinds import Distribution, Normal, Offset, Relative, Uniform, distribution_of
@@ -37,7 +29,7 @@ if TYPE_CHECKING:
     from servotwin.bench import LoadCalibration, TableCalibration
     from servotwin.bench.load_columns import LiftRecord
     from servotwin.identification import Advice, Fit, Ladder, Log
-    from servotwin.identification.fitting.traces import ErrorTable, Trace
+    from servotwin.identification.fitting.traces import ErrorTable
     from servotwin.models import Model
     from servotwin.parameters import Quantity, Servo
 
@@ -55,7 +47,7 @@ def sections(fit: Fit, files: Sequence[str]) -> list[RenderableType]:
     parts: list[RenderableType] = [head, *_verdict(fit)]
     if fit.interrupted:
         parts.append(f"INTERRUPTED: the best so far; not known are {', '.join(fit.unknown)}")
-    parts += ["", _estimates(fit), ""]
+    parts += ["", renderable(page.estimates(fit)), ""]
     if fit.register_values:
         rows = [(one.name, f"{one.value:.3g}", one.interval) for one in fit.register_values]
         parts += [table(("register", "raw value", f"{100.0 * fit.level:g} % interval"), rows), ""]
@@ -64,7 +56,7 @@ def sections(fit: Fit, files: Sequence[str]) -> list[RenderableType]:
               else f"- {name} ended at a bound of the search" for name in fit.at_bound]
     parts += [f"- {line}" for line in fit.allowing]
     parts += [""] if fit.unidentifiable or fit.at_bound or fit.allowing else []
-    parts.append(errors(tables_of(fit), fit.traces, "motion"))
+    parts.append(renderable(page.errors(tables_of(fit), fit.traces, "motion")))
     said = [text for text in fit.warnings if (fit.verdict is None or text != fit.verdict.sentence)
             and not (fit.interrupted and text.startswith("stopped: the best"))]
     if said:
@@ -80,13 +72,7 @@ def _verdict(fit: Fit) -> list[RenderableType]:
     if fit.verdict is None:
         return []
     mark = "" if fit.verdict.holds else "! "
-    lines: list[RenderableType] = [f"{mark}{fit.verdict.sentence}"]
-    if fit.verdict.causes:
-        factor, unit = error_shown(fit.traces)
-        rows = [(cause.name, f"{cause.before * factor:.3g}", f"{cause.after * factor:.3g}", cause.remedy)
-                for cause in fit.verdict.causes]
-        lines += ["", table(("what may be the matter", f"error ({unit})", f"with it ({unit})", "what to do"), rows)]
-    return lines
+    return [f"{mark}{fit.verdict.sentence}", *(part for each in page.causes(fit) for part in ("", renderable(each)))]
 
 
 def written(files: Sequence[str]) -> RenderableType:
@@ -96,36 +82,6 @@ def written(files: Sequence[str]) -> RenderableType:
 
 def _written(files: Sequence[str]) -> list[tuple[str, str]]:
     return [("written", name) for name in files]
-
-
-def _estimates(fit: Fit) -> RenderableType:
-    rows = []
-    for line in estimate_lines(fit):
-        found_by = line.method if line.interval != line.method else ""
-        rows.append((line.name, line.value, line.interval, line.unit, found_by, line.prior,
-                     "rig" if line.nuisance else line.sheet))
-    level = f"{100.0 * fit.level:g} % interval"
-    return table(("parameter", "value", level, "unit", "found by", "prior", "before"), rows)
-
-
-def errors(tables: Mapping[str, ErrorTable], traces: Sequence[Trace], label: str) -> RenderableType:
-    """Return a table of rms errors by the values of a label, all models beside each other."""
-    models = next(iter(tables.values())).models
-    factor, unit = error_shown(traces)
-    rows = [(row.value, row.which, *(_error(row.errors, model, factor) for model in models),
-             percent(row.fits.get(models[0], math.nan))) for row in error_rows(tables, label)]
-    rows += [("all", which, *(_error(held.total(), model, factor) for model in models),
-              percent(held.total(fit_percent)[models[0]])) for which, held in tables.items()]
-    named = any(tables)
-    header = (label.replace("_", " "), "logs", *(f"{MODELS.get(name, name)} ({unit})" for name in models), "fit (%)")
-    if not named:
-        header, rows = (header[0], *header[2:]), [(row[0], *row[2:]) for row in rows]
-    return table(header, rows)
-
-
-def _error(errors_of: Mapping[str, float], model: str, factor: float) -> str:
-    value = errors_of.get(model, math.nan) * factor
-    return f"{value:.3g}" if math.isfinite(value) else "–"
 
 
 def facts(fit: Fit, files: Sequence[str]) -> dict[str, Any]:
@@ -186,27 +142,7 @@ def error_facts(held: ErrorTable) -> dict[str, Any]:
 
 def ladder_table(ladder: Ladder) -> list[RenderableType]:
     """Return the rungs of a friction ladder, and which one is chosen."""
-    factor, unit = error_shown(ladder.fit.traces)
-    rows = []
-    for rung in ladder.rungs:
-        said = ["chosen"] if rung.name == ladder.chosen else []
-        said += ["overfitted"] if rung.overfits else []
-        rows.append((rung.name, str(len(rung.fit.space)), f"{rung.training * factor:.3g}",
-                     f"{rung.holdout * factor:.3g}" if math.isfinite(rung.holdout) else "–", f"{rung.criterion:.1f}",
-                     ", ".join(said)))
-    what = "structure" if "," in ladder.chosen else "friction"
-    return [table((what, "parameters", f"fitted ({unit})", f"held out ({unit})", "information criterion", ""), rows),
-            f"{ladder.chosen}: {ladder.reason}", *_told(ladder, factor, unit), ""]
-
-
-def _told(ladder: Ladder, factor: float, unit: str) -> list[str]:
-    """Return the error that the choice did not see."""
-    if not math.isfinite(ladder.error):
-        return []
-    said = f"error on logs that had no say in the choice: {ladder.error * factor:.3g} {unit}"
-    if ladder.choices:
-        said += f" (held-out logs in two halves, which choose {' and '.join(ladder.choices)})"
-    return [said]
+    return [renderable(page.rungs(ladder)), *page.chosen(ladder), ""]
 
 
 def ladder_facts(ladder: Ladder) -> dict[str, Any]:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType
 
     from servotwin.datasheet.holding import Span
-    from servotwin.look.reports import Report
+    from servotwin.look.reports import Part, Report
 
 
 # --- Tables and texts as lines of a terminal of any width -------------------------------------------------------------
@@ -329,17 +329,22 @@ def drawn(parts: Sequence[RenderableType], width: int | None, *, terminal: bool 
 
 def show_report(head: str, report: Report, *more: RenderableType) -> None:
     """Write the parts of a report that a terminal can show, below a line, and what else there is to say."""
-    from servotwin.look.reports import Table
+    from servotwin.look.reports import Pairs
 
     parts: list[RenderableType] = [head]
     for part in report.parts():
-        if isinstance(part, Table):
-            parts += ["", table(part.head, part.rows)]
-        elif isinstance(part, str):
-            parts += ["", part]
+        if not isinstance(part, Pairs):
+            parts += ["", renderable(part)]
         elif part.rows:
             parts += ["", *([part.title] if part.title else []), pairs(part.rows)]
     show(*parts, *more)
+
+
+def renderable(part: Part) -> RenderableType:
+    """Return a table or a text of a report as the terminal shows it; nothing of what only a page shows."""
+    from servotwin.look.reports import Table
+
+    return table(part.head, part.rows) if isinstance(part, Table) else part if isinstance(part, str) else ""
 
 
 @contextlib.contextmanager

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from servotwin.cli import log
 from servotwin.cli import shared_options as shared
 from servotwin.cli.option_records import usual, with_records
-from servotwin.cli.terminal import emit_json, patience, show, table
+from servotwin.cli.terminal import emit_json, patience, renderable, show
 from servotwin.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
@@ -149,6 +149,7 @@ def _report(found: Validation, above: Mapping[str, float], limits: Mapping[str |
 def _sections(found: Validation, above: Mapping[str, float], limits: Mapping[str | None, float],
               files: list[str]) -> list[RenderableType]:
     from servotwin.cli import fit_report
+    from servotwin.identification.report import page
     from servotwin.identification.report.pictures import error_shown, rig_text
 
     tables = {"": found.errors}
@@ -158,8 +159,8 @@ def _sections(found: Validation, above: Mapping[str, float], limits: Mapping[str
         f"{found.servo.title or found.servo.name} ({found.servo.name}), {type(found.model).__name__}, "
         f"{len(found.traces)} logs" + (f"; {', '.join(rig)}" if rig else "")]
     for label in found.errors.labels():
-        parts += ["", fit_report.errors(tables, found.traces, label)]
-    parts += ["", _log_table(found)]
+        parts += ["", renderable(page.errors(tables, found.traces, label))]
+    parts += ["", renderable(page.logs(tables, found.traces, _MOST_LOGS))]
     parts += ["", *[f"! {text}" for text in found.warnings]] if found.warnings else []
     factor, unit = error_shown(found.traces)
     parts += [""] if above else []
@@ -167,17 +168,3 @@ def _sections(found: Validation, above: Mapping[str, float], limits: Mapping[str
         limit = limits.get(motion, limits.get(None, math.inf))
         parts += [f"! {motion}: {error * factor:.3g} {unit} is above {limit * factor:.3g} {unit}"]
     return [*parts, "", fit_report.written(files)] if files else parts
-
-
-def _log_table(found: Validation) -> Any:
-    from servotwin.identification.report.pictures import error_unit, percent
-
-    errors = found.errors.errors[found.errors.models[0]]
-    signals = {trace.log.name: trace.signal for trace in found.traces}
-    rows = []
-    for error in sorted(errors, key=lambda error: -error.rms)[:_MOST_LOGS]:
-        factor, unit = error_unit(signals[error.log])
-        rows.append((error.log, error.motion or "other", f"{error.rms * factor:.3g} {unit}",
-                     f"{error.largest * factor:.3g} {unit}", percent(error.fit_percent)))
-    more = f"log ({_MOST_LOGS} worst of {len(errors)})" if len(errors) > _MOST_LOGS else "log"
-    return table((more, "motion", "rms error", "largest", "fit (%)"), rows)

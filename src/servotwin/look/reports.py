@@ -29,8 +29,8 @@ class Table:
     def html(self) -> str:
         """It on a page, with the signs that a page can show."""
         drawn = html_table([escape(cell) for cell in self.head],
-                           [[escape(signs(cell)) for cell in row] for row in self.rows], caption=escape(signs(self.caption)),
-                           text_columns=self.text_columns)
+                           [[escape(signs(cell)) for cell in row] for row in self.rows],
+                           caption=escape(signs(self.caption)), text_columns=self.text_columns)
         return f'<div class="{self.kind}">{drawn}</div>\n' if self.kind else drawn
 
 
@@ -114,11 +114,17 @@ Part = str | Table | Pairs | Cards | Picture | Beside | Html
 
 @dataclass(frozen=True)
 class Section:
-    """A part of a report under a title of a level of HTML; an empty one: no title."""
+    """A part of a report under a title of a level of HTML; an empty one: no title. `key` is its address on a page."""
 
     title: str
     parts: Sequence[Part]
     level: int = 2
+    key: str = ""
+
+    @property
+    def html(self) -> str:
+        """Its parts on a page."""
+        return "".join(f"<p>{escape(part)}</p>\n" if isinstance(part, str) else part.html for part in self.parts)
 
 
 @dataclass(frozen=True)
@@ -136,6 +142,8 @@ class Report:
         What a reader has to know first.
     style : str
         Further CSS of its page.
+    contents : bool
+        Whether the page begins with a list of its sections.
 
     Examples
     --------
@@ -149,6 +157,7 @@ class Report:
     sections: Sequence[Section]
     remarks: Sequence[str] = ()
     style: str = ""
+    contents: bool = False
 
     def parts(self) -> Iterator[str | Table | Pairs]:
         """Give the parts that a terminal can show, in order."""
@@ -161,22 +170,22 @@ class Report:
     def page(self) -> str:
         """The page of HTML, which needs nothing but itself."""
         lead = f'<p class="lead">{self.lead}</p>\n' if self.lead else ""
-        return document(self.title, f"<h1>{escape(self.title)}</h1>\n{lead}{notes(self.remarks)}"
-                        + report_html(self.sections), style=self.style)
+        body = chapters(self.sections) if self.contents else report_html(self.sections)
+        return document(self.title, f"<h1>{escape(self.title)}</h1>\n{lead}{notes(self.remarks)}{body}",
+                        style=self.style)
 
 
 def report_html(sections: Sequence[Section]) -> str:
     """Return sections as HTML, for a page that has more."""
     return "".join((f"<h{section.level}>{escape(section.title)}</h{section.level}>\n" if section.title else "")
-                   + "".join(f"<p>{escape(part)}</p>\n" if isinstance(part, str) else part.html
-                             for part in section.parts) for section in sections)
+                   + section.html for section in sections)
 
 
-def chapters(parts: Sequence[tuple[str, str, str]]) -> str:
-    """Return long parts, each a key, a title and HTML, as HTML with a list of contents above them."""
-    contents = "".join(f'<li><a href="#{key}">{title}</a></li>' for key, title, _ in parts)
+def chapters(sections: Sequence[Section]) -> str:
+    """Return long sections, each with a key, as HTML with a list of contents above them."""
+    contents = "".join(f'<li><a href="#{each.key}">{escape(each.title)}</a></li>' for each in sections)
     return f'<nav aria-label="Contents"><ol>{contents}</ol></nav>\n' + "".join(
-        f'<section id="{key}"><h2>{title}</h2>\n{text}</section>\n' for key, title, text in parts)
+        f'<section id="{each.key}"><h2>{escape(each.title)}</h2>\n{each.html}</section>\n' for each in sections)
 
 
 def cards(rows: Sequence[tuple[str, str]]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,8 +25,6 @@ from servotwin.identification.report.pictures import (
 )
 from servotwin.identification.report.pictures import error_rows as error_bars
 from servotwin.look import (
-    MINUS,
-    document,
     escape,
     figure_in,
     label_of,
@@ -33,12 +32,10 @@ from servotwin.look import (
     pages,
     picture,
     readable,
-    table,
     to_bytes,
     unit_for,
 )
-from servotwin.look.reports import Html, Part, Picture, Report, Section, Table, chapters
-from servotwin.look.reports import cards as cards_html
+from servotwin.look.reports import Cards, Html, Part, Picture, Report, Section, Table
 from servotwin.parameters import write_file
 
 if TYPE_CHECKING:
@@ -53,100 +50,105 @@ if TYPE_CHECKING:
 
 # --- The tables of a fit's report -------------------------------------------------------------------------------------
 
-_HOW = {"normal": "normal law", "profile": "profile of the cost", "at bound": "none: at a bound",
-        "undetermined": "none: not determined", "not sought": "none: not asked for"}
-
-
-def estimates(fit: Fit) -> str:
+def estimates(fit: Fit) -> Table:
     """Return the estimates with intervals, and what the servo said before."""
-    rows = []
-    for line in estimate_lines(fit):
-        ends = ["–", "–"] if line.interval == line.method else [line.lower, line.upper]
-        numbers = [text.replace("-", MINUS) for text in (line.value, *ends, line.sheet)]
-        rows.append([f"<code>{escape(line.name)}</code>", *numbers, escape(line.unit),
-                     _HOW.get(line.method, line.method), line.prior])
-    level = f"{100 * fit.level:g} %"
-    return table(("parameter", "value", f"{level} from", "to", "before", "unit", "interval by", "prior"), rows,
-                 caption="“Before” is the value of the servo file; delay and angle offset belong to the rig. “Prior”: "
-                         "how much of what is known is the servo file's range or a prior that was given, not data.") \
-        + _yielded(fit)
+    rows = [(line.name, line.value, line.interval, line.unit, line.method if line.interval != line.method else "",
+             line.prior, "rig" if line.nuisance else line.sheet) for line in estimate_lines(fit)]
+    return Table(("parameter", "value", f"{100 * fit.level:g} % interval", "unit", "found by", "prior", "before"), rows,
+                 "“Before” is the value of the servo file; delay and angle offset belong to the rig. “Prior”: how much "
+                 "of what is known is the servo file's range or a prior that was given, not data.", kind="names")
 
 
-def _yielded(fit: Fit) -> str:
+def _yielded(fit: Fit) -> list[Part]:
     """Return the priors that were dropped beside what the logs say; nothing where there are none."""
     rows = []
     for one in fit.yielded:
         dimension = dimension_of_free(one.name)
         unit = unit_for(one.logs or one.file, dimension)
         known = math.isfinite(one.logs_std)
-        numbers = (figure_in(one.file, unit, dimension), figure_in(one.file_std, unit, dimension),
-                   figure_in(one.logs, unit, dimension, within=one.logs_std) if known else "–",
-                   *(figure_in(x, unit, dimension, within=one.logs_std) if known else "–"
-                     for x in (one.logs_lower, one.logs_upper)))
-        rows.append([f"<code>{escape(one.name)}</code>", *(text.replace("-", MINUS) for text in numbers),
-                     escape(label_of(unit)), number(one.apart, 2)])
+        rows.append([one.name, figure_in(one.file, unit, dimension), figure_in(one.file_std, unit, dimension),
+                     figure_in(one.logs, unit, dimension, within=one.logs_std) if known else "–",
+                     *(figure_in(x, unit, dimension, within=one.logs_std) if known else "–"
+                       for x in (one.logs_lower, one.logs_upper)), label_of(unit), f"{one.apart:.2g}"])
     head = ("parameter", "prior", "±", "logs", f"{100 * fit.level:g} % from", "to", "unit", "standard errors apart")
-    return table(head, rows, caption="Priors that the logs contradict: the fit goes without them.") if rows else ""
+    words = "Priors that the logs contradict: the fit goes without them."
+    return [Table(head, rows, words, kind="names")] if rows else []
 
 
-def causes(fit: Fit) -> str:
-    """Return what was tried and explains a bad verdict, the best first."""
-    if fit.verdict is None:
-        return ""
+def causes(fit: Fit) -> list[Part]:
+    """Return the candidates that explain a bad verdict, the best first; nothing without any."""
+    if fit.verdict is None or not fit.verdict.causes:
+        return []
     factor, unit = error_unit(next(iter(fit.verdict.noise)))
-    rows = [[escape(cause.name), number(cause.before * factor, 3), number(cause.after * factor, 3),
-             escape(cause.remedy)] for cause in fit.verdict.causes]
-    return table(("cause", f"error without it ({unit})", f"with it ({unit})", "what to do"), rows,
-                 caption="Rms errors on parts of the logs that took no part in the trial.")
+    rows = [(cause.name, f"{cause.before * factor:.3g}", f"{cause.after * factor:.3g}", cause.remedy)
+            for cause in fit.verdict.causes]
+    return [Table(("cause", f"error ({unit})", f"with it ({unit})", "what to do"), rows,
+                  "Rms errors without a cause and with it, on parts of the logs that took no part in its trial.")]
 
 
-def errors(tables: Mapping[str, ErrorTable], label: str, factor: float, unit: str) -> str:
-    """Return rms errors by the values of a label, of all models."""
+def errors(tables: Mapping[str, ErrorTable], traces: Sequence[Trace], label: str) -> Table:
+    """Return rms errors by the values of a label, of all models; tables without names have no column of them."""
     models = next(iter(tables.values())).models
-    rows = [[escape(row.value), row.which, *(_error(row.errors.get(model, math.nan) * factor) for model in models),
-             _percent(row.fits.get(models[0], math.nan))] for row in error_bars(tables, label)]
-    for which, held in tables.items():
-        total = held.total()
-        rows.append(["<b>all</b>", which, *(_error(total.get(model, math.nan) * factor) for model in models),
-                     _percent(held.total(fit_percent)[models[0]])])
-    words = escape(label.replace("_", " "))
-    return table((words, "logs", *(f"{escape(MODELS.get(m, m))} ({unit})" for m in models), "fit (%)"),
-                 rows, caption=f"Rms error by {words}, over all samples; fit of the servo.", text_columns=2)
+    factor, unit = error_shown(traces)
+    rows = [(row.value, row.which, *(_error(row.errors.get(model, math.nan) * factor) for model in models),
+             percent(row.fits.get(models[0], math.nan))) for row in error_bars(tables, label)]
+    rows += [("all", which, *(_error(held.total().get(model, math.nan) * factor) for model in models),
+              percent(held.total(fit_percent)[models[0]])) for which, held in tables.items()]
+    words = label.replace("_", " ")
+    head = (words, "logs", *(f"{MODELS.get(name, name)} ({unit})" for name in models), "fit (%)")
+    if not any(tables):
+        head, rows = (head[0], *head[2:]), [(row[0], *row[2:]) for row in rows]
+    return Table(head, rows, f"Rms error by {words}, over all samples; fit of the servo.", 2 if any(tables) else 1)
 
 
-def logs(tables: Mapping[str, ErrorTable], traces: Sequence[Trace]) -> str:
-    """Return the errors log by log, the worst ones first."""
+def logs(tables: Mapping[str, ErrorTable], traces: Sequence[Trace], most: int | None = None) -> Table:
+    """Return the errors log by log, the worst ones first; perhaps so many."""
     signals = {trace.log.name: trace.signal for trace in traces}
     every = [(error, which) for which, held in tables.items() for error in held.errors[held.models[0]]]
+    every.sort(key=lambda item: -item[0].rms if math.isfinite(item[0].rms) else math.inf)
     rows = []
-    for error, which in sorted(every, key=lambda item: -item[0].rms if math.isfinite(item[0].rms) else -math.inf):
+    for error, which in every[:most]:
         factor, unit = error_unit(signals.get(error.log, "output_angle"))
-        rows.append([escape(error.log), escape(error.motion or "other"), which,
+        rows.append((error.log, error.motion or "other", *([which] if any(tables) else []),
                      f"{_error(error.rms * factor)} {unit}", f"{_error(error.largest * factor)} {unit}",
-                     _percent(error.fit_percent), str(error.samples)])
-    return table(("log", "motion", "part", "rms error", "largest error", "fit (%)", "samples"), rows, text_columns=3)
+                     percent(error.fit_percent), str(error.samples)))
+    left = f" ({most} worst of {len(every)})" if most is not None and len(every) > most else ""
+    return Table((f"log{left}", "motion", *(["part"] if any(tables) else []), "rms error", "largest", "fit (%)",
+                  "samples"), rows, text_columns=3 if any(tables) else 2)
 
 
-def starts(fit: Fit) -> str:
+def _starts(fit: Fit) -> Table:
     """Return where the searches from all starts ended."""
     best = min((start.cost for start in fit.starts), default=math.nan)
-    rows = [[str(k), number(start.cost), number(start.cost / best if best else math.nan, 3),
-             "yes" if start.converged else "no"] for k, start in enumerate(fit.starts, 1)]
-    return table(("start", "cost", "times the best", "converged"), rows,
-                 caption="Cost: half the sum of squared residuals in units of noise, large ones in proportion only "
-                         "where the loss is Huber's. With several starts these are the rough searches on some logs.")
+    rows = [(str(k), number(start.cost), number(start.cost / best if best else math.nan, 3),
+             "yes" if start.converged else "no") for k, start in enumerate(fit.starts, 1)]
+    return Table(("start", "cost", "times the best", "converged"), rows,
+                 "Cost: half the sum of squared residuals in units of noise, large ones in proportion only where the "
+                 "loss is Huber's. With several starts these are the rough searches on some logs.")
 
 
-def rungs(ladder: Ladder) -> str:
+def rungs(ladder: Ladder) -> Table:
     """Return all fits of a ladder, and which one is chosen."""
     factor, unit = error_shown(ladder.fit.traces)
-    rows = [[escape(rung.name), str(len(rung.fit.space)), f"{_error(rung.training * factor)} {unit}",
-             f"{_error(rung.holdout * factor)} {unit}" if math.isfinite(rung.holdout) else "–",
-             number(rung.criterion, 5), "chosen" if rung.name == ladder.chosen else ""] for rung in ladder.rungs]
-    return table(("structure", "parameters", "fitted", "held out", "information criterion", ""), rows)
+    rows = [(rung.name, str(len(rung.fit.space)), _error(rung.training * factor), _error(rung.holdout * factor),
+             f"{rung.criterion:.1f}", ", ".join(["chosen"] * (rung.name == ladder.chosen)
+                                                + ["overfitted"] * rung.overfits)) for rung in ladder.rungs]
+    what = "structure" if "," in ladder.chosen else "friction"
+    return Table((what, "parameters", f"fitted ({unit})", f"held out ({unit})", "information criterion", ""), rows)
 
 
-def bounds(fit: Fit) -> str:
+def chosen(ladder: Ladder) -> list[str]:
+    """Return which fit of a ladder is chosen and why, and the error that the choice did not see."""
+    said = [f"{ladder.chosen}: {ladder.reason}"]
+    if math.isfinite(ladder.error):
+        factor, unit = error_shown(ladder.fit.traces)
+        halves = (f" (held-out logs in two halves, which choose {' and '.join(ladder.choices)})" if ladder.choices
+                  else "")
+        said.append(f"error on logs that had no say in the choice: {ladder.error * factor:.3g} {unit}{halves}")
+    return said
+
+
+def _bounds(fit: Fit) -> Table:
     """Return bounds, prior and end of every searched parameter."""
     rows = []
     for p in fit.space.parameters:
@@ -154,39 +156,32 @@ def bounds(fit: Fit) -> str:
         unit = unit_for(fit.estimates[p.name] or p.start, dimension)
         prior = "–" if p.prior is None else f"{figure_in(p.prior[0], unit, dimension, within=p.prior[1])} ± " \
                                             f"{figure_in(p.prior[1], unit, dimension)}"
-        rows.append([f"<code>{escape(p.name)}</code>", figure_in(p.lower, unit, dimension),
-                     figure_in(p.upper, unit, dimension), prior, escape(label_of(unit)),
-                     "at a bound" if p.name in fit.at_bound else "inside"])
-    return table(("parameter", "from", "to", "prior", "unit", "ended"), rows)
+        rows.append((p.name, figure_in(p.lower, unit, dimension), figure_in(p.upper, unit, dimension), prior,
+                     label_of(unit), "at a bound" if p.name in fit.at_bound else "inside"))
+    return Table(("parameter", "from", "to", "prior", "unit", "ended"), rows, kind="names")
 
 
-def settings(fit: Fit) -> str:
+def _settings(fit: Fit) -> Table:
     """Return what was fitted, and by what."""
     record = fit.servo.fit
     noise = ", ".join(f"{name.replace('_', ' ')} {readable(value, sensor_dimension(name))}"
                       for name, value in fit.noise.items())
     doubt = fit.doubt
-    rows = [
-        ("servo", escape(f"{fit.servo.title or fit.servo.name} ({fit.servo.name})")),
-        ("model", escape(type(fit.model).__name__)),
+    return Table(("setting", "value"), [
+        ("servo", f"{fit.servo.title or fit.servo.name} ({fit.servo.name})"),
+        ("model", type(fit.model).__name__),
         ("logs", f"{len(fit.traces)}, of which {sum(t.held_out for t in fit.traces)} held out"),
-        ("data", f"<code>{escape(str(record.get('data', '–')))}</code>"),
-        ("version", escape(f"servotwin {record.get('version', '')}")),
-        ("noise of the residuals (σ)", escape(noise)),
-        ("intervals", "none" if doubt is None else escape(
-            f"{100 * fit.level:g} %, {doubt.method}, standard errors {doubt.inflation:.2g} times those of independent "
-            f"residuals (correlation of neighbours {doubt.autocorrelation:.2f})")),
-        ("time", f"{fit.seconds:.3g} s"),
-    ]
-    return table(("what", "value"), [[f"<b>{what}</b>", words] for what, words in rows], text_columns=2)
+        ("data", str(record.get("data", "–"))),
+        ("version", f"servotwin {record.get('version', '')}"),
+        ("noise of the residuals (σ)", noise),
+        ("intervals", "none" if doubt is None else
+         f"{100 * fit.level:g} %, {doubt.method}, standard errors {doubt.inflation:.2g} times those of independent "
+         f"residuals (correlation of neighbours {doubt.autocorrelation:.2f})"),
+        ("time", f"{fit.seconds:.3g} s")], text_columns=2)
 
 
 def _error(value: float) -> str:
-    return number(value, 3)
-
-
-def _percent(value: float) -> str:
-    return percent(value).replace("-", MINUS)
+    return f"{value:.3g}" if math.isfinite(value) else "–"
 
 
 # --- What the reports of fits and of validations share: frames of pictures, errors, and logs side by side -------------
@@ -197,6 +192,7 @@ STYLE = """
 #logs figcaption{margin:0 0 .2rem;color:var(--ink);font-size:.85rem;overflow-wrap:anywhere}
 .tag{border-radius:4px;padding:0 .35rem;font-size:.8rem;background:#d55e00;color:#fff;white-space:nowrap}
 .key{display:inline-block;width:1.6rem;border-top:3px solid;vertical-align:middle;margin:0 .3rem 0 .8rem}
+.names td:first-child{font-family:ui-monospace,Consolas,monospace;font-size:.9em}
 figure img.drawing{width:100%;max-width:42rem}#logs figure img{width:100%}
 .verdict{font-size:1.1rem}.good{border-left-color:#009e73;background:#f0faf6}
 details{margin:.8rem 0}summary{cursor:pointer;color:var(--blue)}
@@ -205,34 +201,28 @@ figure img.drawing{max-width:27rem}}
 """
 
 
-def figure(figure: Figure, words: str) -> str:
-    """Return a picture with its caption."""
-    return figures([figure], words)
-
-
-def figures(drawn: Sequence[Figure], words: str) -> str:
-    """Return the pages of a picture, one below the other, with their caption."""
-    return Picture(lambda: drawn, words).html
-
-
 def space(unit: str) -> str:
     """Return a unit with the space before it that it needs."""
     return unit if unit == "°" else f" {unit}"
 
 
-def errors_section(tables: Mapping[str, ErrorTable], traces: Sequence[Trace], words: str) -> str:
+def errors_section(tables: Mapping[str, ErrorTable], traces: Sequence[Trace], words: str) -> list[Part]:
     """Return pictures and tables of the errors, by motion and by every other label; `words` say how they were found."""
     factor, unit = error_shown(traces)
-    parts = []
+    parts: list[Part] = []
     for label in dict.fromkeys(label for each in tables.values() for label in each.labels()):
         values = {value for each in tables.values() for value in each.by(label)}
         if len(values) > 1 or label == "motion":
-            parts.append(figures([report_pictures.errors(tables, label, factor, unit, page)
-                                  for page in pages(len(values), report_pictures.VALUES_A_PAGE)],
+            drawn = pages(len(values), report_pictures.VALUES_A_PAGE)
+            parts.append(Picture(partial(_error_pictures, tables, label, factor, unit, drawn),
                                  f"Rms error by {escape(label.replace('_', ' '))}. {words}"))
-        parts.append(errors(tables, label, factor, unit))
-    every = logs(tables, traces)
-    return f"{''.join(parts)}<details><summary>Log by log</summary>{every}</details>\n"
+        parts.append(errors(tables, traces, label))
+    return [*parts, Html(f"<details><summary>Log by log</summary>{logs(tables, traces).html}</details>\n")]
+
+
+def _error_pictures(tables: Mapping[str, ErrorTable], label: str, factor: float, unit: str,
+                    drawn: Sequence[int]) -> list[Figure]:
+    return [report_pictures.errors(tables, label, factor, unit, page) for page in drawn]
 
 
 def trace_list(traces: Sequence[Trace]) -> str:
@@ -269,13 +259,13 @@ def _one(trace: Trace, *, tagged: bool) -> str:
     return f"<figure{kind}><figcaption>{_caption(trace, tagged=tagged)}</figcaption><div>{drawn}</div></figure>\n"
 
 
-def residuals(traces: Sequence[Trace], noise: Mapping[str, float], command: CrossCorrelation | None = None) -> str:
+def residuals(traces: Sequence[Trace], noise: Mapping[str, float], command: CrossCorrelation | None = None) -> Picture:
     """Return the picture of what is left; of logs that were fitted with what the verdict says of the command before."""
-    return figure(report_pictures.residuals(traces, noise, command),
-                  "Simulated less measured, in units of each sensor's noise σ. From above: over time; their "
-                  "distribution beside the normal law; how far residuals follow each other; how far they follow the "
-                  "command of some time before, both filtered so that noise has no memory. Grey: where 99 of 100 lags "
-                  "lie if what is left is noise.")
+    return Picture(lambda: [report_pictures.residuals(traces, noise, command)],
+                   "Simulated less measured, in units of each sensor's noise σ. From above: over time; their "
+                   "distribution beside the normal law; how far residuals follow each other; how far they follow the "
+                   "command of some time before, both filtered so that noise has no memory. Grey: where 99 of 100 lags "
+                   "lie if what is left is noise.")
 
 
 # --- The report of a validation: one HTML page that needs nothing but itself ------------------------------------------
@@ -294,33 +284,34 @@ def write_validation(found: Validation, path: Path, *, overwrite: bool = False) 
 
 def validation_page(found: Validation) -> str:
     """Return the report as HTML."""
-    tables = {"": found.errors}
-    sections = (
-        ("summary", "Summary", _validation_summary(found)),
-        ("errors", "Errors", errors_section(tables, found.traces, "Every log starts where it was measured.")),
-        ("logs", "Measured and simulated", trace_list(found.traces)),
-        ("residuals", "What is left", residuals(found.traces, found.noise)),
-    )
     name, count = found.servo.title or found.servo.name, len(found.traces)
-    logs = f"{count} log" + ("" if count == 1 else "s")
-    return document(f"{name}: validation", f"""<h1>{escape(name)}: validated on {logs}</h1>
-<p class="lead">{escape(type(found.model).__name__)}, <code>{escape(found.servo.name)}</code>. No parameter was fitted
-here.</p>
-{chapters(sections)}""", style=STYLE)
+    lead = (f"{escape(type(found.model).__name__)}, <code>{escape(found.servo.name)}</code>. No parameter was fitted "
+            "here.")
+    return Report(f"{name}: validated on {_count(count, 'log')}", lead, [
+        Section("Summary", _validation_summary(found), key="summary"),
+        Section("Errors", errors_section({"": found.errors}, found.traces, "Every log starts where it was measured."),
+                key="errors"),
+        Section("Measured and simulated", [Html(trace_list(found.traces))], key="logs"),
+        Section("What is left", [residuals(found.traces, found.noise)], key="residuals")],
+        style=STYLE, contents=True).page
 
 
-def _validation_summary(found: Validation) -> str:
+def _validation_summary(found: Validation) -> list[Part]:
     factor, unit = error_shown(found.traces)
     errors = found.errors.errors[type(found.model).__name__]
-    told = percent(found.errors.total(fit_percent)[found.errors.models[0]]).replace("-", MINUS)
+    told = percent(found.errors.total(fit_percent)[found.errors.models[0]])
     worst = max(errors, key=lambda error: error.rms)
     cards = [(f"{number(found.total * factor, 3)}{space(unit)}", f"rms error over all samples (fit {told} %)"),
-             (f"{number(worst.rms * factor, 3)}{space(unit)}", f"rms error of the worst log, {escape(worst.log)}"),
+             (f"{number(worst.rms * factor, 3)}{space(unit)}", f"rms error of the worst log, {worst.log}"),
              (f"{number(max(error.largest for error in errors) * factor, 3)}{space(unit)}", "largest error of all")]
     for name, value in found.nuisance.items():
         how = "fitted to these logs" if name in found.fitted else "as the servo file's fit recorded it"
-        cards.append((escape(rig_text(name, value)), how))
-    return cards_html(cards) + "".join(f'<div class="note"><p>{escape(text)}</p></div>\n' for text in found.warnings)
+        cards.append((rig_text(name, value), how))
+    return [Cards(cards), *map(_note, found.warnings)]
+
+
+def _note(text: str) -> Html:
+    return Html(f'<div class="note"><p>{escape(text)}</p></div>\n')
 
 
 # --- The report of a fit: one HTML page that needs nothing but itself -------------------------------------------------
@@ -353,23 +344,26 @@ def write_report(fit: Fit, path: Path, *, ladder: Ladder | None = None, overwrit
 
 def page(fit: Fit, ladder: Ladder | None = None) -> str:
     """Return the report as HTML."""
-    sections = (
-        *((("verdict", "Verdict", _verdict(fit)),) if fit.verdict is not None else ()),
-        ("summary", "Summary", _summary(fit)), ("estimates", "Parameters", _estimates(fit)),
-        ("unknown", "What the logs cannot say", _unknown(fit)),
-        *((("structures", "What was compared", _compared(ladder)),) if ladder is not None else ()),
-        ("errors", "Errors beside simpler models", _errors(fit)),
-        ("logs", "Measured and simulated", trace_list(fit.traces)),
-        ("residuals", "What is left", _residuals(fit)),
-        ("correlation", "Correlation of the estimates", _correlation(fit)), ("search", "The search", _search(fit)),
-        ("reading", "How to read this page", _reading(fit)),
-    )
-    name = fit.servo.title or fit.servo.name
     held = sum(trace.held_out for trace in fit.traces)
-    return document(f"{name}: fit", f"""<h1>{escape(name)}: fitted to {_count(len(fit.traces), "log")}</h1>
-<p class="lead">{escape(type(fit.model).__name__)}, {_count(len(fit.space), "searched parameter")},
-{_count(held, "log")} held out. Everything on this page follows from the data <code>{escape(_short(fit))}</code>.</p>
-{chapters(sections)}""", style=STYLE)
+    lead = (f"{escape(type(fit.model).__name__)}, {_count(len(fit.space), 'searched parameter')}, "
+            f"{_count(held, 'log')} held out. Everything on this page follows from the data "
+            f"<code>{escape(_short(fit))}</code>.")
+    compared = [] if ladder is None else [
+        Section("What was compared", [rungs(ladder), *(f"{text}." for text in chosen(ladder))], key="structures")]
+    return Report(f"{fit.servo.title or fit.servo.name}: fitted to {_count(len(fit.traces), 'log')}", lead, [
+        *([Section("Verdict", _verdict(fit), key="verdict")] if fit.verdict is not None else []),
+        Section("Summary", _summary(fit), key="summary"),
+        Section("Parameters", [*_forest(fit), estimates(fit), *_yielded(fit)], key="estimates"),
+        Section("What the logs cannot say", [Html(_unknown(fit))], key="unknown"), *compared,
+        Section("Errors beside simpler models", errors_section(
+            tables_of(fit), fit.traces, "Logs that were held out were simulated with the fitted servo, started where "
+            "they were measured."), key="errors"),
+        Section("Measured and simulated", [Html(trace_list(fit.traces))], key="logs"),
+        Section("What is left", _residuals(fit), key="residuals"),
+        Section("Correlation of the estimates", [_correlation(fit)], key="correlation"),
+        Section("The search", [_starts(fit), Html("<h3>Bounds and priors</h3>"), _bounds(fit),
+                               Html("<h3>Settings</h3>"), _settings(fit)], key="search"),
+        Section("How to read this page", [Html(_reading(fit))], key="reading")], style=STYLE, contents=True).page
 
 
 def _short(fit: Fit) -> str:
@@ -380,17 +374,16 @@ def _count(number_of: int, what: str) -> str:
     return f"{number_of} {what}{'' if number_of == 1 else 's'}"
 
 
-def _verdict(fit: Fit) -> str:
+def _verdict(fit: Fit) -> list[Part]:
     """Return the verdict in a box, green where it holds, and the causes that were tried."""
     if fit.verdict is None:
-        return ""
+        return []
     good = " good" if fit.verdict.holds else ""
     words = escape(fit.verdict.sentence[:1].upper() + fit.verdict.sentence[1:])
-    box = f'<div class="note verdict{good}"><p><strong>{words}.</strong></p></div>\n'
-    return box + (causes(fit) if fit.verdict.causes else "")
+    return [Html(f'<div class="note verdict{good}"><p><strong>{words}.</strong></p></div>\n'), *causes(fit)]
 
 
-def _summary(fit: Fit) -> str:
+def _summary(fit: Fit) -> list[Part]:
     factor, unit = error_shown(fit.traces)
     cards = []
     for errors, words in ((fit.holdout, "rms error on logs that were held out"),
@@ -398,25 +391,24 @@ def _summary(fit: Fit) -> str:
         if errors:
             total = errors.total()
             own, *others = errors.models
-            beside = "; ".join(f"{escape(name)} {number(total[name] * factor, 3)}{space(unit)}" for name in others)
-            words += f" (fit {percent(errors.total(fit_percent)[own]).replace('-', MINUS)} %)"
+            beside = "; ".join(f"{name} {number(total[name] * factor, 3)}{space(unit)}" for name in others)
+            words += f" (fit {percent(errors.total(fit_percent)[own])} %)"
             words += f". Beside: {beside}" if beside else ""
             cards.append((f"{number(total[own] * factor, 3)}{space(unit)}", words))
     known = [line for line in estimate_lines(fit) if line.interval != line.method and not line.nuisance]
     cards.append((f"{len(known)} of {len(fit.space)}", "searched parameters have an interval"))
     widest = _widest(fit)
     if widest:
-        cards.append((f"± {share_text(widest[1])}", f"widest of these intervals: <code>{escape(widest[0])}</code>"))
+        cards.append((f"± {share_text(widest[1])}", f"widest of these intervals: {widest[0]}"))
     if len(fit.starts) > 1:
         number_of, words = fit.searches
-        cards.append((f"{number_of} of {len(fit.starts)}", escape(words)))
-    notes = "".join(f'<div class="note"><p>{escape(text)}</p></div>\n' for text in fit.warnings
-                    if fit.verdict is None or text != fit.verdict.sentence)
+        cards.append((f"{number_of} of {len(fit.starts)}", words))
+    said = [_note(text) for text in fit.warnings if fit.verdict is None or text != fit.verdict.sentence]
     if fit.interrupted:
         nothing = "" if known else ", and there are no intervals"
-        notes = ('<div class="note"><p><strong>The fit was interrupted.</strong> This is the best that it had found; '
-                 f"there may be better values{nothing}.</p></div>\n") + notes
-    return cards_html(cards) + notes
+        said.insert(0, Html('<div class="note"><p><strong>The fit was interrupted.</strong> This is the best that it '
+                            f"had found; there may be better values{nothing}.</p></div>\n"))
+    return [Cards(cards), *said]
 
 
 def _widest(fit: Fit) -> tuple[str, float] | None:
@@ -429,12 +421,11 @@ def _widest(fit: Fit) -> tuple[str, float] | None:
     return max(found.items(), key=lambda item: item[1]) if found else None
 
 
-def _estimates(fit: Fit) -> str:
+def _forest(fit: Fit) -> list[Part]:
     forest = report_pictures.forest(fit)
-    drawn = "" if forest is None else figure(
-        forest, f"Estimates and {100 * fit.level:g} % intervals. Grey: what the servo file's own spread allows (95 %). "
-                "An open diamond has no interval.")
-    return drawn + estimates(fit)
+    return [] if forest is None else [Picture(
+        lambda: [forest], f"Estimates and {100 * fit.level:g} % intervals. Grey: what the servo file's own spread "
+        "allows (95 %). An open diamond has no interval.")]
 
 
 def _unknown(fit: Fit) -> str:
@@ -456,50 +447,36 @@ def _unknown(fit: Fit) -> str:
                                 "bound.</p></div>")
 
 
-def _compared(ladder: Ladder) -> str:
-    return rungs(ladder) + f"<p>{escape(ladder.chosen)}: {escape(ladder.reason)}.</p>"
-
-
-def _errors(fit: Fit) -> str:
-    return errors_section(tables_of(fit), fit.traces, "Logs that were held out were simulated with the fitted "
-                               "servo, started where they were measured.")
-
-
-def _residuals(fit: Fit) -> str:
+def _residuals(fit: Fit) -> list[Part]:
     drawn = residuals(fit.traces, fit.noise, None if fit.verdict is None else fit.verdict.command)
     if fit.doubt is None:
-        return drawn
+        return [drawn]
     if fit.doubt.method == "independent residuals":
         words = "Neighbouring residuals are independent."
     else:
         words = (f"Neighbouring residuals follow each other (correlation {number(fit.doubt.autocorrelation, 2)}). The "
-                 f"intervals allow for that ({escape(fit.doubt.method)}; {number(fit.doubt.inflation, 2)} times as "
+                 f"intervals allow for that ({fit.doubt.method}; {number(fit.doubt.inflation, 2)} times as "
                  "wide as for independent residuals), but not for a model that is wrong in the mean.")
     if fit.verdict is not None:
         sensor = next(iter(fit.verdict.noise))
         factor, unit = error_unit(sensor)
         words += (f" They are {number(fit.verdict.ratio, 2)} times the noise that needs no model, "
                   f"{number(fit.verdict.noise[sensor] * factor, 2)}{space(unit)}.")
-    return drawn + f"<p>{words}</p>\n"
+    return [drawn, words]
 
 
-def _correlation(fit: Fit) -> str:
+def _correlation(fit: Fit) -> Part:
     drawn = report_pictures.correlation(fit)
     if drawn is None:
-        return "<p>Fewer than two numbers have an interval, so there is nothing to correlate.</p>\n"
-    return figure(drawn, "Blue: two estimates are high together. Orange: one is high where the other is low. Near ±1 "
-                          "the logs hardly tell the two apart. Numbers without an interval are left out.")
-
-
-def _search(fit: Fit) -> str:
-    return (starts(fit) + "<h3>Bounds and priors</h3>" + bounds(fit) + "<h3>Settings</h3>"
-            + settings(fit))
+        return "Fewer than two numbers have an interval, so there is nothing to correlate."
+    return Picture(lambda: [drawn], "Blue: two estimates are high together. Orange: one is high where the other is "
+                   "low. Near ±1 the logs hardly tell the two apart. Numbers without an interval are left out.")
 
 
 def _reading(fit: Fit) -> str:
     level = f"{100 * fit.level:g} %"
     return f"""<ul>
-<li><b>Interval.</b> If the model is right, {level} of such intervals hold the true value. “Normal law”: the cost is a
+<li><b>Interval.</b> If the model is right, {level} of such intervals hold the true value. “Normal”: the cost is a
 parabola near its minimum. “Profile”: it is not, so the ends were found by fixing the number and fitting all
 others. “Linearised”: the fit was stopped; the ends are those of the problem made straight at the best so far,
 {LINEARISED_TIMES:g} times as wide, and beyond where a whole step would lead.</li>
