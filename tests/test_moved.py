@@ -9,7 +9,9 @@ from servotwin.moved import MOVED
 
 WANTED = {"servotwin.robots.steering": "STEERINGS", "servotwin.robots.comparison": "Comparison",
           "servotwin.robots.controlled": "DrivePort", "servotwin.robots.kinematics": "follow",
-          "servotwin.robots.redundancy": "LeastMotion", "servotwin.bench.emulator.paper_chain": "chain_rows"}
+          "servotwin.robots.redundancy": "LeastMotion", "servotwin.bench.emulator.paper_chain": "chain_rows",
+          "servotwin.robots.arm": "two_link", "servotwin.robots.controllers": "STEERINGS",
+          "servotwin.robots.task_run": "run_task", "servotwin.robots.tasks": "task_path"}
 
 
 @pytest.mark.parametrize("old", MOVED)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import servotwin as st
-from servotwin.robots.mount import with_heat
+from servotwin.robots.servos.mount import with_heat
 
 SERVO = st.load_servo("feetech-sts3215-12v").replace({"supply.internal_resistance": 0.3})
 SUPPLY = st.Supply(open_circuit_voltage=12.0, internal_resistance=0.3)

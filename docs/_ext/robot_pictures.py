@@ -12,7 +12,7 @@ import servotwin as st
 from servotwin import plotting
 from servotwin.cli.robot_task_report import joint_uses
 from servotwin.robots import AwayFromLimits, LeastMotion, LeastTorque, run_task, scara, task_path
-from servotwin.robots.task_run import NOMINAL, Case, Comparison
+from servotwin.robots.arms.task_run import NOMINAL, Case, Comparison
 
 IMAGES = Path(__file__).resolve().parents[1] / "images"
 

@@ -10,11 +10,15 @@ if TYPE_CHECKING:
 
 MOVED = {  # to be removed in 0.2
     "servotwin.bench.emulator.paper_chain": "servotwin.bench.emulator.plant",
-    "servotwin.robots.comparison": "servotwin.robots.task_run",
-    "servotwin.robots.controlled": "servotwin.robots.controllers",
-    "servotwin.robots.kinematics": "servotwin.robots.tasks",
-    "servotwin.robots.redundancy": "servotwin.robots.tasks",
-    "servotwin.robots.steering": "servotwin.robots.controllers",
+    "servotwin.robots.arm": "servotwin.robots.arms.arm",
+    "servotwin.robots.comparison": "servotwin.robots.arms.task_run",
+    "servotwin.robots.controlled": "servotwin.robots.arms.controllers",
+    "servotwin.robots.controllers": "servotwin.robots.arms.controllers",
+    "servotwin.robots.kinematics": "servotwin.robots.arms.tasks",
+    "servotwin.robots.redundancy": "servotwin.robots.arms.tasks",
+    "servotwin.robots.steering": "servotwin.robots.arms.controllers",
+    "servotwin.robots.task_run": "servotwin.robots.arms.task_run",
+    "servotwin.robots.tasks": "servotwin.robots.arms.tasks",
 }
 """Old name -> new name."""
 

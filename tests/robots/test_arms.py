@@ -9,9 +9,9 @@ import servotwin as st
 from servotwin.errors import InputError
 from servotwin.robots import mjcf_models as mjcf
 from servotwin.robots import scara, two_link
-from servotwin.robots.arm import HEIGHT, LENGTHS, PINION, SERVO_MASS
-from servotwin.robots.arm import TWO_LENGTHS as LINKS
-from servotwin.robots.task_run import tool_places
+from servotwin.robots.arms.arm import HEIGHT, LENGTHS, PINION, SERVO_MASS
+from servotwin.robots.arms.arm import TWO_LENGTHS as LINKS
+from servotwin.robots.arms.task_run import tool_places
 
 mujoco = pytest.importorskip("mujoco", reason="the extra `robots` is not installed")
 DRAWS = np.random.default_rng(3)

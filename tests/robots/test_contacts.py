@@ -11,7 +11,7 @@ from servotwin.errors import InputError
 from servotwin.robots import Motion, run_motion, sizing_of, validate_robot
 from servotwin.robots.model_file import plant_of, robot_model
 from servotwin.robots.overlaps import fall_of, leave_out, leave_out_measured, overlaps
-from servotwin.robots.record import FROM_NOWHERE
+from servotwin.robots.servos.record import FROM_NOWHERE
 
 mujoco = pytest.importorskip("mujoco", reason="the extra `robots` is not installed")
 SERVO = st.DigitalServo(st.load_servo("feetech-sts3215-7v4"))

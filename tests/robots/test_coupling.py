@@ -10,7 +10,7 @@ import servotwin as st
 from servotwin.errors import InputError
 from servotwin.models import default_model
 from servotwin.robots import Motion, ServoDrive, run_motion, sizing_of
-from servotwin.robots.coupling import couple, couplings_of
+from servotwin.robots.servos.coupling import couple, couplings_of
 
 G, MASS, LENGTH = 9.81, 0.02, 0.02  # of a finger
 SERVO = default_model(st.load_servo("towerpro-mg996r"))

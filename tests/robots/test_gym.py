@@ -19,8 +19,8 @@ gymnasium = pytest.importorskip("gymnasium", reason="Gymnasium is not installed"
 
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 
-from servotwin.robots.command_map import CommandMap  # noqa: E402
 from servotwin.robots.gym import ServoActuated  # noqa: E402
+from servotwin.robots.servos.command_map import CommandMap  # noqa: E402
 
 MIDDLE = math.pi / 2  # of the travel of the analog servo, rad
 ANALOG = Mount(st.PulseServo(st.load_servo("hitec-hs-755hb")), zero=-MIDDLE)

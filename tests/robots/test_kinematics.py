@@ -8,10 +8,10 @@ import pytest
 
 from servotwin.errors import InputError, MissingExtraError
 from servotwin.robots import AwayFromLimits, LeastMotion, LeastTorque, follow, ideal_task, scara, task_path, two_link
-from servotwin.robots.arm import HEIGHT
-from servotwin.robots.arm import TWO_LENGTHS as LENGTHS
-from servotwin.robots.task_run import tool_places
-from servotwin.robots.tasks import circle, limits_of, square
+from servotwin.robots.arms.arm import HEIGHT
+from servotwin.robots.arms.arm import TWO_LENGTHS as LENGTHS
+from servotwin.robots.arms.task_run import tool_places
+from servotwin.robots.arms.tasks import circle, limits_of, square
 
 pytest.importorskip("mink", reason="the extra `robots` is not installed")
 

@@ -12,7 +12,7 @@ from servotwin.datasheet import thermal_masses
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.robots import Motion, Mount, run_motion
 from servotwin.robots.model_file import joint_names, joint_ranges, robot_model
-from servotwin.robots.mount import with_heat
+from servotwin.robots.servos.mount import with_heat
 from servotwin.robots.sizing import heating, lasting_torque, mean_heat
 from servotwin.robots.tracking import best_delay
 

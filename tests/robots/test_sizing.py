@@ -13,7 +13,7 @@ from servotwin.datasheet.warming import masses_by_mass
 from servotwin.errors import InputError
 from servotwin.physics import winding_resistance
 from servotwin.robots import Motion, Mount, run_motion, sizing_of
-from servotwin.robots.mount import supplied
+from servotwin.robots.servos.mount import supplied
 from servotwin.robots.sizing import heating
 
 mujoco = pytest.importorskip("mujoco", reason="the extra `robots` is not installed")

@@ -9,9 +9,9 @@ import servotwin as st
 from servotwin.control import Encoder, Reference
 from servotwin.errors import InputError
 from servotwin.robots import follow, run_task, task_path, two_link
-from servotwin.robots.controllers import STEERINGS, Delayed, DrivePort, Plain, RigidBody
-from servotwin.robots.task_run import Belief
-from servotwin.robots.tasks import circle
+from servotwin.robots.arms.controllers import STEERINGS, Delayed, DrivePort, Plain, RigidBody
+from servotwin.robots.arms.task_run import Belief
+from servotwin.robots.arms.tasks import circle
 
 mujoco = pytest.importorskip("mujoco", reason="the extra `robots` is not installed")
 pytest.importorskip("mink", reason="the extra `robots` is not installed")

@@ -7,7 +7,7 @@ import pytest
 
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.robots import contour_error, scara, task_path, two_link
-from servotwin.robots.tasks import circle, pick_and_place, square
+from servotwin.robots.arms.tasks import circle, pick_and_place, square
 
 CENTRE = (0.2, 0.01, 0.05)
 PATHS = {

@@ -6,7 +6,7 @@ import pytest
 import servotwin as st
 from servotwin.errors import InputError
 from servotwin.robots import Motion, Mount, run_motion
-from servotwin.robots.servo_groups import differing, of_one_form
+from servotwin.robots.servos.servo_groups import differing, of_one_form
 
 pytest.importorskip("mujoco")
 VOLTS = 7.4

@@ -11,7 +11,7 @@ import servotwin as st
 from leg_cases import SERVOS, values_of
 from reference import digital_bus
 from reference.drivetrain_circuit import Source
-from servotwin.robots.mount import with_heat
+from servotwin.robots.servos.mount import with_heat
 
 EVERY = 0.02  # s
 LEAD = 3.7e-4  # s: the first call of lanes, so that no call ends at a tick

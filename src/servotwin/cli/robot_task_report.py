@@ -21,9 +21,9 @@ from servotwin.cli.terminal import pairs, table
 from servotwin.errors import InputError
 from servotwin.look import escape
 from servotwin.look.reports import Beside, Cards, Html, Report, Section, Table
-from servotwin.robots.controllers import STEERINGS
+from servotwin.robots.arms.controllers import STEERINGS
+from servotwin.robots.arms.task_run import CONDITIONS, FIDELITIES, NOMINAL
 from servotwin.robots.replay import ALL, SERVOS
-from servotwin.robots.task_run import CONDITIONS, FIDELITIES, NOMINAL
 from servotwin.tables import csv_text
 from servotwin.text import shortened
 
@@ -33,10 +33,10 @@ if TYPE_CHECKING:
 
     from servotwin.cli.output_files import Writers
     from servotwin.robots import RobotValidation, Sizing, WaypointRun
-    from servotwin.robots.arm import Arm
+    from servotwin.robots.arms.arm import Arm
+    from servotwin.robots.arms.task_run import Comparison, IdealTask, Outcome, TaskRun
+    from servotwin.robots.arms.tasks import Criterion, JointPath, ToolPath
     from servotwin.robots.camera import Trail
-    from servotwin.robots.task_run import Comparison, IdealTask, Outcome, TaskRun
-    from servotwin.robots.tasks import Criterion, JointPath, ToolPath
     Array = NDArray[np.float64]
 
 
@@ -468,7 +468,7 @@ def names(joints: int, *, ideal: bool, redundant: bool, picture: bool, video: bo
 
 def other_ways(arm: Arm, path: ToolPath, criterion: Criterion, joints: JointPath) -> dict[str, JointPath]:
     """Return how a redundant arm may move, without a criterion and with the one asked for, by name."""
-    from servotwin.robots.tasks import LeastMotion
+    from servotwin.robots.arms.tasks import LeastMotion
 
     if not arm.redundant:
         return {}
@@ -497,7 +497,7 @@ def ideal_facts(done: IdealTask, ways: Ways) -> dict[str, Any]:
 
 
 def _of_task(ways: Ways) -> dict[str, Any]:
-    from servotwin.robots.tasks import LeastMotion, LeastTorque
+    from servotwin.robots.arms.tasks import LeastMotion, LeastTorque
 
     return {"task": ways.joints.path.name, "redundant": ways.joints.arm.redundant, "ways": {
         name: {"limit_distance": way.limit_distance, "torque_rms": LeastTorque().measure(way),
@@ -587,8 +587,8 @@ def _writers(path: ToolPath, ways: Ways, traces: Sequence[tuple[str, Array, Arra
 def joint_uses(ways: Mapping[str, JointPath]) -> Any:
     """Return the picture of how joints are used by each criterion: hinges alone."""
     from servotwin import plotting
+    from servotwin.robots.arms.tasks import limits_of
     from servotwin.robots.model_file import joint_names
-    from servotwin.robots.tasks import limits_of
 
     arm = next(iter(ways.values())).arm
     model = arm.model()

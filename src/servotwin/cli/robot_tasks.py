@@ -27,9 +27,9 @@ from servotwin.errors import UnknownNameError
 if TYPE_CHECKING:
     from servotwin.models import Model
     from servotwin.robots import WaypointRun
-    from servotwin.robots.arm import Arm
-    from servotwin.robots.task_run import Comparison, Outcome
-    from servotwin.robots.tasks import Criterion, ToolPath
+    from servotwin.robots.arms.arm import Arm
+    from servotwin.robots.arms.task_run import Comparison, Outcome
+    from servotwin.robots.arms.tasks import Criterion, ToolPath
 
 
 # --- `servotwin robot mobile`: the robot on wheels drives along waypoints, by odometry --------------------------------
@@ -213,8 +213,8 @@ def _do(arm: Arm, asked: Asked) -> None:
     from servotwin.cli import robot_report as files
     from servotwin.cli import robot_task_report as written
     from servotwin.robots import sizing_of
-    from servotwin.robots.controllers import STEERINGS
-    from servotwin.robots.task_run import ideal_task, run_task
+    from servotwin.robots.arms.controllers import STEERINGS
+    from servotwin.robots.arms.task_run import ideal_task, run_task
 
     check_numbers(output_step=asked.output_step, rate=written.TASK_RATE, blend=None)
     if asked.controller not in STEERINGS:
@@ -243,7 +243,7 @@ def _do(arm: Arm, asked: Asked) -> None:
 
 def path_of(arm: Arm, task: str, size: str | None, speed: float) -> ToolPath:
     """Return the path of a task, of the words of its options."""
-    from servotwin.robots.tasks import task_path
+    from servotwin.robots.arms.tasks import task_path
     from servotwin.units.quantities import quantity
 
     length = None if size is None else quantity("--size", size, "length", bare=True, positive=True)
@@ -252,7 +252,7 @@ def path_of(arm: Arm, task: str, size: str | None, speed: float) -> ToolPath:
 
 
 def _criterion(arm: Arm, name: str) -> Criterion:
-    from servotwin.robots.tasks import CRITERIA, LeastMotion, check_redundant
+    from servotwin.robots.arms.tasks import CRITERIA, LeastMotion, check_redundant
 
     known = {one.name: one for one in CRITERIA}
     if name not in known:
@@ -301,7 +301,7 @@ def compare(
     from servotwin.cli import robot_report as files
     from servotwin.cli import robot_task_report as words
     from servotwin.cli.shared_options import servo_of
-    from servotwin.robots.task_run import Comparison
+    from servotwin.robots.arms.task_run import Comparison
 
     chosen = _cases(robot, task)
     comparison = Comparison(servo=servo_of(servo, []), bus_servo=servo_of(bus_servo, []), speed=speed)
@@ -315,7 +315,7 @@ def compare(
 
 
 def _cases(robots: list[str] | None, tasks: list[str] | None) -> list[Any]:
-    from servotwin.robots import task_run
+    from servotwin.robots.arms import task_run
 
     for name in robots or []:
         if name not in task_run.ROBOTS:

@@ -108,7 +108,7 @@ def _done(servo: Servo) -> Robots:
         task_path,
         unequal_servos,
     )
-    from servotwin.robots.controllers import STEERINGS
+    from servotwin.robots.arms.controllers import STEERINGS
 
     model, arms = PulseServo(servo), {}
     for name, third_link in (("figure-28", True), ("figure-29", False)):

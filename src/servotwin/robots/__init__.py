@@ -3,19 +3,19 @@
 from typing import Any
 
 from servotwin.robots.actuator_recipe import Recipe, recipe_of
-from servotwin.robots.arm import Arm, scara, two_link
-from servotwin.robots.command_map import CommandMap
+from servotwin.robots.arms.arm import Arm, scara, two_link
+from servotwin.robots.arms.task_run import TaskMetrics, TaskRun, ideal_task, run_task
+from servotwin.robots.arms.tasks import AwayFromLimits, JointPath, LeastMotion, LeastTorque, ToolPath, follow, task_path
 from servotwin.robots.drive import DriveState, ServoDrive
 from servotwin.robots.mjcf_models import mobile_robot
 from servotwin.robots.model_file import joint_names, joint_ranges, robot_model
 from servotwin.robots.motion import Motion, read_motion
-from servotwin.robots.mount import Mount
-from servotwin.robots.record import Record, ServoRecord
 from servotwin.robots.replay import JointError, Replay, RobotValidation, validate_robot
 from servotwin.robots.run import RobotRun, run_motion
+from servotwin.robots.servos.command_map import CommandMap
+from servotwin.robots.servos.mount import Mount
+from servotwin.robots.servos.record import Record, ServoRecord
 from servotwin.robots.sizing import Sizing, sizing_of
-from servotwin.robots.task_run import TaskMetrics, TaskRun, ideal_task, run_task
-from servotwin.robots.tasks import AwayFromLimits, JointPath, LeastMotion, LeastTorque, ToolPath, follow, task_path
 from servotwin.robots.tracking import contour_error
 from servotwin.robots.waypoints import (
     Odometry,

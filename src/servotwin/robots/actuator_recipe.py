@@ -29,8 +29,8 @@ from servotwin.loads import Load
 from servotwin.models import AveragedServo, BoundedServo, DigitalServo, Model, mid_travel
 from servotwin.models.terms.friction import sliding_friction
 from servotwin.physics.motor import back_emf, electromagnetic_torque, steady_armature_current
-from servotwin.robots.mount import SERVOS
 from servotwin.robots.places import load_mujoco
+from servotwin.robots.servos.mount import SERVOS
 from servotwin.simulation.simulator import simulate
 from servotwin.units import is_finite
 

@@ -14,9 +14,9 @@ from servotwin.errors import InputError, SimulationError, UnknownNameError
 from servotwin.models import mid_travel
 from servotwin.robots.model_file import Plant, driven_joints, joint_names, robot_model
 from servotwin.robots.motion import Motion
-from servotwin.robots.mount import Mount
 from servotwin.robots.places import load_mujoco
 from servotwin.robots.run import RobotRun, run_motion
+from servotwin.robots.servos.mount import Mount
 from servotwin.robots.sizing import Sizing, sizing_of
 
 if TYPE_CHECKING:

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, ServotwinError, SimulationError, UnknownNameError
 from servotwin.models import Model
-from servotwin.robots.command_map import CommandMap, told
-from servotwin.robots.joints_layout import BLOCK, FAILED, FOREIGN, INSTANCE, MESSAGES, RECORD, WELL
-from servotwin.robots.mount import Mount, heat_notes, joints_of, treat_friction, warm_mounts
 from servotwin.robots.places import load_mujoco, places
-from servotwin.robots.record import TOO_FEW, Record, set_iterations
-from servotwin.robots.servo_groups import (
+from servotwin.robots.servos.command_map import CommandMap, told
+from servotwin.robots.servos.joints_layout import BLOCK, FAILED, FOREIGN, INSTANCE, MESSAGES, RECORD, WELL
+from servotwin.robots.servos.mount import Mount, heat_notes, joints_of, treat_friction, warm_mounts
+from servotwin.robots.servos.record import TOO_FEW, Record, set_iterations
+from servotwin.robots.servos.servo_groups import (
     Harbour,
     Instance,
     arrays_of,

@@ -10,11 +10,11 @@ import numpy as np
 
 from servotwin.errors import InputError, MissingExtraError, ServotwinError, SimulationError, UnknownNameError
 from servotwin.models import Model
-from servotwin.robots.command_map import CommandMap, maps, seats
 from servotwin.robots.drive import ServoDrive
-from servotwin.robots.mount import Mount
 from servotwin.robots.places import load_mujoco
-from servotwin.robots.record import Record
+from servotwin.robots.servos.command_map import CommandMap, maps, seats
+from servotwin.robots.servos.mount import Mount
+from servotwin.robots.servos.record import Record
 
 try:
     import gymnasium

@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 from xml.etree import ElementTree as Xml
 
 from servotwin.errors import InputError, UnknownNameError
-from servotwin.robots.coupling import actuators_at_joints, couplings_of, other_actuators
 from servotwin.robots.mjcf_models import mobile_robot, so101
 from servotwin.robots.overlaps import part_neighbours, passive_joints
 from servotwin.robots.places import load_mujoco
+from servotwin.robots.servos.coupling import actuators_at_joints, couplings_of, other_actuators
 from servotwin.text import checked_name, fault_of
 
 # --- Robot files of strangers: macros of xacro, meshes of ROS packages, and which joints a URDF says are --------------

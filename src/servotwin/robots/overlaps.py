@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.robots.coupling import couple
 from servotwin.robots.motion import Motion
 from servotwin.robots.places import load_mujoco
+from servotwin.robots.servos.coupling import couple
 
 Array = NDArray[np.float64]
 DEEP = 1e-3  # m: deeper than soft contacts let a small robot sink in

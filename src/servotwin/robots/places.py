@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from servotwin.errors import MissingExtraError, ServotwinError
-from servotwin.robots.joints_layout import FUNCTIONS, PLACES
+from servotwin.robots.servos.joints_layout import FUNCTIONS, PLACES
 
 _ODD, _ODD_TOO = 1234.567890123456789, 9876.54321012345678  # numbers that stand nowhere else
 _INSIDE = {"time": _ODD, "energy": _ODD_TOO}  # of the data's own memory; all else is behind addresses in it

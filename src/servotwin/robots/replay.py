@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 from servotwin.datasheet.full_drive import FullDrive
 from servotwin.errors import InputError
 from servotwin.models import Model
-from servotwin.robots.coupling import couple, silence
 from servotwin.robots.model_file import plant_of
 from servotwin.robots.motion import Motion
-from servotwin.robots.mount import Mount, joints_of, supplied
 from servotwin.robots.overlaps import leave_out_measured
 from servotwin.robots.places import load_mujoco
 from servotwin.robots.run import RobotRun, run_motion
+from servotwin.robots.servos.coupling import couple, silence
+from servotwin.robots.servos.mount import Mount, joints_of, supplied
 from servotwin.simulation.progress import Progress, shown
 
 # --- The same robot with MuJoCo's `<position>` actuators, with numbers that people use for arms of bus servos ---------

@@ -16,15 +16,15 @@ from servotwin.errors import InputError, SimulationError, UnknownNameError
 from servotwin.models import Model
 from servotwin.parameters.groups import Supply
 from servotwin.parameters.registers.held import as_robot_has_it, said_of, set_of_robot
-from servotwin.robots.command_map import unused_ranges
-from servotwin.robots.coupling import couple, couplings_of, led
 from servotwin.robots.drive import ServoDrive
 from servotwin.robots.model_file import joint_names, joint_ranges, plant_of
 from servotwin.robots.motion import Motion
-from servotwin.robots.mount import Mount, supplied, warm_mounts
 from servotwin.robots.overlaps import fall_of, leave_out, links_of, overlap_words, overlaps, robot_bodies
 from servotwin.robots.places import load_mujoco
-from servotwin.robots.record import FROM_NOWHERE, Record
+from servotwin.robots.servos.command_map import unused_ranges
+from servotwin.robots.servos.coupling import couple, couplings_of, led
+from servotwin.robots.servos.mount import Mount, supplied, warm_mounts
+from servotwin.robots.servos.record import FROM_NOWHERE, Record
 from servotwin.robots.tracking import IdealRun, Tracking, blend_window, ideal_run, tracking_of
 from servotwin.simulation.progress import Progress, shown
 from servotwin.simulation.remarks import NOT_AT_REST, Sag, floor_of, held_back, may_fall, sag_in, watches_its_supply

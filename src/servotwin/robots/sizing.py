@@ -21,13 +21,13 @@ from servotwin.datasheet.warming import WIRE_LIMIT, Masses, thermal_masses
 from servotwin.errors import InputError
 from servotwin.physics import Temperatures, winding_resistance
 from servotwin.physics.thermal import COPPER_COEFFICIENT, REFERENCE_TEMPERATURE, copper_loss
-from servotwin.robots.mount import supplied
+from servotwin.robots.servos.mount import supplied
 from servotwin.simulation.remarks import LOW, Remark
 
 if TYPE_CHECKING:
     from servotwin.models import Model
-    from servotwin.robots.record import ServoRecord
     from servotwin.robots.run import RobotRun
+    from servotwin.robots.servos.record import ServoRecord
 
 
 # --- How warm the servos of a robot get, in a motion and where it goes on for ever ------------------------------------

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from servotwin.errors import InputError, SimulationError
-from servotwin.robots.coupling import Linkage
 from servotwin.robots.motion import Motion
 from servotwin.robots.overlaps import body_name, joints_between
 from servotwin.robots.places import load_mujoco
-from servotwin.robots.record import ServoRecord
+from servotwin.robots.servos.coupling import Linkage
+from servotwin.robots.servos.record import ServoRecord
 from servotwin.simulation.remarks import Remark
 from servotwin.units import is_finite
 

@@ -21,14 +21,14 @@ from servotwin.parameters import Servo, load_servo
 from servotwin.robots.drive import ServoDrive
 from servotwin.robots.mjcf_models import MASS, TRACK, WHEEL_RADIUS, WHEELS
 from servotwin.robots.model_file import robot_model
-from servotwin.robots.mount import Mount
 from servotwin.robots.places import load_mujoco
+from servotwin.robots.servos.mount import Mount
 from servotwin.simulation.progress import Progress, shown
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
     from servotwin.parameters.groups import Supply
-    from servotwin.robots.record import Record
+    from servotwin.robots.servos.record import Record
 
 
 # --- Wheels on servos that turn endlessly, and where a robot believes that they have taken it -------------------------

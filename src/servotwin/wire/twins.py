@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, MissingExtraError, ServotwinError
 from servotwin.models import DigitalServo
 from servotwin.parameters.groups import Firmware, Supply
-from servotwin.robots.servo_groups import OF_THE_BUS, differing, of_one_form
+from servotwin.robots.servos.servo_groups import OF_THE_BUS, differing, of_one_form
 from servotwin.simulation import VectorSimulator
 
 # --- The twins behind the IDs of a bus: lanes of one compiled simulator, on one supply --------------------------------

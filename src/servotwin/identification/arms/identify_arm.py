@@ -60,9 +60,9 @@ from servotwin.parameters import Servo, Supply, load_servo
 from servotwin.parameters.registers.held import as_robot_has_it, said_of, set_of_robot
 from servotwin.parameters.servo import OUTPUT_SIDE, Quantity
 from servotwin.robots import Motion, Mount, RobotValidation, joint_names, robot_model, validate_robot
-from servotwin.robots.coupling import couplings_of
 from servotwin.robots.motion import joints_of_dataset
 from servotwin.robots.overlaps import leave_out_measured
+from servotwin.robots.servos.coupling import couplings_of
 from servotwin.units import is_finite
 
 # --- The robot of a fit: its model, its servos, and what stands for them where nobody says ----------------------------

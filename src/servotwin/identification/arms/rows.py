@@ -27,7 +27,7 @@ from servotwin.models import Model
 from servotwin.parameters import Servo, Supply
 from servotwin.robots import Motion, Mount, joint_names, joint_ranges, read_motion
 from servotwin.robots.motion import episodes_of
-from servotwin.robots.servo_groups import differing, of_one_form
+from servotwin.robots.servos.servo_groups import differing, of_one_form
 
 # --- What was recorded of a robot, made ready for a fit: goals and positions of its joints, side by side --------------
 

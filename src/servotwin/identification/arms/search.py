@@ -29,9 +29,9 @@ from servotwin.identification.arms.rows import (
 from servotwin.identification.fitting.case import HUBER
 from servotwin.identification.fitting.least_squares import Loss, Prior, block, bounded_step
 from servotwin.robots import ServoDrive
-from servotwin.robots.coupling import couple, couplings_of
 from servotwin.robots.places import load_mujoco
 from servotwin.robots.run import ticks_in
+from servotwin.robots.servos.coupling import couple, couplings_of
 from servotwin.simulation import VectorSimulator
 
 # --- What the measured motion of a robot asks of each joint: torques and inertias, link by link -----------------------

@@ -71,8 +71,8 @@ class Call:
 
 _FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
 DRIVERS = Recipe("drivers", tuple(f"servotwin.{entry}" for entry in (
-    "simulation.compile.tick:renew", "simulation.compile.tick:advance", "robots.joints:control",
-    "robots.joints:step")), by_numbers=True)
+    "simulation.compile.tick:renew", "simulation.compile.tick:advance", "robots.servos.joints:control",
+    "robots.servos.joints:step")), by_numbers=True)
 """What is called with numbers, by kernels, by a program in C and by a rigid-body engine."""
 
 
@@ -150,7 +150,7 @@ def tick_address() -> int:
 
 @cache
 def joint_addresses() -> tuple[int, int]:
-    """Return the addresses of two C functions of `robots.joints`.
+    """Return the addresses of two C functions of `robots.servos.joints`.
 
     They are `void control(const mjModel *m, mjData *d)` and
     `int64_t step(int64_t *drive, const mjModel *m, mjData *d, int64_t steps)`.

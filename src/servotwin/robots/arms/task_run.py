@@ -15,14 +15,14 @@ from servotwin.control import ControlRun, Trajectory, bare_bridge, run_loop
 from servotwin.errors import ServotwinError
 from servotwin.models import AveragedServo, BoundedServo, DigitalServo, Model, PulseServo
 from servotwin.parameters import Servo, Supply
-from servotwin.robots.arm import TOOL, Arm, scara, two_link
-from servotwin.robots.controllers import STEERINGS, Delayed, DrivePort, Plain, Steering, known_of
+from servotwin.robots.arms.arm import TOOL, Arm, scara, two_link
+from servotwin.robots.arms.controllers import STEERINGS, Delayed, DrivePort, Plain, Steering, known_of
+from servotwin.robots.arms.tasks import Criterion, JointPath, LeastMotion, ToolPath, follow, task_path
 from servotwin.robots.drive import ServoDrive
 from servotwin.robots.motion import Motion
-from servotwin.robots.mount import Mount, supplied, warm_mounts
 from servotwin.robots.places import load_mujoco
 from servotwin.robots.run import SETTLE, RobotRun, finished, supply_of
-from servotwin.robots.tasks import Criterion, JointPath, LeastMotion, ToolPath, follow, task_path
+from servotwin.robots.servos.mount import Mount, supplied, warm_mounts
 from servotwin.robots.tracking import Contour, contour_error, ideal_run
 
 # --- `run_task` -------------------------------------------------------------------------------------------------------
@@ -201,8 +201,8 @@ def run_task(arm: Arm, servos: Model | Mapping[str, Model], path: ToolPath, *, c
     Examples
     --------
     >>> import servotwin as st
-    >>> from servotwin.robots.tasks import task_path
-    >>> from servotwin.robots.arm import two_link
+    >>> from servotwin.robots.arms.tasks import task_path
+    >>> from servotwin.robots.arms.arm import two_link
     >>> arm = two_link()
     >>> done = run_task(arm, st.PulseServo(st.load_servo("hitec-hs-755hb")), task_path(arm, "circle"), settle=0.1)
     >>> done.ideal_contour.largest < 1e-6 < 1e-3 < done.metrics.contour_rms < 1e-2
@@ -260,9 +260,9 @@ def ideal_task(joint_path: JointPath) -> IdealTask:
 
     Examples
     --------
-    >>> from servotwin.robots.tasks import follow
-    >>> from servotwin.robots.tasks import task_path
-    >>> from servotwin.robots.arm import two_link
+    >>> from servotwin.robots.arms.tasks import follow
+    >>> from servotwin.robots.arms.tasks import task_path
+    >>> from servotwin.robots.arms.arm import two_link
     >>> ideal_task(follow(two_link(), task_path(two_link(), "circle"))).contour.largest < 1e-6
     True
     """

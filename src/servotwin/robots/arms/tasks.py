@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from servotwin.errors import InputError, MissingExtraError, UnknownNameError
-from servotwin.robots.arm import TOOL, Arm
+from servotwin.robots.arms.arm import TOOL, Arm
 from servotwin.robots.model_file import joint_names, joint_ranges
 from servotwin.robots.motion import Motion
 from servotwin.robots.places import load_mujoco
@@ -435,8 +435,8 @@ def follow(arm: Arm, path: ToolPath, *, start: Array | None = None, posture: Pos
 
     Examples
     --------
-    >>> from servotwin.robots.tasks import circle
-    >>> from servotwin.robots.arm import two_link
+    >>> from servotwin.robots.arms.tasks import circle
+    >>> from servotwin.robots.arms.arm import two_link
     >>> arm = two_link()
     >>> found = follow(arm, circle(arm.centre, 0.03, plane=(0, 2)))
     >>> found.angles[0].round(3).tolist()

@@ -37,14 +37,14 @@ from servotwin.control import (
 from servotwin.control.controller import Measured, Readings
 from servotwin.control.ports import wire_of
 from servotwin.errors import InputError
-from servotwin.robots.arm import Arm
-from servotwin.robots.command_map import told
+from servotwin.robots.arms.arm import Arm
 from servotwin.robots.drive import ServoDrive
 from servotwin.robots.motion import Motion
-from servotwin.robots.mount import Mount
 from servotwin.robots.places import load_mujoco
-from servotwin.robots.record import ServoRecord
 from servotwin.robots.run import begin
+from servotwin.robots.servos.command_map import told
+from servotwin.robots.servos.mount import Mount
+from servotwin.robots.servos.record import ServoRecord
 
 # --- Servos of a robot as what controllers are wired to: the port of `servotwin.control`, with joints as --------------
 
@@ -243,7 +243,7 @@ class RigidBody:
     Examples
     --------
     >>> import servotwin as st
-    >>> from servotwin.robots.arm import two_link
+    >>> from servotwin.robots.arms.arm import two_link
     >>> arm = two_link()
     >>> body = RigidBody(arm.model(), arm.mounts(st.PulseServo(st.load_servo("hitec-hs-755hb"))))
     >>> body(np.zeros(2), np.zeros(2), np.zeros(2)).shape

@@ -10,8 +10,8 @@ from servotwin.datasheet.holding import changed, supply_values
 from servotwin.datasheet.warming import thermal_masses
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models import AveragedServo, BoundedServo, DigitalServo, Model, PulseServo, PulseServoInductive
-from servotwin.robots.coupling import actuators_at_joints, couplings_of, tendon_actuators
 from servotwin.robots.places import load_mujoco
+from servotwin.robots.servos.coupling import actuators_at_joints, couplings_of, tendon_actuators
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:

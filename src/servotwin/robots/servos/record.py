@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, MissingExtraError, UnknownNameError
 from servotwin.models.engine.observe import Observed
 from servotwin.models.outputs import SIGNALS
-from servotwin.robots.command_map import Told, told
-from servotwin.robots.joints_layout import KEPT, ROW
-from servotwin.robots.mount import Joint, Mount
+from servotwin.robots.servos.command_map import Told, told
+from servotwin.robots.servos.joints_layout import KEPT, ROW
+from servotwin.robots.servos.mount import Joint, Mount
 from servotwin.simulation import result
 from servotwin.simulation.lanes.vector import AT_MOTOR
 from servotwin.simulation.remarks import NOT_AT_REST, TRIPS, Remark

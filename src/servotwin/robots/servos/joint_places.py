@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from servotwin.models.engine.observe import Observed
-from servotwin.robots import joints_layout as layout
+from servotwin.robots.servos import joints_layout as layout
 
 WORD = 8  # bytes
 SIGNALS, OWN_SIGNALS, IN_FRONT = len(Observed._fields), len(layout.KEPT), len(layout.ROW)

@@ -16,8 +16,8 @@ from servotwin.models import Model, mid_travel
 from servotwin.robots import mjcf_models as mjcf
 from servotwin.robots.mjcf_models import Block, Shape, Vector, beam, box, disc, words
 from servotwin.robots.model_file import robot_model
-from servotwin.robots.mount import Mount
 from servotwin.robots.places import load_mujoco
+from servotwin.robots.servos.mount import Mount
 from servotwin.units import is_finite
 
 # --- Arms made from code: their MJCF, where their servos sit, and what of the tool they can place ---------------------

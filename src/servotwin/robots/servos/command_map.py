@@ -14,8 +14,8 @@ from servotwin.errors import InputError, UnknownNameError
 from servotwin.models.switched import SwitchedServo
 from servotwin.models.terms.wiring import PULSE_RANGE
 from servotwin.robots.model_file import joint_names
-from servotwin.robots.mount import Joint, Mount, joints_of
 from servotwin.robots.places import load_mujoco
+from servotwin.robots.servos.mount import Joint, Mount, joints_of
 from servotwin.simulation import VectorSimulator
 from servotwin.units import is_finite
 

@@ -16,8 +16,8 @@ from __future__ import annotations
 
 import math
 
-from servotwin.robots import joint_places as place
-from servotwin.robots.joints_layout import (
+from servotwin.robots.servos import joint_places as place
+from servotwin.robots.servos.joints_layout import (
     ASK_NEW,
     ASK_RESET,
     ASK_ROOM,

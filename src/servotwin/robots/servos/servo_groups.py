@@ -17,9 +17,10 @@ from servotwin.datasheet.turning import is_pulsed
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models import Model
 from servotwin.parameters.groups import Supply
-from servotwin.robots.command_map import CommandMap, own_map, told
-from servotwin.robots.coupling import silence
-from servotwin.robots.joints_layout import (
+from servotwin.robots.places import Places, load_mujoco
+from servotwin.robots.servos.command_map import CommandMap, own_map, told
+from servotwin.robots.servos.coupling import silence
+from servotwin.robots.servos.joints_layout import (
     ARRAYS,
     ASK_NEW,
     ASK_RESET,
@@ -34,8 +35,7 @@ from servotwin.robots.joints_layout import (
     ROOM,
     ROW,
 )
-from servotwin.robots.mount import Joint
-from servotwin.robots.places import Places, load_mujoco
+from servotwin.robots.servos.mount import Joint
 from servotwin.simulation import VectorSimulator
 from servotwin.simulation.lanes.c_entry import CEntry
 

@@ -1,0 +1,1 @@
+"""The arms of the paper: their tools follow paths, under controllers."""
