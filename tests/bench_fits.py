@@ -10,7 +10,7 @@ import servotwin as st
 from servotwin.bench.recording import About, Limits, Wiring, experiments, record
 from servotwin.bench.rehearsal import rehearsal_rig
 from servotwin.identification import identify
-from servotwin.identification.fitting.free import nominal
+from servotwin.identification.fitting.search.free import nominal
 from servotwin.loads import Constant, Inertia, Load
 
 BASE = "hitec-hs-755hb"

@@ -13,9 +13,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from common import best
 
 import servotwin as st
-from servotwin.identification.fitting.case import Point
-from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.free import Space
+from servotwin.identification.fitting.search.case import Point
+from servotwin.identification.fitting.search.forecast import Forecast
+from servotwin.identification.fitting.search.free import Space
 from servotwin.loads import Load
 from servotwin.logs import Log
 from servotwin.models import Model

@@ -20,7 +20,7 @@ import servotwin as st
 from reference import bus_rig, rig_fits
 from reference import rig_draws as draws
 from reference.rig_defects import with_defect
-from servotwin.identification.fitting.stopping import LONGER, Course
+from servotwin.identification.fitting.search.stopping import LONGER, Course
 
 FROM = 1.0  # s
 AT = (0.1, 0.25, 0.5, 0.75)  # of the whole time

@@ -29,7 +29,7 @@ import servotwin as st
 from reference import rig
 from reference import rig_draws as draws
 from reference.rig_logs import REDUCTION, log_of
-from servotwin.identification.fitting.task import Task
+from servotwin.identification.fitting.search.task import Task
 
 DATA = next((one for up in Path(__file__).resolve().parents if (one := up / "shared" / "data").is_dir()), None)
 XL330 = ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque",

@@ -200,7 +200,7 @@ def test_a_bench_table(cli, tmp_path):
 
 
 def test_an_interrupt_keeps_the_best_so_far(fit, tmp_path, monkeypatch):
-    from servotwin.identification.fitting.least_squares import Search
+    from servotwin.identification.fitting.search.least_squares import Search
 
     run, steps = Search.run, []
 
@@ -238,7 +238,7 @@ def test_the_time_that_a_fit_may_take(fit, tmp_path):
 
 
 def test_an_interrupt_before_the_first_step_leaves_nothing(fit, tmp_path, monkeypatch):
-    from servotwin.identification.fitting.least_squares import Search
+    from servotwin.identification.fitting.search.least_squares import Search
 
     def interrupted(self, *arguments, **more):
         raise KeyboardInterrupt

@@ -16,7 +16,8 @@ pytest.importorskip("mujoco", reason="the extra `robots` is not installed")
 import servotwin as st
 from robots.robots_cases import links
 from robots.test_replay import JOINTS, recorded
-from servotwin.identification.fitting import checks, stopping
+from servotwin.identification.fitting import checks
+from servotwin.identification.fitting.search import stopping
 
 pytestmark = pytest.mark.long
 

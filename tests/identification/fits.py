@@ -3,7 +3,7 @@
 import servotwin as st
 from identification.synthetic_logs import TRUTH, noisy, run
 from servotwin.identification import identify
-from servotwin.identification.fitting.free import nominal
+from servotwin.identification.fitting.search.free import nominal
 
 DISC = st.loads.Inertia(1.06e-2) + st.loads.Constant(0.3)
 FREE = ["motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque",

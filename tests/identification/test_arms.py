@@ -13,7 +13,7 @@ from servotwin.identification.arms import identify_arm, search
 from servotwin.identification.arms.arm_fit import BELIEFS, ArmCause, confirmed, shaken
 from servotwin.identification.arms.rows import Noise, Numbers, beyond_scatter, episodes_from, used_rows, whitened
 from servotwin.identification.arms.search import JointLanes, Problem, WholeArm
-from servotwin.identification.fitting.case import LogPart
+from servotwin.identification.fitting.search.case import LogPart
 from servotwin.identification.fitting.uncertainty import Rows, Unidentifiable
 from servotwin.robots import Motion, Mount, run_motion
 

@@ -21,9 +21,9 @@ from servotwin.identification.fitting.assumptions import (
     assumptions,
     with_assumptions,
 )
-from servotwin.identification.fitting.case import PERIOD_SCALE, Point
-from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.free import Space
+from servotwin.identification.fitting.search.case import PERIOD_SCALE, Point
+from servotwin.identification.fitting.search.forecast import Forecast
+from servotwin.identification.fitting.search.free import Space
 from servotwin.identification.fitting.uncertainty import Uncertainty
 
 FILE = st.load_servo("hitec-hs-755hb").replace({"electronics.frame_period": 0.01})

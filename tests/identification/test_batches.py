@@ -8,9 +8,9 @@ import pytest
 import servotwin as st
 from identification.synthetic_logs import PENDULUM, TRUTH, run
 from servotwin.errors import InputError
-from servotwin.identification.fitting.case import DELAY_SCALE, Point
-from servotwin.identification.fitting.forecast import Bundle, Forecast, Running, batches
-from servotwin.identification.fitting.free import Space
+from servotwin.identification.fitting.search.case import DELAY_SCALE, Point
+from servotwin.identification.fitting.search.forecast import Bundle, Forecast, Running, batches
+from servotwin.identification.fitting.search.free import Space
 from servotwin.simulation.progress import Crew
 
 FREE = ("output_inertia", "electronics.stretcher_gain")

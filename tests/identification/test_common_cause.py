@@ -6,7 +6,7 @@ import pytest
 
 from identification.fits import FREE, fitted, some
 from identification.synthetic_logs import TRUTH
-from servotwin.identification.fitting.free import nominal
+from servotwin.identification.fitting.search.free import nominal
 from servotwin.identification.fitting.validate import Agreeing, common_cause
 
 

@@ -11,10 +11,10 @@ from identification.digital_servos import ON_BUS, PLANT, PULSED, digital_log, of
 from identification.fits import near
 from servotwin.errors import ServotwinError
 from servotwin.identification import Log, Structure, as_structure, compare_structures, identify, validate
-from servotwin.identification.fitting.case import GAIN, with_loop_gain
 from servotwin.identification.fitting.checks import usual_free
-from servotwin.identification.fitting.free import nominal
 from servotwin.identification.fitting.ladder import as_arm
+from servotwin.identification.fitting.search.case import GAIN, with_loop_gain
+from servotwin.identification.fitting.search.free import nominal
 
 QUICK = {"priors": None, "starts": 1, "compare_with": (), "holdout": 0, "diagnose": False}
 MOTIONS = ("step", "prbs", "triangle")

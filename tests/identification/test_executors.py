@@ -13,9 +13,9 @@ from identification.fits import WRONG, fitted, some
 from identification.synthetic_logs import PENDULUM
 from servotwin.errors import InputError
 from servotwin.identification import friction_ladder
-from servotwin.identification.fitting.case import Point
-from servotwin.identification.fitting.forecast import Forecast, Running
-from servotwin.identification.fitting.free import Space
+from servotwin.identification.fitting.search.case import Point
+from servotwin.identification.fitting.search.forecast import Forecast, Running
+from servotwin.identification.fitting.search.free import Space
 from simulation.test_workers import Backwards
 
 SPAWN = multiprocessing.get_context("spawn")

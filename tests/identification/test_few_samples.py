@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from servotwin.identification.fitting.least_squares import Prior
+from servotwin.identification.fitting.search.least_squares import Prior
 from servotwin.identification.fitting.uncertainty import Rows, uncertainty
 
 

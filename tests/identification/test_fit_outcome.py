@@ -9,8 +9,8 @@ import pytest
 import servotwin as st
 from identification.fits import DISC, STD, WRONG, fitted, some
 from identification.synthetic_logs import TRUTH, noisy, run
-from servotwin.identification.fitting.free import nominal
-from servotwin.identification.fitting.stopping import LONGER
+from servotwin.identification.fitting.search.free import nominal
+from servotwin.identification.fitting.search.stopping import LONGER
 
 
 def test_traces_and_errors_are_those_of_the_simulation(logs, fit):

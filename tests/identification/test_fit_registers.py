@@ -9,7 +9,7 @@ import pytest
 import servotwin as st
 from servotwin.identification import validate
 from servotwin.identification.fitting.registers import as_logs_say, of_no_robot, register_search
-from servotwin.identification.fitting.stopping import Within
+from servotwin.identification.fitting.search.stopping import Within
 from servotwin.logs.bam_logs import read_bam_log
 from servotwin.models import default_model
 from servotwin.parameters.registers.held import register_family_of

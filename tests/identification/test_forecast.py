@@ -8,9 +8,9 @@ import pytest
 import servotwin as st
 from identification.synthetic_logs import PENDULUM, TRUTH, noisy, run
 from servotwin.errors import InputError
-from servotwin.identification.fitting.case import DELAY_SCALE, FINE, OFFSET_SCALE, SPEED_SCALE, Point
-from servotwin.identification.fitting.forecast import Forecast, Running
-from servotwin.identification.fitting.free import Space
+from servotwin.identification.fitting.search.case import DELAY_SCALE, FINE, OFFSET_SCALE, SPEED_SCALE, Point
+from servotwin.identification.fitting.search.forecast import Forecast, Running
+from servotwin.identification.fitting.search.free import Space
 
 FREE = ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque",
         "electronics.stretcher_gain", "electronics.deadband", "load.pendulum.mass")

@@ -8,7 +8,7 @@ import pytest
 import servotwin as st
 from identification.fits import FREE, TRUTH, WRONG, fitted, some
 from servotwin.identification import Log
-from servotwin.identification.fitting.case import Frames, gap_of, gaps, latency, near_edges, signal, widest
+from servotwin.identification.fitting.search.case import Frames, gap_of, gaps, latency, near_edges, signal, widest
 from servotwin.logs.regular import made_regular, regular_times
 
 PERIOD = 0.02

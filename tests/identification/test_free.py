@@ -8,7 +8,7 @@ import pytest
 import servotwin as st
 from identification.synthetic_logs import TRUTH
 from servotwin.errors import InputError, ServotwinError
-from servotwin.identification.fitting.free import LUMPED, Space, nominal, unit_of_free
+from servotwin.identification.fitting.search.free import LUMPED, Space, nominal, unit_of_free
 
 MODEL = st.PulseServo(TRUTH)
 N = TRUTH.gear.gear_reduction

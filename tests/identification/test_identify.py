@@ -8,7 +8,7 @@ import pytest
 import servotwin as st
 from identification.fits import BOUNDED, DISC, FREE, MOTIONS, STD, WRONG, fitted, near, some, true
 from identification.synthetic_logs import TRUTH, noisy, run
-from servotwin.identification.fitting.free import nominal
+from servotwin.identification.fitting.search.free import nominal
 
 # --------------------------------------------------------------------------------------- the truth
 

@@ -8,8 +8,8 @@ from scipy.optimize import brentq, minimize_scalar
 
 from identification.toy_forecast import Toy
 from servotwin.identification.fitting.assumptions import ends
-from servotwin.identification.fitting.case import Point
-from servotwin.identification.fitting.least_squares import Loss, Prior, Search
+from servotwin.identification.fitting.search.case import Point
+from servotwin.identification.fitting.search.least_squares import Loss, Prior, Search
 from servotwin.identification.fitting.uncertainty import Uncertainty, rows_of, uncertainty
 
 T = np.linspace(0.05, 1.0, 12)

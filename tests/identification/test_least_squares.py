@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import least_squares
 
 from identification.toy_forecast import Toy
-from servotwin.identification.fitting.case import STEP, LogPart, Point
-from servotwin.identification.fitting.least_squares import (
+from servotwin.identification.fitting.search.case import STEP, LogPart, Point
+from servotwin.identification.fitting.search.least_squares import (
     _LEAST_GAIN,
     Block,
     Loss,

@@ -5,9 +5,9 @@ import pytest
 
 import servotwin as st
 from identification.digital_servos import ON_BUS, digital_log
-from servotwin.identification.fitting.case import Point
-from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.free import Space
+from servotwin.identification.fitting.search.case import Point
+from servotwin.identification.fitting.search.forecast import Forecast
+from servotwin.identification.fitting.search.free import Space
 
 pytestmark = pytest.mark.long
 

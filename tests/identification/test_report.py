@@ -13,9 +13,9 @@ import servotwin as st
 from cli import fit_logs
 from servotwin.errors import OutputExistsError
 from servotwin.identification import identify
-from servotwin.identification.fitting.case import SHARED
 from servotwin.identification.fitting.fit import LINEARISED_TIMES
 from servotwin.identification.fitting.identify import LINEARISED
+from servotwin.identification.fitting.search.case import SHARED
 from servotwin.identification.fitting.uncertainty import Unidentifiable
 from servotwin.identification.fitting.verdict import Cause
 from servotwin.identification.report import page as report

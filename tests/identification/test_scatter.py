@@ -7,8 +7,8 @@ import servotwin as st
 from identification.fits import FREE, fitted, near, some
 from servotwin.errors import InputError
 from servotwin.identification import Space
-from servotwin.identification.fitting.case import make_case
-from servotwin.identification.fitting.least_squares import moving, scatter
+from servotwin.identification.fitting.search.case import make_case
+from servotwin.identification.fitting.search.least_squares import moving, scatter
 
 COUNT = 2000
 

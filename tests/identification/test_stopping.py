@@ -11,7 +11,7 @@ import pytest
 import servotwin as st
 from identification.fits import fitted
 from servotwin.errors import InputError
-from servotwin.identification.fitting.stopping import Course, Within
+from servotwin.identification.fitting.search.stopping import Course, Within
 
 
 def test_the_time_that_a_fit_may_take_stops_it(logs):

@@ -7,12 +7,12 @@ import servotwin as st
 from identification.digital_servos import PULSED, digital_log
 from identification.fits import near
 from servotwin.identification import Space, identify
-from servotwin.identification.fitting.case import DELAY_SCALE, Frames, Point
 from servotwin.identification.fitting.diagnosis.bench import Purse, Watched
-from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.identify import NUISANCE, usual_nuisance
-from servotwin.identification.fitting.least_squares import Loss
-from servotwin.identification.fitting.phases import Scan, Ticks, ticks_of
+from servotwin.identification.fitting.search.case import DELAY_SCALE, Frames, Point
+from servotwin.identification.fitting.search.forecast import Forecast
+from servotwin.identification.fitting.search.least_squares import Loss
+from servotwin.identification.fitting.search.phases import Scan, Ticks, ticks_of
 from validation.test_digital_coverage import MOTIONS, OFF, bench
 
 DISC = st.loads.Inertia(4e-3)  # rests until the first tick

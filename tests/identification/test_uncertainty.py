@@ -6,8 +6,8 @@ import re
 import numpy as np
 import pytest
 
-from servotwin.identification.fitting.case import LogPart
-from servotwin.identification.fitting.least_squares import Loss, Prior
+from servotwin.identification.fitting.search.case import LogPart
+from servotwin.identification.fitting.search.least_squares import Loss, Prior
 from servotwin.identification.fitting.uncertainty import Counts, Rows, _widest, memory_of, rows_of, uncertainty
 
 NONE = Prior(np.zeros(1), np.zeros(1))

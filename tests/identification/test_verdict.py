@@ -11,7 +11,7 @@ from servotwin.identification import identify
 from servotwin.identification.fitting.diagnosis.bench import gain, teaching
 from servotwin.identification.fitting.identify import _outliers
 from servotwin.identification.fitting.residual_noise import SensorSeries, cross_correlation, isolated, noise_of
-from servotwin.identification.fitting.stopping import LONGER
+from servotwin.identification.fitting.search.stopping import LONGER
 from servotwin.identification.fitting.uncertainty import Rows
 from servotwin.identification.fitting.verdict import against, judge, rival
 from servotwin.logs.log import Log

@@ -9,7 +9,7 @@ import pytest
 import servotwin as st
 from identification.synthetic_logs import TRUTH, noisy, run
 from servotwin.identification import identify
-from servotwin.identification.fitting.free import nominal
+from servotwin.identification.fitting.search.free import nominal
 from servotwin.identification.fitting.yielding import Yielded
 
 FORWARD, BACKWARD = "friction.coulomb_torque_forward", "friction.coulomb_torque_backward"

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from servotwin.identification.fitting.case import STEP, LogPart, Point
+from servotwin.identification.fitting.search.case import STEP, LogPart, Point
 
 Array = Any
 

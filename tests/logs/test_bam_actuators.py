@@ -9,7 +9,7 @@ import pytest
 import servotwin as st
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.identification import BamConvention, read_bam_log, read_bam_parameters, write_bam_parameters
-from servotwin.identification.fitting.case import with_loop_gain
+from servotwin.identification.fitting.search.case import with_loop_gain
 from servotwin.logs import BAM_ACTUATORS
 from servotwin.logs.bam_logs import bam_name_of
 

@@ -9,7 +9,7 @@ import pytest
 
 from identification.digital_servos import PULSED, digital_log
 from servotwin.identification import identify
-from servotwin.identification.fitting.free import nominal
+from servotwin.identification.fitting.search.free import nominal
 
 FREE = ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque",
         "firmware.proportional_gain", "firmware.derivative_gain")

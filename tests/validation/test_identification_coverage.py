@@ -13,7 +13,7 @@ from reference.rig_draws import CONDITIONS
 from reference.rig_fits import judged
 from servotwin import loads
 from servotwin.identification import identify
-from servotwin.identification.fitting.free import nominal
+from servotwin.identification.fitting.search.free import nominal
 
 SEEDS = (20, 21)
 MOST_OF_ALL, MOST_OF_ONE = 28, 8

@@ -20,7 +20,7 @@ from servotwin.errors import InputError
 if TYPE_CHECKING:
     from servotwin.cli.output_files import Target
     from servotwin.identification import Advice, Fit, Ladder, Log
-    from servotwin.identification.fitting.stopping import Within
+    from servotwin.identification.fitting.search.stopping import Within
     from servotwin.models import Model
 
 

@@ -13,8 +13,8 @@ from servotwin.cli.summary import was_set
 from servotwin.cli.terminal import emit_json, pairs, renderable, show, table
 from servotwin.errors import InputError, ServotwinError, UnknownNameError
 from servotwin.identification.fitting.checks import MENDED
-from servotwin.identification.fitting.free import Space, nominal
-from servotwin.identification.fitting.stopping import Within
+from servotwin.identification.fitting.search.free import Space, nominal
+from servotwin.identification.fitting.search.stopping import Within
 from servotwin.identification.fitting.traces import LogError, fit_percent
 from servotwin.identification.report import page
 from servotwin.identification.report.pictures import dimension_of_free, nominal_of, tables_of

@@ -7,11 +7,8 @@ if TYPE_CHECKING:
     from servotwin.identification.arms.arm_fit import ArmFit
     from servotwin.identification.arms.identify_arm import identify_arm
     from servotwin.identification.fitting.advise import Advice, Experiment, advise
-    from servotwin.identification.fitting.case import LogPart, Point
     from servotwin.identification.fitting.checks import findings
     from servotwin.identification.fitting.fit import Fit, Ladder, Rung, Start, Validation
-    from servotwin.identification.fitting.forecast import Forecast
-    from servotwin.identification.fitting.free import LUMPED, FreeParameter, Space
     from servotwin.identification.fitting.identify import identify
     from servotwin.identification.fitting.ladder import (
         RUNGS,
@@ -20,6 +17,9 @@ if TYPE_CHECKING:
         compare_structures,
         friction_ladder,
     )
+    from servotwin.identification.fitting.search.case import LogPart, Point
+    from servotwin.identification.fitting.search.forecast import Forecast
+    from servotwin.identification.fitting.search.free import LUMPED, FreeParameter, Space
     from servotwin.identification.fitting.suspicions.look import Finding
     from servotwin.identification.fitting.traces import ErrorTable, Interval, LogError, Trace
     from servotwin.identification.fitting.uncertainty import Uncertainty, Unidentifiable
@@ -67,11 +67,11 @@ _HOMES = {
     "identification.arms.arm_fit": ("ArmFit",),
     "identification.arms.identify_arm": ("identify_arm",),
     "identification.fitting.advise": ("Advice", "Experiment", "advise"),
-    "identification.fitting.case": ("LogPart", "Point"),
+    "identification.fitting.search.case": ("LogPart", "Point"),
     "identification.fitting.checks": ("findings",),
     "identification.fitting.fit": ("Fit", "Ladder", "Rung", "Start", "Validation"),
-    "identification.fitting.forecast": ("Forecast",),
-    "identification.fitting.free": ("LUMPED", "FreeParameter", "Space"),
+    "identification.fitting.search.forecast": ("Forecast",),
+    "identification.fitting.search.free": ("LUMPED", "FreeParameter", "Space"),
     "identification.fitting.identify": ("identify",),
     "identification.fitting.ladder": (
         "RUNGS", "Structure", "as_structure", "compare_structures", "friction_ladder"),

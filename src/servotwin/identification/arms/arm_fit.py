@@ -23,10 +23,10 @@ from servotwin.identification.arms.rows import (
     residuals,
 )
 from servotwin.identification.arms.search import ArmSearch, Problem
-from servotwin.identification.fitting.case import HUBER, LogPart
 from servotwin.identification.fitting.checks import checked_level
-from servotwin.identification.fitting.least_squares import Loss, Prior
 from servotwin.identification.fitting.registers import RegisterSearch
+from servotwin.identification.fitting.search.case import HUBER, LogPart
+from servotwin.identification.fitting.search.least_squares import Loss, Prior
 from servotwin.identification.fitting.traces import Interval
 from servotwin.identification.fitting.uncertainty import (
     Rows,

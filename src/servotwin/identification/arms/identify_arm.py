@@ -40,7 +40,6 @@ from servotwin.identification.arms.rows import (
 )
 from servotwin.identification.arms.search import Demand, Problem, WholeArm, link_names, links_of, with_masses
 from servotwin.identification.fitting import checks
-from servotwin.identification.fitting.case import DELAY_SCALE
 from servotwin.identification.fitting.diagnosis.drifts import counts_turns
 from servotwin.identification.fitting.registers import (
     PROMISING,
@@ -54,7 +53,8 @@ from servotwin.identification.fitting.registers import (
     numbers_apart,
 )
 from servotwin.identification.fitting.registers import searched as registers_searched
-from servotwin.identification.fitting.stopping import Stops, Within
+from servotwin.identification.fitting.search.case import DELAY_SCALE
+from servotwin.identification.fitting.search.stopping import Stops, Within
 from servotwin.models import Model, default_model
 from servotwin.parameters import Servo, Supply, load_servo
 from servotwin.parameters.registers.held import as_robot_has_it, said_of, set_of_robot

@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.case import NORMAL, LogPart, robust_deviation
 from servotwin.identification.fitting.checks import usual_free
-from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.registers import busiest
+from servotwin.identification.fitting.search.case import NORMAL, LogPart, robust_deviation
+from servotwin.identification.fitting.search.free import Space
 from servotwin.logs.log import Log
 from servotwin.models import Model
 from servotwin.parameters import Servo, Supply

@@ -26,8 +26,8 @@ from servotwin.identification.arms.rows import (
     used_rows,
     usual_steps,
 )
-from servotwin.identification.fitting.case import HUBER
-from servotwin.identification.fitting.least_squares import Loss, Prior, block, bounded_step
+from servotwin.identification.fitting.search.case import HUBER
+from servotwin.identification.fitting.search.least_squares import Loss, Prior, block, bounded_step
 from servotwin.robots import ServoDrive
 from servotwin.robots.places import load_mujoco
 from servotwin.robots.run import ticks_in

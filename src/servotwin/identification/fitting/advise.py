@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.identification.fitting import checks
-from servotwin.identification.fitting.case import DELAY_SCALE, Point
 from servotwin.identification.fitting.fit import Fit
-from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.free import Priors, Space, nominal
+from servotwin.identification.fitting.search.case import DELAY_SCALE, Point
+from servotwin.identification.fitting.search.forecast import Forecast
+from servotwin.identification.fitting.search.free import Priors, Space, nominal
 from servotwin.loads import Inertia, Load, Pendulum
 from servotwin.logs.log import Log
 from servotwin.models import Model

@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import ServotwinError
-from servotwin.identification.fitting.case import STEP, Case, LogPart, Point, command_of, has_pulses
-from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.free import nominal
-from servotwin.identification.fitting.least_squares import Ask, Outcome, Prior, Search, together
-from servotwin.identification.fitting.task import Task
+from servotwin.identification.fitting.search.case import STEP, Case, LogPart, Point, command_of, has_pulses
+from servotwin.identification.fitting.search.forecast import Forecast
+from servotwin.identification.fitting.search.free import nominal
+from servotwin.identification.fitting.search.least_squares import Ask, Outcome, Prior, Search, together
+from servotwin.identification.fitting.search.task import Task
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty
 from servotwin.models import DigitalServo
 from servotwin.parameters import Servo

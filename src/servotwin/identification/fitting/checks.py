@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.case import TIME, with_loop_gain
+from servotwin.identification.fitting.search.case import TIME, with_loop_gain
 from servotwin.identification.fitting.suspicions.followed import centred, not_followed, spans, turned, wraps
 from servotwin.identification.fitting.suspicions.look import Finding, Look, look, missing_rows, refused, wrong_stamps
 from servotwin.logs.log import Log

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.case import DELAY_SCALE, STEP, LogPart, Point, latency, widest
-from servotwin.identification.fitting.forecast import Forecast, LogLanes
-from servotwin.identification.fitting.free import LUMPED
-from servotwin.identification.fitting.least_squares import Begin, Loss, by_sensor
-from servotwin.identification.fitting.phases import PulseChoice, Scan, settled
+from servotwin.identification.fitting.search.case import DELAY_SCALE, STEP, LogPart, Point, latency, widest
+from servotwin.identification.fitting.search.forecast import Forecast, LogLanes
+from servotwin.identification.fitting.search.free import LUMPED
+from servotwin.identification.fitting.search.least_squares import Begin, Loss, by_sensor
+from servotwin.identification.fitting.search.phases import PulseChoice, Scan, settled
+from servotwin.identification.fitting.search.task import Task
 from servotwin.identification.fitting.slew_lag import fit_slew_lag
-from servotwin.identification.fitting.task import Task
 from servotwin.identification.fitting.traces import ErrorTable, ErrorTables, LogError, Trace, log_error
 from servotwin.logs.log import ANGLES, Log
 from servotwin.models import Model

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.identification.fitting.checks import checked_level
-from servotwin.identification.fitting.free import LUMPED, FreeParameter, Space
-from servotwin.identification.fitting.least_squares import Begin
 from servotwin.identification.fitting.registers import RegisterSearch, register_values
+from servotwin.identification.fitting.search.free import LUMPED, FreeParameter, Space
+from servotwin.identification.fitting.search.least_squares import Begin
 from servotwin.identification.fitting.traces import ErrorTable, Interval, Trace
 from servotwin.identification.fitting.uncertainty import Unidentifiable
 from servotwin.logs.log import Log

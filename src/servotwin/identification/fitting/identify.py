@@ -28,20 +28,7 @@ from servotwin.identification.fitting.assumptions import (
     systematic,
     with_assumptions,
 )
-from servotwin.identification.fitting.case import (
-    DELAY_SCALE,
-    FINE,
-    HUBER,
-    NUISANCES,
-    OFFSET_SCALE,
-    SHARED,
-    STEP,
-    LogPart,
-    Point,
-    has_pulses,
-)
 from servotwin.identification.fitting.checks import BY_ITSELF, explained, first_looks, mended
-from servotwin.identification.fitting.clocks import delay_range, phase_errors, ticking, unsure_commands
 from servotwin.identification.fitting.comparison import BESIDE, SLEW, compare, trace_of, with_pulses_of
 from servotwin.identification.fitting.diagnosis import diagnose
 from servotwin.identification.fitting.diagnosis.drifts import counted_stamps
@@ -55,14 +42,27 @@ from servotwin.identification.fitting.fit import (
     with_record,
     with_what_logs_say,
 )
-from servotwin.identification.fitting.forecast import FIT_ACCURACY, Forecast, Running
-from servotwin.identification.fitting.free import Bounds, Priors, Space
-from servotwin.identification.fitting.least_squares import Begin, Loss, Outcome, Search
-from servotwin.identification.fitting.phases import credible, settled
 from servotwin.identification.fitting.registers import RegisterSearch, as_logs_say, register_search
 from servotwin.identification.fitting.residual_noise import SensorSeries, noise_of
-from servotwin.identification.fitting.stopping import Course, Within
-from servotwin.identification.fitting.task import Task
+from servotwin.identification.fitting.search.case import (
+    DELAY_SCALE,
+    FINE,
+    HUBER,
+    NUISANCES,
+    OFFSET_SCALE,
+    SHARED,
+    STEP,
+    LogPart,
+    Point,
+    has_pulses,
+)
+from servotwin.identification.fitting.search.clocks import delay_range, phase_errors, ticking, unsure_commands
+from servotwin.identification.fitting.search.forecast import FIT_ACCURACY, Forecast, Running
+from servotwin.identification.fitting.search.free import Bounds, Priors, Space
+from servotwin.identification.fitting.search.least_squares import Begin, Loss, Outcome, Search
+from servotwin.identification.fitting.search.phases import credible, settled
+from servotwin.identification.fitting.search.stopping import Course, Within
+from servotwin.identification.fitting.search.task import Task
 from servotwin.identification.fitting.traces import ErrorTables, Trace
 from servotwin.identification.fitting.uncertainty import (
     Counts,

@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.identification.fitting import checks
-from servotwin.identification.fitting.case import LogPart
 from servotwin.identification.fitting.fit import Fit, Ladder, Rung, begin_after
-from servotwin.identification.fitting.free import LUMPED, nominal, stated
 from servotwin.identification.fitting.identify import identify
-from servotwin.identification.fitting.least_squares import Begin, Loss
-from servotwin.identification.fitting.phases import widening
-from servotwin.identification.fitting.stopping import Within
+from servotwin.identification.fitting.search.case import LogPart
+from servotwin.identification.fitting.search.free import LUMPED, nominal, stated
+from servotwin.identification.fitting.search.least_squares import Begin, Loss
+from servotwin.identification.fitting.search.phases import widening
+from servotwin.identification.fitting.search.stopping import Within
 from servotwin.identification.fitting.traces import LogError, Trace, pooled
 from servotwin.loads import Flexible, Load
 from servotwin.logs.log import Log

@@ -18,10 +18,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import ServotwinError
-from servotwin.identification.fitting.case import DELAY_SCALE, GAIN, HUBER, Point, robust_deviation, with_loop_gain
-from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.free import Space
-from servotwin.identification.fitting.stopping import Within
+from servotwin.identification.fitting.search.case import (
+    DELAY_SCALE,
+    GAIN,
+    HUBER,
+    Point,
+    robust_deviation,
+    with_loop_gain,
+)
+from servotwin.identification.fitting.search.forecast import Forecast
+from servotwin.identification.fitting.search.free import Space
+from servotwin.identification.fitting.search.stopping import Within
 from servotwin.logs.bam_logs import writes_gain
 from servotwin.logs.log import Log
 from servotwin.models import DigitalServo, Model

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.case import robust_deviation
+from servotwin.identification.fitting.search.case import robust_deviation
 from servotwin.identification.fitting.uncertainty import Rows
 from servotwin.logs.columns import step_of
 from servotwin.logs.log import Log

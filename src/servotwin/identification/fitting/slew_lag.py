@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.case import robust_deviation
+from servotwin.identification.fitting.search.case import robust_deviation
 from servotwin.logs.log import ANGLES, Log
 from servotwin.units import is_finite
 

@@ -19,8 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.case import LogPart
-from servotwin.identification.fitting.least_squares import Loss, Prior
+from servotwin.identification.fitting.search.case import LogPart
+from servotwin.identification.fitting.search.least_squares import Loss, Prior
 
 # --- How long residuals remember --------------------------------------------------------------------------------------
 

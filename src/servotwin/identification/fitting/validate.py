@@ -20,7 +20,11 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, ServoFileError
 from servotwin.identification.fitting import checks
-from servotwin.identification.fitting.case import (
+from servotwin.identification.fitting.checks import explained, first_looks
+from servotwin.identification.fitting.comparison import trace_of, with_pulses_of
+from servotwin.identification.fitting.fit import Validation
+from servotwin.identification.fitting.registers import as_logs_say, register_search
+from servotwin.identification.fitting.search.case import (
     DELAY_SCALE,
     HUBER,
     NUISANCES,
@@ -32,15 +36,11 @@ from servotwin.identification.fitting.case import (
     gaps,
     has_pulses,
 )
-from servotwin.identification.fitting.checks import explained, first_looks
-from servotwin.identification.fitting.clocks import first_offset
-from servotwin.identification.fitting.comparison import trace_of, with_pulses_of
-from servotwin.identification.fitting.fit import Validation
-from servotwin.identification.fitting.forecast import Forecast, Running
-from servotwin.identification.fitting.free import Space
-from servotwin.identification.fitting.least_squares import Begin, Loss, Prior, scatter_of
-from servotwin.identification.fitting.registers import as_logs_say, register_search
-from servotwin.identification.fitting.task import Task
+from servotwin.identification.fitting.search.clocks import first_offset
+from servotwin.identification.fitting.search.forecast import Forecast, Running
+from servotwin.identification.fitting.search.free import Space
+from servotwin.identification.fitting.search.least_squares import Begin, Loss, Prior, scatter_of
+from servotwin.identification.fitting.search.task import Task
 from servotwin.identification.fitting.traces import ErrorTable, Trace
 from servotwin.logs.log import Log
 from servotwin.models import MODELS, Model

@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.identification.fitting.assumptions import Allowed, Ends, Systematic, begins
-from servotwin.identification.fitting.case import Case, Point
-from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.free import nominal
-from servotwin.identification.fitting.least_squares import Loss, Outcome, Prior, Search, together
+from servotwin.identification.fitting.search.case import Case, Point
+from servotwin.identification.fitting.search.forecast import Forecast
+from servotwin.identification.fitting.search.free import nominal
+from servotwin.identification.fitting.search.least_squares import Loss, Outcome, Prior, Search, together
+from servotwin.identification.fitting.search.task import Task
 from servotwin.identification.fitting.suspicions.look import rough_noise
-from servotwin.identification.fitting.task import Task
 from servotwin.identification.fitting.uncertainty import (
     Rows,
     Uncertainty,

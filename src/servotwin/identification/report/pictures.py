@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin import units
-from servotwin.identification.fitting.free import LUMPED, nominal
 from servotwin.identification.fitting.residual_noise import SensorSeries, cross_correlation
+from servotwin.identification.fitting.search.free import LUMPED, nominal
 from servotwin.identification.fitting.traces import fit_percent
 from servotwin.identification.fitting.verdict import FALSE_ALARM
 from servotwin.look import (

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.case import LogPart, Point, joined, robust_deviation
-from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.least_squares import Begin, Search, by_sensor
-from servotwin.identification.fitting.phases import settled
-from servotwin.identification.fitting.task import Task
+from servotwin.identification.fitting.search.case import LogPart, Point, joined, robust_deviation
+from servotwin.identification.fitting.search.forecast import Forecast
+from servotwin.identification.fitting.search.least_squares import Begin, Search, by_sensor
+from servotwin.identification.fitting.search.phases import settled
+from servotwin.identification.fitting.search.task import Task
 from servotwin.logs.log import ANGLES, Log
 from servotwin.models import Model
 

@@ -20,9 +20,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.case import Point, has_pulses, joined, robust_deviation
 from servotwin.identification.fitting.diagnosis.bench import Gain, Spent, Told, TrialBench, Watched, gain, teaching
-from servotwin.identification.fitting.free import nominal
+from servotwin.identification.fitting.search.case import Point, has_pulses, joined, robust_deviation
+from servotwin.identification.fitting.search.free import nominal
 from servotwin.identification.fitting.traces import Trace
 from servotwin.identification.fitting.verdict import Cause, shown
 from servotwin.logs.log import Log

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from servotwin.errors import ServotwinError
 from servotwin.identification.fitting.assumptions import assumptions
-from servotwin.identification.fitting.case import HUBER, Point, has_pulses, joined, robust_deviation
 from servotwin.identification.fitting.checks import findings
 from servotwin.identification.fitting.diagnosis.bench import (
     DEAR,
@@ -37,8 +36,9 @@ from servotwin.identification.fitting.diagnosis.drifts import (
     lost_pulses,
     warming,
 )
-from servotwin.identification.fitting.free import LUMPED, nominal
-from servotwin.identification.fitting.task import Task
+from servotwin.identification.fitting.search.case import HUBER, Point, has_pulses, joined, robust_deviation
+from servotwin.identification.fitting.search.free import LUMPED, nominal
+from servotwin.identification.fitting.search.task import Task
 from servotwin.identification.fitting.traces import Trace
 from servotwin.identification.fitting.verdict import Cause, Verdict, shown
 from servotwin.loads import Load

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.case import HUBER, robust_deviation
+from servotwin.identification.fitting.search.case import HUBER, robust_deviation
 from servotwin.identification.fitting.suspicions.look import Array, Finding, Look, Mask, aligned, said_times
 from servotwin.identification.survey.survey import motion_of
 from servotwin.logs.column_words import SAID

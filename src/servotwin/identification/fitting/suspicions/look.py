@@ -13,7 +13,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from servotwin.errors import ServotwinError
-from servotwin.identification.fitting.case import NORMAL, has_pulses, robust_deviation
+from servotwin.identification.fitting.search.case import NORMAL, has_pulses, robust_deviation
 from servotwin.logs.log import Log
 from servotwin.models import Model
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.free import LUMPED, Space
+from servotwin.identification.fitting.search.free import LUMPED, Space
 from servotwin.loads import Load
 from servotwin.logs.bam_logs import writes_gain
 from servotwin.logs.log import KINDS, Log

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.case import (
+from servotwin.identification.fitting.search.case import (
     DELAY_SCALE,
     Frames,
     Gap,
@@ -28,11 +28,11 @@ from servotwin.identification.fitting.case import (
     gaps,
     latency,
 )
-from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.least_squares import Loss
+from servotwin.identification.fitting.search.forecast import Forecast
+from servotwin.identification.fitting.search.least_squares import Loss
 
 if TYPE_CHECKING:
-    from servotwin.identification.fitting.forecast import Forecast
+    from servotwin.identification.fitting.search.forecast import Forecast
 
 
 # --- The ticks of a program that pulses command: which command each of them takes -------------------------------------

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.case import (
+from servotwin.identification.fitting.search.case import (
     DELAY_SCALE,
     LATER,
     MOST_DELAY,
@@ -40,7 +40,7 @@ from servotwin.identification.fitting.case import (
     signal,
     widest,
 )
-from servotwin.identification.fitting.free import Space
+from servotwin.identification.fitting.search.free import Space
 from servotwin.loads import Load
 from servotwin.logs.log import Log
 from servotwin.models import DigitalServo, Model

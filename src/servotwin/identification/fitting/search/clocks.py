@@ -19,18 +19,33 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.case import DELAY_SCALE, PERIOD_SCALE, Case, LogPart, Point, gap_of, near_edges
-from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.least_squares import Loss, NormalEquations, Prior, block, by_sensor, safe
-from servotwin.identification.fitting.phases import PulseChoice, Scan, drifts, likely_periods, settled, with_period
 from servotwin.identification.fitting.residual_noise import SensorSeries, noise_of
+from servotwin.identification.fitting.search.case import (
+    DELAY_SCALE,
+    PERIOD_SCALE,
+    Case,
+    LogPart,
+    Point,
+    gap_of,
+    near_edges,
+)
+from servotwin.identification.fitting.search.forecast import Forecast
+from servotwin.identification.fitting.search.least_squares import Loss, NormalEquations, Prior, block, by_sensor, safe
+from servotwin.identification.fitting.search.phases import (
+    PulseChoice,
+    Scan,
+    drifts,
+    likely_periods,
+    settled,
+    with_period,
+)
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty
 from servotwin.logs.log import ANGLES, Log
 from servotwin.logs.regular import made_regular, regular_times
 from servotwin.models import DigitalServo, Model
 
 if TYPE_CHECKING:
-    from servotwin.identification.fitting.task import Task
+    from servotwin.identification.fitting.search.task import Task
 
 
 # --- Other commands for the ticks of all logs at once, judged by where all numbers would go with them -----------------

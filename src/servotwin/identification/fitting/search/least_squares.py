@@ -14,8 +14,8 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.case import STEP, LogPart, Point, robust_deviation
-from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.search.case import STEP, LogPart, Point, robust_deviation
+from servotwin.identification.fitting.search.forecast import Forecast
 
 # --- How far residuals scatter, told so that a few outliers change it little ------------------------------------------
 

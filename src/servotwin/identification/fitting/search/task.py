@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.case import (
+from servotwin.identification.fitting.search.case import (
     DELAY_SCALE,
     MOST_DELAY,
     OFFSET_SCALE,
@@ -24,10 +24,18 @@ from servotwin.identification.fitting.case import (
     LogPart,
     Point,
 )
-from servotwin.identification.fitting.clocks import DELAYS, at_likely_delay, first_offset, ticking, with_clocks
-from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.least_squares import Begin, Loss, Outcome, Prior, Search, scatter_of, together
-from servotwin.identification.fitting.phases import Scan, widening
+from servotwin.identification.fitting.search.clocks import DELAYS, at_likely_delay, first_offset, ticking, with_clocks
+from servotwin.identification.fitting.search.forecast import Forecast
+from servotwin.identification.fitting.search.least_squares import (
+    Begin,
+    Loss,
+    Outcome,
+    Prior,
+    Search,
+    scatter_of,
+    together,
+)
+from servotwin.identification.fitting.search.phases import Scan, widening
 from servotwin.identification.fitting.uncertainty import Counts, Rows, rows_of
 from servotwin.logs.log import ANGLES
 
