@@ -9,7 +9,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from lane_cases import case, replaced, with_lanes
-from servotwin.models.engine.batch import linear_segments, side_by_side, tiles
+from servotwin.models.engine.batch import side_by_side, tiles
+from servotwin.models.engine.batch.segments import linear_segments
 from servotwin.models.engine.dynamics import contacts
 from servotwin.models.state.records import room
 from servotwin.models.terms.bridge import NO_BRIDGE, Off

@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 from lane_cases import replaced
-from servotwin.models.engine.batch import inductive_segments
+from servotwin.models.engine.batch.segments import inductive_segments
 from servotwin.models.state.modes import CONDUCTING, CURRENT_BACKWARD, CURRENT_FORWARD, NO_CURRENT
 from servotwin.models.terms.bridge import Bridge, Off
 from servotwin.models.terms.friction import NO_FRICTION

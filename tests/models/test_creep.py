@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import servotwin as st
-from servotwin.models.engine.batch import piecewise_segments
+from servotwin.models.engine.batch.segments import piecewise_segments
 from servotwin.models.engine.dynamics import contacts, currents
 from servotwin.models.engine.motions import dormand_prince, stribeck
 from servotwin.models.state.modes import NOWHERE, RIGID, Mode, Vector

@@ -7,8 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import servotwin as st
-from servotwin.models.engine.batch import backlash_batch, warm_segments
+from servotwin.models.engine.batch import backlash_batch
 from servotwin.models.engine.batch.rk_steps import State
+from servotwin.models.engine.batch.segments import warm_segments
 from servotwin.models.engine.dynamics import coefficients, guards
 from servotwin.models.engine.dynamics.coefficients import rates_of
 from servotwin.models.engine.legs import legs

@@ -8,17 +8,17 @@ import sys
 
 import pytest
 
-from servotwin.models.engine.batch import linear_segments
-from servotwin.models.engine.batch.linear_segments import ArcNumbers
+from servotwin.models.engine.batch.segments import linear_segments
+from servotwin.models.engine.batch.segments.linear_segments import ArcNumbers
 from servotwin.models.state.noise import gaussian
 from servotwin.simulation.compile import Recipe, kernels
 from servotwin.simulation.compile.building import printed
-from servotwin.simulation.compile.derive import derive
 from servotwin.simulation.compile.finding import compilers
-from servotwin.simulation.compile.translate import header
+from servotwin.simulation.compile.text.derive import derive
+from servotwin.simulation.compile.text.translate import header
 from servotwin.simulation.lanes.forms import _BY_FORMULA, CALM, DIGITAL, RUNS
 
-SLIDE = Recipe("slide", ("servotwin.models.engine.batch.linear_segments:slide",), vector=True)
+SLIDE = Recipe("slide", ("servotwin.models.engine.batch.segments.linear_segments:slide",), vector=True)
 NUMBERS = ArcNumbers(60.0, 60.0, 0.2, 1 / 60.0, 1 / 60.0, 5.0, 330.0, 20.0, 5.0, 6.0, 0.4, 0.1, 33.0, 40.0, 5.0, 1.0,
                      -1.0, 0.0, -math.inf, math.inf, 6e-3, 2.0, 0.2, 0.2)
 FLAGGED = ("_integrated", "_long_step")  # what a motion takes where no closed form holds

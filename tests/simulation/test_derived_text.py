@@ -5,7 +5,7 @@ import ast
 import pytest
 
 from servotwin.simulation import bus_run
-from servotwin.simulation.compile.derive import derive
+from servotwin.simulation.compile.text.derive import derive
 from servotwin.simulation.lanes import forms
 
 RECIPES = (bus_run.BUSES, forms.RUNS, forms.DIGITAL,

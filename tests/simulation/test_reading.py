@@ -6,7 +6,7 @@ import pytest
 
 from servotwin.models.engine.batch import tiles
 from servotwin.models.terms.numbers import ACTS
-from servotwin.simulation.compile import reading, unread
+from servotwin.simulation.compile.text import reading, unread
 from servotwin.simulation.lanes.forms import DIGITAL, side_by_side
 
 pytestmark = pytest.mark.long

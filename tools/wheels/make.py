@@ -25,7 +25,7 @@ from servotwin.simulation.compile import Recipe, source_key
 from servotwin.simulation.compile.building import index, printed
 from servotwin.simulation.compile.finding import Compiler, compilers, index_name, shipped_folder
 from servotwin.simulation.compile.storage import cache_folder
-from servotwin.simulation.compile.unread import unread
+from servotwin.simulation.compile.text.unread import unread
 from servotwin.simulation.lanes.forms import parts_of
 from servotwin.simulation.recipes import all_recipes
 

@@ -63,9 +63,9 @@ from servotwin.models.terms.wiring import Wiring
 from servotwin.physics.pieces import Piece
 from servotwin.simulation.compile import Recipe
 from servotwin.simulation.compile.c_types import identifier
-from servotwin.simulation.compile.kinds import FLOAT64, INT64, Array, Kind, Record, Tuple
 from servotwin.simulation.compile.signatures import named
 from servotwin.simulation.compile.standalone import Standalone
+from servotwin.simulation.compile.text.kinds import FLOAT64, INT64, Array, Kind, Record, Tuple
 from servotwin.text import c_comment
 
 if TYPE_CHECKING:

@@ -9,11 +9,11 @@ import subprocess
 import numpy as np
 import pytest
 
-from servotwin.simulation.compile.derive import Derived, Recipe
 from servotwin.simulation.compile.finding import compilers
-from servotwin.simulation.compile.kinds import BOOL, FLOAT32, FLOAT64, INT8, INT32, INT64, Array, Record
 from servotwin.simulation.compile.library import Function
-from servotwin.simulation.compile.translate import translated
+from servotwin.simulation.compile.text.derive import Derived, Recipe
+from servotwin.simulation.compile.text.kinds import BOOL, FLOAT32, FLOAT64, INT8, INT32, INT64, Array, Record
+from servotwin.simulation.compile.text.translate import translated
 
 INNER = np.dtype((np.record, [("x", "f8"), ("row", "f8", (3,))]))
 OUTER = np.dtype((np.record, [("n", "i8"), ("signs", "?", (4,)), ("y", "f4"), ("inner", INNER), ("table", "f8", (2,

@@ -12,7 +12,7 @@ import pytest
 
 from servotwin.simulation.compile.building import printed
 from servotwin.simulation.compile.c_types import identifier
-from servotwin.simulation.compile.translate import header
+from servotwin.simulation.compile.text.translate import header
 from servotwin.simulation.recipes import all_recipes
 
 RECIPES = {recipe.name: recipe for recipe in all_recipes()}

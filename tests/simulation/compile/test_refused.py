@@ -5,7 +5,7 @@ import time
 import pytest
 
 from servotwin.simulation.compile import building
-from servotwin.simulation.compile.kinds import TranslationError
+from servotwin.simulation.compile.text.kinds import TranslationError
 from simulation.compile.by_hand import translate
 
 BEFORE = '''

@@ -12,8 +12,8 @@ import pytest
 import servotwin as st
 from servotwin.simulation.compile import finding
 from servotwin.simulation.compile.building import printed
-from servotwin.simulation.compile.kinds import Array, Tuple, words_of
 from servotwin.simulation.compile.library import Function
+from servotwin.simulation.compile.text.kinds import Array, Tuple, words_of
 from servotwin.simulation.lanes import forms, whole_runs
 
 HARNESS = Path(__file__).with_name("harness")

@@ -8,7 +8,7 @@ from typing import Any
 
 from servotwin.simulation import recipes
 from servotwin.simulation.compile import Recipe
-from servotwin.simulation.compile.derive import Derivation
+from servotwin.simulation.compile.text.derive import Derivation
 
 _NAMES = ("kernels", "call_of")  # what takes a recipe first, and is imported by name
 

@@ -23,8 +23,8 @@ from servotwin.models.engine.memory import Memory, time_of
 from servotwin.models.engine.motions.motion import Motion
 from servotwin.models.engine.observe import Observed
 from servotwin.models.engine.step import DIVERGED
-from servotwin.simulation.compile.derive import derive
 from servotwin.simulation.compile.recipe import Recipe
+from servotwin.simulation.compile.text.derive import derive
 
 # --- Kernels without a compiler: the derived text as it stands, in plain Python ---------------------------------------
 

@@ -14,7 +14,6 @@ from functools import cache
 from pathlib import Path
 from typing import IO, Any
 
-from servotwin.simulation.compile.derive import derive
 from servotwin.simulation.compile.finding import (
     SUFFIX,
     Built,
@@ -29,7 +28,8 @@ from servotwin.simulation.compile.finding import (
 from servotwin.simulation.compile.recipe import Recipe
 from servotwin.simulation.compile.signatures import signatures
 from servotwin.simulation.compile.storage import is_there, key_of, writable_folder, write
-from servotwin.simulation.compile.translate import Translation, translated
+from servotwin.simulation.compile.text.derive import derive
+from servotwin.simulation.compile.text.translate import Translation, translated
 
 _LONGEST = 600.0  # s that a compiler may take
 

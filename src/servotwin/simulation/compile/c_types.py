@@ -9,8 +9,8 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from servotwin.simulation.compile.kind_rules import field_kind
-from servotwin.simulation.compile.kinds import (
+from servotwin.simulation.compile.text.kind_rules import field_kind
+from servotwin.simulation.compile.text.kinds import (
     BOOL,
     FLOAT32,
     FLOAT64,

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.simulation.compile import Recipe, backend, is_plain, kernels
-from servotwin.simulation.compile.kinds import Tuple, words_of
+from servotwin.simulation.compile.text.kinds import Tuple, words_of
 
 _WORD = 8  # bytes
 

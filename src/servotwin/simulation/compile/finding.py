@@ -174,7 +174,8 @@ class Built:
 @cache
 def sources() -> tuple[str, ...]:
     """Return the text of everything from which C is printed; to read it is quicker than to derive."""
-    files = sorted(Path(__file__).parent.glob("*.[ph]*"))
+    here = Path(__file__).parent
+    files = sorted([*here.glob("*.py"), *here.joinpath("text").glob("*.[ph]*")])
     for package in (physics, state, terms, engine):
         files += sorted(Path(package.__path__[0]).rglob("*.py"))
     return tuple(file.read_text(encoding="utf-8") for file in files)

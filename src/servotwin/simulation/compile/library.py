@@ -16,7 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.simulation.compile.finding import Built, built, problems
-from servotwin.simulation.compile.kinds import (
+from servotwin.simulation.compile.recipe import Recipe
+from servotwin.simulation.compile.signatures import signatures
+from servotwin.simulation.compile.text.kinds import (
     BOOL,
     FLOAT32,
     FLOAT64,
@@ -28,8 +30,6 @@ from servotwin.simulation.compile.kinds import (
     told,
     words_of,
 )
-from servotwin.simulation.compile.recipe import Recipe
-from servotwin.simulation.compile.signatures import signatures
 
 Words = list[int | float]
 

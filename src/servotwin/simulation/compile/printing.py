@@ -12,10 +12,16 @@ import numpy as np
 
 from servotwin.simulation.compile import c_types
 from servotwin.simulation.compile.c_types import Types, bracketed, identifier, member
-from servotwin.simulation.compile.expressions import ARITHMETIC, Expressions, by_pointer
-from servotwin.simulation.compile.inference import Specialised
-from servotwin.simulation.compile.kind_rules import constant_int, dimensions, is_range, list_length, ordered_arguments
-from servotwin.simulation.compile.kinds import (
+from servotwin.simulation.compile.text.expressions import ARITHMETIC, Expressions, by_pointer
+from servotwin.simulation.compile.text.inference import Specialised
+from servotwin.simulation.compile.text.kind_rules import (
+    constant_int,
+    dimensions,
+    is_range,
+    list_length,
+    ordered_arguments,
+)
+from servotwin.simulation.compile.text.kinds import (
     BOOL,
     FLOAT32,
     FLOAT64,

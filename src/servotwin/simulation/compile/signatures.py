@@ -23,7 +23,8 @@ from servotwin.models.terms.firmware import Firmware
 from servotwin.models.terms.frame import Chip
 from servotwin.models.terms.given import Given
 from servotwin.models.terms.numbers import Numbers
-from servotwin.simulation.compile.kinds import (
+from servotwin.simulation.compile.recipe import Recipe
+from servotwin.simulation.compile.text.kinds import (
     BOOL,
     FLOAT32,
     FLOAT64,
@@ -35,7 +36,6 @@ from servotwin.simulation.compile.kinds import (
     TranslationError,
     Tuple,
 )
-from servotwin.simulation.compile.recipe import Recipe
 
 Signature = tuple[str, tuple[Kind, ...]]
 _FLOATS, _TABLE, _CUBE = (Array(FLOAT64, dimensions) for dimensions in (1, 2, 3))

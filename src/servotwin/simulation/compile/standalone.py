@@ -10,12 +10,12 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from servotwin.simulation.compile.derive import derive
-from servotwin.simulation.compile.inference import Module
-from servotwin.simulation.compile.kinds import Kind
 from servotwin.simulation.compile.printing import Printer
 from servotwin.simulation.compile.recipe import in_floats
-from servotwin.simulation.compile.translate import part_of_header
+from servotwin.simulation.compile.text.derive import derive
+from servotwin.simulation.compile.text.inference import Module
+from servotwin.simulation.compile.text.kinds import Kind
+from servotwin.simulation.compile.text.translate import part_of_header
 
 if TYPE_CHECKING:
     from servotwin.simulation.compile.c_types import Types

@@ -55,7 +55,7 @@ from servotwin.models.terms.frame import NO_CHIP, Chip
 from servotwin.models.terms.numbers import NOTHING, ROOMS, Numbers
 from servotwin.physics.pieces import Piece
 from servotwin.simulation.compile import Recipe, is_plain
-from servotwin.simulation.compile.unread import FROM_TICK_TO_TICK, IN_GENERAL, in_general, unread
+from servotwin.simulation.compile.text.unread import FROM_TICK_TO_TICK, IN_GENERAL, in_general, unread
 from servotwin.simulation.lanes.packed import Packed, by_groups, swept
 
 # --- The forms in which lanes run compiled ----------------------------------------------------------------------------

@@ -30,9 +30,9 @@ from servotwin.models.terms.given import Given
 from servotwin.simulation.compile import Recipe
 from servotwin.simulation.compile.building import printed
 from servotwin.simulation.compile.finding import Compiler, compilers
-from servotwin.simulation.compile.kinds import Kind, Scalar, Tuple
 from servotwin.simulation.compile.signatures import signatures
-from servotwin.simulation.compile.translate import Translation
+from servotwin.simulation.compile.text.kinds import Kind, Scalar, Tuple
+from servotwin.simulation.compile.text.translate import Translation
 from servotwin.web.alone.pack import world
 
 if TYPE_CHECKING:

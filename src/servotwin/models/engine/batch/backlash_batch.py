@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from servotwin.models.engine.batch import tiles
 from servotwin.models.engine.batch.rk_steps import cooled
-from servotwin.models.engine.batch.warm_segments import LONGEST, MARGIN, NEAR
+from servotwin.models.engine.batch.segments.warm_segments import LONGEST, MARGIN, NEAR
 from servotwin.models.engine.dynamics import coefficients, guards
 from servotwin.models.engine.dynamics.coefficients import Apart
 from servotwin.models.engine.events import crossings

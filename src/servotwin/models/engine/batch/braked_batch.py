@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from servotwin.models.engine.batch import linear_segments, tiles
+from servotwin.models.engine.batch import tiles
+from servotwin.models.engine.batch.segments import linear_segments
 from servotwin.models.engine.motions.elementary import fading, fma, log
 
 

@@ -14,7 +14,7 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.models.engine import controller
-from servotwin.models.engine.batch.linear_segments import starting, way_to_edge
+from servotwin.models.engine.batch.segments.linear_segments import starting, way_to_edge
 from servotwin.models.engine.dynamics import contacts
 from servotwin.models.engine.lanes import ARRIVED, UNDERWAY, inputs_of, numbers_of
 from servotwin.models.engine.legs import tick_legs

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from servotwin.models.engine.batch import inductive_segments, inductive_shares, linear_segments, tiles
-from servotwin.models.engine.batch.inductive_segments import Circuit, Course, Went
+from servotwin.models.engine.batch import tiles
+from servotwin.models.engine.batch.segments import inductive_segments, inductive_shares, linear_segments
+from servotwin.models.engine.batch.segments.inductive_segments import Circuit, Course, Went
 from servotwin.models.state.modes import NO_CURRENT, sign_of
 from servotwin.models.terms.friction import shared
 from servotwin.models.terms.numbers import Numbers

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from servotwin.models.engine.batch import linear_segments, piecewise_segments, tiles
+from servotwin.models.engine.batch import tiles
+from servotwin.models.engine.batch.segments import linear_segments, piecewise_segments
 from servotwin.models.engine.dynamics.guards import SPEED
 from servotwin.models.engine.motions.elementary import decay, fma
 from servotwin.models.terms.numbers import Numbers

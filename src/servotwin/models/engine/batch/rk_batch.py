@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from servotwin.models.engine.batch import rk_steps, tiles, warm_batch, warm_segments
+from servotwin.models.engine.batch import rk_steps, tiles, warm_batch
 from servotwin.models.engine.batch.rk_steps import (
     NOBODY,
     SLOTS,
@@ -20,6 +20,7 @@ from servotwin.models.engine.batch.rk_steps import (
     put_numbers_in,
     step,
 )
+from servotwin.models.engine.batch.segments import warm_segments
 from servotwin.models.engine.batch.tiles import More
 from servotwin.models.engine.events import crossings
 from servotwin.models.terms import heat

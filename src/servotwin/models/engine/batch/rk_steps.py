@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from servotwin.models.engine.batch import linear_segments
+from servotwin.models.engine.batch.segments import linear_segments
 from servotwin.models.engine.dynamics import contacts, currents, guards
 from servotwin.models.engine.dynamics.coefficients import rates_of
 from servotwin.models.engine.motions.dormand_prince import (

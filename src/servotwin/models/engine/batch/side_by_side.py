@@ -9,17 +9,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from servotwin.models.engine.batch import (
-    backlash_batch,
-    frame_phases,
-    inductive_batch,
-    inductive_segments,
-    linear_segments,
-    piecewise_segments,
-    rk_batch,
-    rk_steps,
-    tiles,
-)
+from servotwin.models.engine.batch import backlash_batch, frame_phases, inductive_batch, rk_batch, rk_steps, tiles
+from servotwin.models.engine.batch.segments import inductive_segments, linear_segments, piecewise_segments
 from servotwin.models.state.modes import BACKWARD, FORWARD, FREE, RIGID, STUCK, Vector
 from servotwin.models.state.noise import gaussian
 

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from servotwin.models.engine.batch import inductive_segments, linear_segments, piecewise_segments
-from servotwin.models.engine.batch.inductive_segments import Circuit, Course, Winding
-from servotwin.models.engine.batch.linear_segments import ArcNumbers
 from servotwin.models.engine.batch.rk_steps import SMOOTH, STEEP, slots_type
+from servotwin.models.engine.batch.segments import inductive_segments, linear_segments, piecewise_segments
+from servotwin.models.engine.batch.segments.inductive_segments import Circuit, Course, Winding
+from servotwin.models.engine.batch.segments.linear_segments import ArcNumbers
 from servotwin.models.engine.dynamics import contacts
 from servotwin.models.engine.lanes import chip_at, chip_of, numbers_at, numbers_of
 from servotwin.models.engine.memory import FIRST_STEP

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from servotwin.models.engine.batch import piecewise_segments, rk_steps, tiles, warm_segments
-from servotwin.models.engine.batch.linear_segments import Arc
-from servotwin.models.engine.batch.piecewise_segments import Band
+from servotwin.models.engine.batch import rk_steps, tiles
 from servotwin.models.engine.batch.rk_steps import State
+from servotwin.models.engine.batch.segments import piecewise_segments, warm_segments
+from servotwin.models.engine.batch.segments.linear_segments import Arc
+from servotwin.models.engine.batch.segments.piecewise_segments import Band
 from servotwin.models.engine.dynamics import coefficients
 from servotwin.models.engine.motions import warm_exponential
 from servotwin.models.engine.motions.warm_exponential import Gone, Law

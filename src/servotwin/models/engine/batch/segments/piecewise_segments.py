@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from servotwin.models.engine.batch import linear_segments
-from servotwin.models.engine.batch.linear_segments import MOST_ARCS, Arc, Slid
+from servotwin.models.engine.batch.segments import linear_segments
+from servotwin.models.engine.batch.segments.linear_segments import MOST_ARCS, Arc, Slid
 from servotwin.models.engine.dynamics import contacts, currents
 from servotwin.models.engine.dynamics.coefficients import linear_coefficients
 from servotwin.models.engine.dynamics.guards import CREEPS, SHARE, SPEED, ZONE_DOWN, ZONE_UP

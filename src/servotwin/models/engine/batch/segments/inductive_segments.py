@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from servotwin.models.engine.batch import linear_segments, piecewise_segments
-from servotwin.models.engine.batch.linear_segments import MOST_ARCS, Arc
+from servotwin.models.engine.batch.segments import linear_segments, piecewise_segments
+from servotwin.models.engine.batch.segments.linear_segments import MOST_ARCS, Arc
 from servotwin.models.engine.dynamics import contacts, currents
 from servotwin.models.engine.dynamics.coefficients import speed_coefficients
 from servotwin.models.engine.dynamics.guards import SPEED

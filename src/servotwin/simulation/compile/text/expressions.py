@@ -9,9 +9,9 @@ from typing import Any, ClassVar, Protocol
 
 from servotwin.simulation.compile import c_types
 from servotwin.simulation.compile.c_types import Types, bracketed, identifier, member
-from servotwin.simulation.compile.inference import Specialised
-from servotwin.simulation.compile.kind_rules import constant_int
-from servotwin.simulation.compile.kinds import (
+from servotwin.simulation.compile.text.inference import Specialised
+from servotwin.simulation.compile.text.kind_rules import constant_int
+from servotwin.simulation.compile.text.kinds import (
     BOOL,
     FLOAT32,
     FLOAT64,

@@ -16,12 +16,12 @@ from dataclasses import replace
 from servotwin.models.engine.log import WITH_ROWS
 from servotwin.models.state import records
 from servotwin.models.terms.numbers import ACTS, paths
-from servotwin.simulation.compile.derive import derive, flat_name
-from servotwin.simulation.compile.inference import Module, Specialised
-from servotwin.simulation.compile.kinds import Kind, Record, Tuple
 from servotwin.simulation.compile.recipe import Recipe
 from servotwin.simulation.compile.signatures import signatures
-from servotwin.simulation.compile.unread import in_general
+from servotwin.simulation.compile.text.derive import derive, flat_name
+from servotwin.simulation.compile.text.inference import Module, Specialised
+from servotwin.simulation.compile.text.kinds import Kind, Record, Tuple
+from servotwin.simulation.compile.text.unread import in_general
 
 _Number = tuple[tuple[str, ...], str]  # the fields of its record, and its own name
 _RUNS = tuple(f"servotwin.models.engine.run.runs:{name}" for name in ("start", "go_on"))

@@ -10,9 +10,9 @@ import ast
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from servotwin.simulation.compile.derive import Derived
-from servotwin.simulation.compile.kind_rules import fits, in_memory, is_range, leaves, list_length, row
-from servotwin.simulation.compile.kinds import (
+from servotwin.simulation.compile.text.derive import Derived
+from servotwin.simulation.compile.text.kind_rules import fits, in_memory, is_range, leaves, list_length, row
+from servotwin.simulation.compile.text.kinds import (
     INT64,
     Array,
     Fixed,
@@ -21,7 +21,7 @@ from servotwin.simulation.compile.kinds import (
     Tuple,
     told,
 )
-from servotwin.simulation.compile.values import Values
+from servotwin.simulation.compile.text.values import Values
 
 _ROUNDS = 12  # more than any kernel needs until its kinds are settled
 

@@ -33,7 +33,7 @@ def unread(recipe: Recipe, of: tuple[str, ...] = ()) -> tuple[str, ...]:
     for path in (shipped_folder() / name, *([kept] if is_there(kept) else [])):
         with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
             return tuple(map(str, json.loads(path.read_text(encoding="utf-8"))["unread"]))
-    from servotwin.simulation.compile.reading import unread_numbers  # which translates
+    from servotwin.simulation.compile.text.reading import unread_numbers  # which translates
 
     found = tuple(unread_numbers(recipe, of))
     with contextlib.suppress(OSError):  # to find it again costs its time alone

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from servotwin.models.engine.batch import inductive_segments, linear_segments, piecewise_segments
-from servotwin.models.engine.batch.inductive_segments import Circuit, Flow, Went
-from servotwin.models.engine.batch.linear_segments import MOST_ARCS
+from servotwin.models.engine.batch.segments import inductive_segments, linear_segments, piecewise_segments
+from servotwin.models.engine.batch.segments.inductive_segments import Circuit, Flow, Went
+from servotwin.models.engine.batch.segments.linear_segments import MOST_ARCS
 from servotwin.models.engine.dynamics import contacts, currents
 from servotwin.models.engine.dynamics.coefficients import against_of, speed_coefficients
 from servotwin.models.engine.dynamics.guards import SPEED

@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from servotwin.models.engine.batch import linear_segments, piecewise_segments
-from servotwin.models.engine.batch.linear_segments import Arc
-from servotwin.models.engine.batch.piecewise_segments import Band
 from servotwin.models.engine.batch.rk_steps import SMOOTH, STEEP, State, cooled, way_from_rest
+from servotwin.models.engine.batch.segments import linear_segments, piecewise_segments
+from servotwin.models.engine.batch.segments.linear_segments import Arc
+from servotwin.models.engine.batch.segments.piecewise_segments import Band
 from servotwin.models.engine.dynamics import coefficients, currents
 from servotwin.models.engine.dynamics.guards import SPEED
 from servotwin.models.engine.motions import warm_exponential

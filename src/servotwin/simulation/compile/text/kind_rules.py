@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from typing import Any
 
-from servotwin.simulation.compile.kinds import (
+from servotwin.simulation.compile.text.kinds import (
     BOOL,
     FLOAT32,
     FLOAT64,

@@ -13,9 +13,10 @@ from functools import cache
 from pathlib import Path
 
 from servotwin.simulation.compile.c_types import Types
-from servotwin.simulation.compile.derive import Derived
-from servotwin.simulation.compile.inference import Module
-from servotwin.simulation.compile.kinds import (
+from servotwin.simulation.compile.printing import Printer
+from servotwin.simulation.compile.text.derive import Derived
+from servotwin.simulation.compile.text.inference import Module
+from servotwin.simulation.compile.text.kinds import (
     BOOL,
     FLOAT32,
     FLOAT64,
@@ -27,7 +28,6 @@ from servotwin.simulation.compile.kinds import (
     Tuple,
     told,
 )
-from servotwin.simulation.compile.printing import Printer
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from servotwin.simulation.compile import c_types
-from servotwin.simulation.compile.kind_rules import (
+from servotwin.simulation.compile.text.kind_rules import (
     WHOLE,
     comparable,
     constant_int,
@@ -20,7 +20,7 @@ from servotwin.simulation.compile.kind_rules import (
     power,
     row,
 )
-from servotwin.simulation.compile.kinds import (
+from servotwin.simulation.compile.text.kinds import (
     BOOL,
     FLOAT32,
     FLOAT64,

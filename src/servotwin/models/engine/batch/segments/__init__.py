@@ -1,0 +1,1 @@
+"""Segments of lanes side by side: linear, piecewise, with inductance, with heat."""

@@ -1,0 +1,1 @@
+"""Kernels as text: the functions that a recipe reaches are read, derived, given kinds, and translated."""
