@@ -102,7 +102,7 @@ FEEDBACK_CONVERTER = Converter(bits=10, reference=1024 / 432.65, offset=-44.1 + 
 This is a description and no circuit: the converter at the command has another gain and another zero.
 """
 
-# --- What the bench shows: the seven values of its display, and a row of its table ------------------------------------
+# --- Signals of the bench: the seven values of its display, and a row of its table ------------------------------------
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:

@@ -93,7 +93,7 @@ class PulseGenerator:
         return first, first + self.counts_per_step - 1
 
 
-# --- What Table II says about the converter at the command ------------------------------------------------------------
+# --- Table II: the converter at the command ---------------------------------------------------------------------------
 
 class Interval(NamedTuple):
     """All values from `lower` on and below `upper`; empty where `upper` is not above `lower`."""

@@ -27,7 +27,7 @@ from servotwin.parameters.servo import output_value
 from servotwin.physics import load_share
 from servotwin.physics.sheet import LEAST_EFFICIENCY
 
-# --- What the lines of a table of loads say in numbers with intervals, and beside the servo's sheet -------------------
+# --- The lines of a table of loads in numbers with intervals, and beside the servo's sheet ----------------------------
 
 LEVEL = 0.95
 NO_LOAD_CURRENT, TORQUE_PER_CURRENT, CURRENT_PER_TORQUE = "no-load current", "torque per current", "current per torque"
@@ -185,7 +185,7 @@ _FRICTION = ("friction.coulomb_torque_forward", "friction.coulomb_torque_backwar
 
 @dataclass(frozen=True, kw_only=True)
 class Circuit:
-    """What a servo is at its output shaft, as far as a table needs it (SI)."""
+    """A servo at its output shaft, as far as a table needs it (SI)."""
 
     N: float
     V: float
@@ -406,7 +406,7 @@ def efficiency_of(found: Mapping[str, float], circuit: Circuit) -> float:
     """Return the efficiency of the gear: of the table where it tells it, else of the servo."""
     return float(load_share(found[_MU])) if _MU in found else circuit.efficiency
 
-# --- What a table of loads says of a servo, in sentences --------------------------------------------------------------
+# --- Sentences on a servo by a table of loads -------------------------------------------------------------------------
 
 _KGF_CM = 0.0980665  # N m
 _CURVED = 0.05
@@ -582,7 +582,7 @@ _SUPPLY, _SOURCE = "supply.open_circuit_voltage", "supply.internal_resistance"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LoadCalibration:
-    """What a table of loads says about a servo.
+    """A servo by a table of loads.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ from servotwin.units import is_finite, to_si
 from servotwin.units.quantities import bare_unit, number_and_unit, quantity
 from servotwin.units.words import unit_word
 
-# --- What a column of a table of weights, currents and speeds says: a role, a unit and a factor to SI -----------------
+# --- Columns of a table of weights, currents and speeds: a role, a unit and a factor to SI ----------------------------
 
 LOAD, ARM, CURRENT, SPEED, TIME, SAG, ANGLE, VOLTAGE = (
     "load", "arm", "current", "speed", "time", "sag", "angle", "voltage")

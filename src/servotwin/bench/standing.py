@@ -24,7 +24,7 @@ _PART = 0.25  # of the largest swing: what is smaller does not count beside it
 
 @dataclass(frozen=True, kw_only=True)
 class Standing:
-    """What a shaft does over a stretch of time, seen every 0.1 ms.
+    """The motion of a shaft over a stretch of time, seen every 0.1 ms.
 
     Parameters
     ----------

@@ -623,7 +623,7 @@ _MOVED = 0.01  # of pulse_to_voltage_gain: from here on what was computed with t
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TableCalibration:
-    """What a bench table says about a servo.
+    """A servo by a bench table.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 
-# --- What the commands of the bench ask for in the same words, and what those words mean ------------------------------
+# --- Common options of the commands of the bench ----------------------------------------------------------------------
 
 BENCH, RUN, SAID = "Bench", "Experiment", "What the log says"
 

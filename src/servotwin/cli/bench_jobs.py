@@ -1,4 +1,4 @@
-"""What `servotwin bench record` does with one servo at a board, or several on a bus."""
+"""`servotwin bench record` with one servo at a board, or several on a bus."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def picture(name: str, rows: list[Mapping[str, float]], width: int) -> str:
     return str(plotext.build())
 
 
-# --- What `servotwin bench record` does with one servo at a board, or several on a bus --------------------------------
+# --- `servotwin bench record` with one servo at a board, or several on a bus ------------------------------------------
 
 _BUSES = ("feetech", "dynamixel")
 _LOOK, _END = 0.1, 1023  # s over which the supply is read; the last count

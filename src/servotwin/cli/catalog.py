@@ -596,7 +596,7 @@ def _folder(out: Path) -> None:
         raise OutputError(f"{out} cannot be written ({error.strerror})") from None
 
 
-# --- What `servotwin catalog from-sheet` tells of a sheet and of the servo made of it, as facts and as lines ----------
+# --- A sheet of `servotwin catalog from-sheet` and the servo made of it, as facts and as lines ------------------------
 
 _UNCHECKED = "not checked, needs a current"
 

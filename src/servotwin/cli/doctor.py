@@ -201,7 +201,7 @@ def board_parts(found: BrownOut) -> list[RenderableType]:
             f"({board.source})", pairs(rows)]
 
 
-# --- What is installed ------------------------------------------------------------------------------------------------
+# --- The installation -------------------------------------------------------------------------------------------------
 
 _NOT_FOR_USERS = {"all", "dev", "docs", "test", "test-web", "lint", "wheels", "peers"}
 _FOR = {

@@ -16,7 +16,7 @@ _LONGEST = 600  # characters; what is longer is cut in its middle
 
 @dataclass(frozen=True, kw_only=True)
 class Failure:
-    """What the user is told.
+    """The message to the user.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ _CLEAR_LINE_SHOW_CURSOR = b"\r\x1b[2K\x1b[?25h"  # a bar may be there, which hid
 
 
 class _State:
-    """What an interrupt does at this moment."""
+    """The effect of an interrupt at this moment."""
 
     def __init__(self) -> None:
         self.words: Sequence[str] = ()

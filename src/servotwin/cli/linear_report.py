@@ -1,4 +1,4 @@
-"""What `servotwin linear` asks for and says, in words."""
+"""Options and words of `servotwin linear`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 
-# --- What `servotwin linear` asks for and says, in words --------------------------------------------------------------
+# --- Options and words of `servotwin linear` --------------------------------------------------------------------------
 
 _AMPLITUDES = ("1deg", "5deg", "20deg")
 _FRAMES = ("20ms", "10ms", "5ms")

@@ -1,4 +1,4 @@
-"""What `servotwin log` says of a log, as tables and lines."""
+"""Tables and lines of `servotwin log`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the commands that move a robot of a file ask for in the same words."""
+"""Common options of the commands that move a robot of a file."""
 
 from __future__ import annotations
 
@@ -297,7 +297,7 @@ def as_options() -> Iterator[None]:
         raise InputError(texts[0], got=error.got, allowed=texts[1] or None) from None
 
 
-# --- What the commands that move a robot of a file ask for in the same words ------------------------------------------
+# --- Common options of the commands that move a robot of a file -------------------------------------------------------
 
 MOTION, ROBOT = "Motion", "Servos of the robot"  # panels of the help
 
@@ -440,7 +440,7 @@ def check_drawing(plant: Any, camera: str | None, *, video: bool) -> bool:
         return False
 
 
-# --- What `servotwin robot validate` writes and says ------------------------------------------------------------------
+# --- Files and tables of `servotwin robot validate` -------------------------------------------------------------------
 
 SUMMARY, WINDOWS, ERRORS, PAGE = "summary.json", "windows.png", "errors.png", "index.html"
 

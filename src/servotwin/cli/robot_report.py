@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     Trails = Callable[[int], Sequence[Trail]]
 
 
-# --- What is told of a robot that has followed a motion: facts in SI, and rows of a table -----------------------------
+# --- Facts and rows of a robot that has followed a motion: facts in SI, and rows of a table ---------------------------
 
 HEAD = ("joint", "rms error", "at most", "late by", "peak", "supply", "winding", "margin")
 _ZERO_CELSIUS = 273.15

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-# --- What the page of an arm says of its task: contour error, and the use of a redundant joint ------------------------
+# --- The page of an arm's task: contour error, and the use of a redundant joint ---------------------------------------
 
 def task_sections(found: Mapping[str, Any], ways: Sequence[str], rows: Sequence[Sequence[str]]) -> list[Section]:
     """Return the sections on tool and redundancy, for the page of servos that did a task.
@@ -101,7 +101,7 @@ def _joules(value: float) -> str:
     return "–" if math.isnan(value) else f"{value:.3g} J"
 
 
-# --- What `servotwin robot mobile` reads, says and writes -------------------------------------------------------------
+# --- Waypoints, report and files of `servotwin robot mobile` ----------------------------------------------------------
 
 PATH_TABLE, PATHS = "path.csv", "paths.png"
 MOBILE_RATE = 12.5  # pictures of the video a second
@@ -218,7 +218,7 @@ def _page(found: dict[str, Any], names: Sequence[str]) -> str:
         Beside([PATHS], "Where the robot was, and where it believed to be.")])], style=STYLE).page
 
 
-# --- What `servotwin robot compare` says: tables, factors, and where each controller loses ----------------------------
+# --- The report of `servotwin robot compare`: tables, factors, and where each controller loses ------------------------
 
 TITLES = {
     "plain": "plain commands", "deadband": "deadband compensation", "feedforward": "(40) as feedforward",

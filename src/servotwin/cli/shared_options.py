@@ -1,4 +1,4 @@
-"""What the commands that run a servo ask for in the same words: groups of options as records, and single options."""
+"""Common options of the commands that run a servo: groups of options as records, and single options."""
 
 from __future__ import annotations
 

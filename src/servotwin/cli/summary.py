@@ -1,4 +1,4 @@
-"""What a simulation is summed up to: one set of facts (SI), shown as a table or as JSON."""
+"""The summary of a simulation: one set of facts (SI), shown as a table or as JSON."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def buzz_facts(found: Buzz) -> dict[str, Any]:
             "remedies": [remedy._asdict() for remedy in found.remedies]}
 
 
-# --- What the catalog commands tell of a servo, ready for JSON --------------------------------------------------------
+# --- Facts of the catalog commands on a servo, ready for JSON ---------------------------------------------------------
 
 def headline(servo: Servo) -> dict[str, Any]:
     """Return id, title, kind, supply voltage [V], stall torque [N m] and speed [deg/s] of its data sheet, and flags.
@@ -216,7 +216,7 @@ def _value(value: Any) -> str:
         value if isinstance(value, str) else f"{value:z.5g}")
 
 
-# --- What a simulation is summed up to: one set of facts (SI), shown as a table or as JSON ----------------------------
+# --- The summary of a simulation: one set of facts (SI), shown as a table or as JSON ----------------------------------
 
 NONE = "-"
 _LAST = 0.5  # s, or half of a shorter run: over which the speed of a servo that turns endlessly is meant

@@ -1,4 +1,4 @@
-"""What goes to standard output: text, tables and JSON, each written at once."""
+"""Standard output: text, tables and JSON, each written at once."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _FOLD = "    "  # before what follows below a row
 _WORTH = 1.5  # times the lines of a table that folds: what one that wraps may take, which is easier to compare
 _LEAST = 20  # columns; a narrower terminal is treated as this wide
 _KEPT = "\N{NO-BREAK SPACE}"
-# What stays on one line: numbers with their units, units of several words, and ranges in brackets if there is room
+# Words that stay on one line: numbers with their units, units of several words, and ranges in brackets if there is room
 _WHOLE = re.compile(r"\d (?:N m|kgf cm|deg C|[^\W\d]{1,4}(?:/\w+)?|%|°)(?![\w.])|\b(?:N m|kgf cm|deg C)\b")
 _RANGE = re.compile(r"\([^() ]+ to [^() ]+\)")
 
@@ -233,7 +233,7 @@ def with_span(value: float, span: Span | None, form: str, unit: str, *, scale: f
     return f"{shown}, {low} to {high}" if note else f"{shown} ({low} to {high})"
 
 
-# --- What goes to standard output: text, tables and JSON, each written at once ----------------------------------------
+# --- Standard output: text, tables and JSON, each written at once -----------------------------------------------------
 
 _PIPE_WIDTH = 120  # characters of a line where no terminal says how wide it is
 

@@ -35,7 +35,7 @@ _MANY = 100.0  # times; beyond it a margin is not told in numbers
 
 
 class Prices(NamedTuple):
-    """What servos cost, by what the file calls them, and in which currency."""
+    """Prices of servos by the file's names, and in which currency."""
 
     of: dict[str, float]
     currency: str

@@ -1,4 +1,4 @@
-"""What a controller is: a plain function of measured signals, with its state in the hands of the one who calls it."""
+"""A controller: a plain function of measured signals, with its state in the hands of the one who calls it."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ if TYPE_CHECKING:
     from servotwin.parameters import Servo
 
 
-# --- What a controller is ---------------------------------------------------------------------------------------------
+# --- A controller -----------------------------------------------------------------------------------------------------
 
 Measured = Mapping[str, Any]
 """What the sensors show: `time` and signals by name (SI), numbers of one servo or arrays (n,) of joints."""
 
 VOLTAGE, ANGLE = "armature_voltage", "command_angle"
-"""What a controller can command: the voltage of the motor [V], past the servo's own loop, or an angle [rad]."""
+"""Commands of a controller: the voltage of the motor [V], past the servo's own loop, or an angle [rad]."""
 
 
 class Decision(NamedTuple):
-    """What a controller has decided: a command [V or rad], and the state to go on from."""
+    """The decision of a controller: a command [V or rad], and the state to go on from."""
 
     command: Any
     state: Any
@@ -139,7 +139,7 @@ def clipped(value: Any, lower: Any, upper: Any) -> Any:
     return np.clip(value, lower, upper)
 
 
-# --- What a controller sees of a servo: signals through converters, with their steps, noise and delay -----------------
+# --- Sensors of a controller: signals through converters, with their steps, noise and delay ---------------------------
 
 _SAME = 1e-9  # s, as near as sums of steps come to a time
 

@@ -181,7 +181,7 @@ class ComputedTorque:
 # --- A disturbance observer -------------------------------------------------------------------------------------------
 
 class ObserverState(NamedTuple):
-    """What an observer remembers: its controller's state, angle and voltage as they are filtered, the last voltage."""
+    """State of an observer: its controller's state, angle and voltage as they are filtered, the last voltage."""
 
     controller: Any
     angle: Smoothed
@@ -289,10 +289,10 @@ def disturbance(inverse: ServoInverse, angle: Smoothed, voltage: Smoothed, rate:
     return voltage.value - inverse.volts_per_torque * moved
 
 
-# --- What a command is moved by, against a deadband that swallows it and against play that it has to cross ------------
+# --- Compensation of a deadband and of play ---------------------------------------------------------------------------
 
 class SidedState(NamedTuple):
-    """What a compensation remembers: its controller's state, and the side on which it is, −1, 0 or +1."""
+    """State of a compensation: its controller's state, and the side on which it is, −1, 0 or +1."""
 
     controller: Any
     side: Any
@@ -411,7 +411,7 @@ class PlayCompensation(_Sided):
 # --- PID with a filtered derivative, weights of the reference, and anti-windup by back-calculation --------------------
 
 class PidState(NamedTuple):
-    """What a PID remembers: its integral [V or rad], and the angle as it is filtered."""
+    """State of a PID: its integral [V or rad], and the angle as it is filtered."""
 
     integral: Any
     seen: Smoothed

@@ -28,7 +28,7 @@ FRICTION_SLOPE = 10.0  # s/rad at the motor, where the servo gives none; assumed
 
 @dataclass(frozen=True, kw_only=True)
 class ServoInverse:
-    """What a controller believes of a servo and its load, at the output shaft: equation (40), solved any way round.
+    """A controller's model of a servo and its load, at the output shaft: equation (40), solved any way round.
 
     Numbers of one servo, or arrays (n,) of joints. `inverse_of` takes them from a model; those of another servo, or
     some of them replaced, are a controller that believes something wrong.

@@ -169,7 +169,7 @@ _NOTHING = 1e-9  # V, what a braked bridge has by rounding
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ControlRun:
-    """What a controller has done.
+    """The record of a controller.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a controller is wired to: it measures, it sends, and time goes on; simulated here, hardware later."""
+"""Ports of controllers: they measure, send, and let time go on; simulated here, hardware later."""
 
 from __future__ import annotations
 
@@ -174,7 +174,7 @@ def bare_bridge(servo: Servo, *, duty_steps: int = 1000, period: float = 1e-3, d
         "potentiometer.fixed_angle": 0.0}, source="the chip bypassed"))
 
 
-# --- What a controller is wired to ------------------------------------------------------------------------------------
+# --- Ports of controllers ---------------------------------------------------------------------------------------------
 
 class Port(Protocol):
     """Four things to do with a servo, or with all servos of a robot at once."""

@@ -26,7 +26,7 @@ _ROUNDS = 4000
 
 
 class PredictiveState(NamedTuple):
-    """What a predictive controller remembers: angle and voltage as they are filtered, and the last voltage."""
+    """State of a predictive controller: angle and voltage as they are filtered, and the last voltage."""
 
     angle: Smoothed
     voltage: Smoothed

@@ -1,4 +1,4 @@
-"""What is asked of a shaft over time: angle, speed, acceleration and jerk, as piecewise polynomials."""
+"""References of a shaft over time: angle, speed, acceleration and jerk, as piecewise polynomials."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def _by_jerk(phases: list[tuple[float, float]], order: int) -> Phases:
     return Phases(tuple(durations), tuple(rows))
 
 
-# --- What is asked of a shaft over time: angle, speed, acceleration and jerk, as piecewise polynomials ----------------
+# --- References of a shaft over time: angle, speed, acceleration and jerk, as piecewise polynomials -------------------
 
 _ORDERS = 4  # angle, speed, acceleration, jerk
 
@@ -118,7 +118,7 @@ class Reference(NamedTuple):
 
 
 class Path(Protocol):
-    """What a controller can be told to follow: a `Trajectory`, or one that went through a shaper."""
+    """A reference of a controller: a `Trajectory`, or one that went through a shaper."""
 
     @property
     def duration(self) -> float:

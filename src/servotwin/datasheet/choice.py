@@ -49,7 +49,7 @@ class Reason(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """What a servo has to keep to; None where that does not matter.
+    """The limits of a servo; None where that does not matter.
 
     Parameters
     ----------

@@ -261,7 +261,7 @@ class OperatingPoint(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class SpeedCurve:
-    """What a servo does at full drive, from standing still to turning freely.
+    """A servo at full drive, from standing still to turning freely.
 
     Parameters
     ----------

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from servotwin.parameters import Servo
 
 
-# --- What a sheet prints beside what the servo made of it does when it is simulated, figure by figure -----------------
+# --- Printed figures beside those of the servo made of the sheet, simulated, figure by figure -------------------------
 
 _MOST_OFF = 0.15  # of a printed figure: what is further off is flagged
 _MOST_TIME = 1.4  # times the printed time for 60°, in which a step of 60° from rest passes 54°
@@ -307,7 +307,7 @@ class Bandwidth(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class VoltageSheet:
-    """What a servo does at one supply voltage.
+    """A servo at one supply voltage.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the program of a digital servo makes of an error that stands: stiffness, dead zone, cap and protections."""
+"""The program of a digital servo under a standing error: stiffness, dead zone, cap and protections."""
 
 from __future__ import annotations
 

@@ -171,7 +171,7 @@ _THIRTY = math.radians(30.0)
 
 @dataclass(frozen=True, kw_only=True)
 class Lift:
-    """What a servo does with a mass on an arm that it turns up and down.
+    """A servo with a mass on an arm that it turns up and down.
 
     Parameters
     ----------

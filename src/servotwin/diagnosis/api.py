@@ -124,7 +124,7 @@ class Looked(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Diagnosis:
-    """What a servo suffers from.
+    """The symptoms of a servo.
 
     Parameters
     ----------
@@ -366,7 +366,7 @@ class BrownOut:
 
     @property
     def outcome(self) -> str:
-        """What the board does in the run: "resets", "may reset" or "runs on"."""
+        """The board in the run: "resets", "may reset" or "runs on"."""
         return _outcome(self.board, self.voltage)
 
     @property

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 
-# --- What a cause is made of: one number of a servo or its load, and how it is taken away -----------------------------
+# --- A cause: one number of a servo or its load, and how it is taken away ---------------------------------------------
 
 _LEAST = 1e-3  # of its end, from which a number of 0 goes there
 
@@ -429,7 +429,7 @@ class Strength(NamedTuple):
 
 
 class Cause(NamedTuple):
-    """What a symptom becomes where one number is taken away.
+    """A symptom without one number.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from servotwin.simulation import Rest, Result
 
 
-# --- What a symptom is looked for in: a run, or a log with its noise, where the target stands still -------------------
+# --- Sources of symptoms: a run, or a log with its noise, where the target stands still -------------------------------
 
 Array = NDArray[np.float64]
 

@@ -315,7 +315,7 @@ $passing    } while (status == 0 && left > longest);
 ''')
 
 
-# --- What the code of a servo has to follow, and which kernels therefore are in it ------------------------------------
+# --- The kernels that the code of a servo needs -----------------------------------------------------------------------
 
 ENTRIES = ("start", "advance", "answer", "observe")
 APART = ("heat.T_amb",)  # stands apart too, for where nothing gets warm

@@ -162,7 +162,7 @@ def base_units(unit: str) -> dict[str, int]:
     return {base: power for base, power in powers.items() if power}
 
 
-# --- What the functions of FMI have to know of one model, as a header in C --------------------------------------------
+# --- The model for the functions of FMI, as a header in C -------------------------------------------------------------
 
 _NAMES = ("servo", "state", "signals", "given", "table", "given_table", "make", "init", "advance", "observe",
           "command")

@@ -1,4 +1,4 @@
-"""What a servo is, from logs of what it did: parameters with intervals. Every part is loaded when it is first used."""
+"""Identification of servos from logs: parameters with intervals. Every part is loaded when it is first used."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any

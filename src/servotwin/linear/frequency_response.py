@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 
-# --- What `frequency_response` gives back: a complex gain for every amplitude and frequency ---------------------------
+# --- The result of `frequency_response`: a complex gain for every amplitude and frequency -----------------------------
 
 Array = NDArray[np.float64]
 

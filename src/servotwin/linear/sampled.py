@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 
-# --- What every loop that decides now and then can tell of itself -----------------------------------------------------
+# --- Properties of every sampled loop ---------------------------------------------------------------------------------
 
 
 class Law(Protocol):

@@ -1,4 +1,4 @@
-"""What hangs on the output shaft: frozen parts that add up to one `Load`.
+"""Loads on the output shaft: frozen parts that add up to one `Load`.
 
     load = Inertia(1e-3) + Viscous(1e-4) + Constant(0.1) + Pendulum(mass=0.1, length=0.12)
 

@@ -120,7 +120,7 @@ def _matched(form: re.Pattern[str], table: TextTable, k: int, column: str, cell:
                          allowed=CLOCKS[unit])
     return match
 
-# --- What the name of a foreign column says: a role, and perhaps a unit. Names in English and German ------------------
+# --- Names of foreign columns: a role, and perhaps a unit. Names in English and German --------------------------------
 
 TIME, PULSE, COMMAND, COMMAND_ANGLE = "time", "pulse", "command", "command angle"
 ANGLE, FEEDBACK, SOME_TIME = "angle", "feedback", "some time"
@@ -287,7 +287,7 @@ def _measured(has: set[str], words: frozenset[str], dimension: str) -> str | Non
         return COUNTS
     return ANGLE
 
-# --- What the values of a column say ----------------------------------------------------------------------------------
+# --- Values of a column -----------------------------------------------------------------------------------------------
 
 _SINCE_1970 = 1e8  # s; times that are larger count from no start of a run
 MOST_DEGREES = 400.0

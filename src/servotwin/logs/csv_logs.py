@@ -123,7 +123,7 @@ def step_in(angle: NDArray[np.float64]) -> Step | None:
 
 NAMED, SIDECAR = "named", "sidecar"
 NEEDS = (TIME, COMMAND, "angle")
-"""What a table has to have to be a log."""
+"""Columns that make a table a log."""
 _SHORT = {**{name: short for short, name in SHORT.items()}, TIME: TIME}
 _DIMENSIONS = {names.PULSE: "time", names.COMMAND_ANGLE: "angle", names.ANGLE: "angle", names.TIME: "time",
                names.SOME_TIME: "time", names.FEEDBACK: "voltage", names.VOLTAGE: "voltage", names.SPEED: "speed",

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from servotwin.logs.columns import Column
 
 
-# --- What a reader mends in a file when it is asked to, by name -------------------------------------------------------
+# --- Mends of a reader, by name ---------------------------------------------------------------------------------------
 
 TORN, RESET, DROP, SPREAD, CLOCK16, THOUSANDS = (
     "torn", "reset", "drop-repeated", "spread-repeated", "clock16", "thousands")

@@ -26,7 +26,7 @@ from servotwin.tables import TextTable, read_table
 from servotwin.text import checked_name
 from servotwin.units.words import scaled_unit, unit_shown, units_written
 
-# --- What a dataset of LeRobot holds: its joints, and the goals and positions of every episode ------------------------
+# --- A dataset of LeRobot: its joints, and the goals and positions of every episode -----------------------------------
 
 # A dataset is a folder with `meta/info.json` and Parquet files below `data` (versions 2.0, 2.1 and 3.0 of the format,
 # https://github.com/huggingface/lerobot). `action` holds the goals of all joints, `observation.state` their positions.

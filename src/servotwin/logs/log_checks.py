@@ -1,4 +1,4 @@
-"""What a log has to fulfil; every failure is one line that names the log and the column."""
+"""Conditions on a log; every failure is one line that names the log and the column."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from servotwin.logs.formats import Layout
     from servotwin.tables import TextTable
 
-# --- What a log has to fulfil; every failure is one line that names the log and the column ----------------------------
+# --- Conditions on a log; every failure is one line that names the log and the column ---------------------------------
 
 FEWEST = 3  # samples
 _Kind = TypeVar("_Kind", bound=np.generic)

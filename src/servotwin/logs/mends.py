@@ -1,4 +1,4 @@
-"""What can be mended in a table before it is a log: the words of `--mend`, and rows that are no rows."""
+"""Mends of a table before it is a log: the words of `--mend`, and rows that are no rows."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from servotwin.tables.reading import MISSING, grouped_in, without_groups
 if TYPE_CHECKING:
     from servotwin.logs.formats import Layout
 
-# --- What can be mended in a table before it is a log: the words of `--mend`, and rows that are no rows ---------------
+# --- Mends of a table before it is a log: the words of `--mend`, and rows that are no rows ----------------------------
 
 _MOST_TORN = 0.2  # of the rows: with more the table is another one
 _MOSTLY = 0.8  # of the cells of a column
@@ -260,7 +260,7 @@ def between(table: TextTable, k: int) -> Iterator[int]:
         if table.rows[k - 1].line < line < table.rows[k].line:
             yield line
 
-# --- What is wrong with the clock of a table --------------------------------------------------------------------------
+# --- Faults of a table's clock ----------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 _NANOSECONDS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}

@@ -27,7 +27,7 @@ from servotwin.parameters import Servo
 from servotwin.signals.signal import warn_of_time_base
 from servotwin.units.words import unit_shown
 
-# --- What the user said of columns, kept in sidecars ------------------------------------------------------------------
+# --- The user's words on columns, kept in sidecars --------------------------------------------------------------------
 
 def keep_columns(logs: Sequence[Log], folder: Path | None = None, *, overwrite: bool = False,
                  instead_of: Sequence[Log] = ()) -> list[Path]:

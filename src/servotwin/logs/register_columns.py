@@ -22,7 +22,7 @@ from servotwin.units.words import unit_word
 
 OPTION = "--registers"
 _GOAL, _POSITION = "Goal_Position", "Present_Position"
-# What a log holds of a servo's registers, of several for one signal the first that the family has: the load of an STS
+# Registers of a servo in a log, of several for one signal the first that the family has: the load of an STS
 # is its duty, that of a Dynamixel, which has a register of its own for PWM, something estimated
 _SIGNALS = {"command_angle": (_GOAL,), "output_angle": (_POSITION,),
             "output_speed": ("Present_Velocity", "Present_Speed"),

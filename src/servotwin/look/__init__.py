@@ -1,6 +1,6 @@
 """One look for pictures and pages: colours, lines, units that people read, and HTML that needs nothing but itself.
 
-What plotting, reports and the command line share. matplotlib is loaded when a picture is made.
+Common parts of plotting, reports and the command line. matplotlib is loaded when a picture is made.
 """
 
 from servotwin.look.page import (

@@ -1,4 +1,4 @@
-"""What every model is: parameters joined to laws, a command conversion, and named output signals."""
+"""Models: parameters joined to laws, a command conversion, and named output signals."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def any_of(condition: Any) -> bool:
 
 
 class Shown(Protocol):
-    """What a signal asks of a model."""
+    """The demands of a signal on a model."""
 
     @property
     def requires(self) -> tuple[str, ...]:

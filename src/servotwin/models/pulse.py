@@ -23,7 +23,7 @@ _REQUIRES = (*MOTOR, "electronics.stretcher_gain", "electronics.one_shot_slope",
 
 
 class _Pulsed(SwitchedServo):
-    """What both pulse servos share: the chip and the bridge."""
+    """The common part of both pulse servos: the chip and the bridge."""
 
     numbers = staticmethod(packing.pulsed)
     optional = (

@@ -1,4 +1,4 @@
-"""What a digital servo that stands draws at a duty, and where the travel of a servo has its middle."""
+"""The current of a standing digital servo at a duty, and where the travel of a servo has its middle."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from servotwin.models.terms.numbers import Numbers
 
 
-# --- What a digital servo that stands draws at a duty, its limit of current included ----------------------------------
+# --- The current of a standing digital servo at a duty, its limit of current included ---------------------------------
 
 _ROUNDS = 30  # until a soft supply and a limit of current agree
 

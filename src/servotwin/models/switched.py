@@ -1,4 +1,4 @@
-"""What all servos behind a switched bridge share: their states, their potentiometer, commands that come in pulses."""
+"""Common parts of servos behind a switched bridge: their states, their potentiometer, commands that come in pulses."""
 
 from __future__ import annotations
 

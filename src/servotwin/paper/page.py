@@ -53,7 +53,7 @@ _CONTROLLERS = {"plain": "plain commands", "feedforward": "(40) as feedforward"}
 
 @dataclass(frozen=True, kw_only=True)
 class Robots:
-    """What the three robots did.
+    """The tasks of the three robots.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a servo is made of: parameters with units, origin and spread, the catalog, and published data."""
+"""Servos by their numbers: parameters with units, origin and spread, the catalog, and published data."""
 
 from servotwin.parameters.catalog import Dataset, catalog_names, dataset_names, load_dataset, load_servo
 from servotwin.parameters.groups import (

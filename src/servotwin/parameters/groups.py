@@ -18,7 +18,7 @@ from servotwin.errors import InputError, ParameterError
 from servotwin.units import is_finite, si_unit
 from servotwin.units.quantities import number_and_unit, quantity
 
-# --- What a parameter group is: a frozen dataclass whose fields say unit, range, meaning and symbol -------------------
+# --- A parameter group: a frozen dataclass whose fields say unit, range, meaning and symbol ---------------------------
 
 # They check themselves; a field that is None is absent: the effect is off, or not known.
 

@@ -154,7 +154,7 @@ def _check_spread(what: str, value: float, spread: Mapping[str, float]) -> None:
         raise InputError(f"{what}: upper", got=upper, allowed=f"at least the value {value!r} (SI)")
 
 
-# --- What a maker prints of a servo: the [sheet] of its file as numbers -----------------------------------------------
+# --- Printed figures of a servo: the [sheet] of its file as numbers ---------------------------------------------------
 
 _FIGURES = {**POINT, **WHOLE}
 

@@ -1,4 +1,4 @@
-"""What the program of a digital servo computes at a tick: counts, dead zone, terms of its law, limits.
+"""The program of a digital servo at a tick: counts, dead zone, terms of its law, limits.
 
 Gains are in duty per unit of the output shaft; a duty of 1 is a bridge that is always on.
 """

@@ -1,4 +1,4 @@
-"""What follows from a pulse: the chip's own pulse, the time that it drives, and what both amount to in the mean."""
+"""Consequences of a pulse: the chip's own pulse, the time that it drives, and what both amount to in the mean."""
 
 from __future__ import annotations
 

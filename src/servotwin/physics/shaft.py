@@ -1,4 +1,4 @@
-"""What moves a shaft: torques, inertia, and the torques that a load makes of its angle."""
+"""Motion of a shaft: torques, inertia, and the torques that a load makes of its angle."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ LEAST_EFFICIENCY = 0.5  # below it the gear of no servo is, and a sheet that say
 
 @dataclass(frozen=True, kw_only=True)
 class SheetMotor:
-    """What a sheet says about the motor, seen at the output shaft.
+    """A sheet's figures of the motor, seen at the output shaft.
 
     Parameters
     ----------

@@ -252,7 +252,7 @@ def _span(ax: Axes, left: float, right: float, y: float, text: str) -> None:
     ax.text(0.5 * (left + right), y + 0.07, text, ha="center", va="bottom", fontsize=8.5, parse_math=True)
 
 
-# --- What a servo's computed sheet shows ------------------------------------------------------------------------------
+# --- Pictures of a computed sheet -------------------------------------------------------------------------------------
 
 _PANELS = ("torque (N m)", "current (A)", "power to the load (W)", "efficiency (%)")
 _MARKERS = ("D", "s", "o", "^", "v")

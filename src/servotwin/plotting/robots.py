@@ -1,4 +1,4 @@
-"""What the servos of a robot have done: following a motion, currents and temperatures, and torque in their curves."""
+"""Signals of a robot's servos: following a motion, currents and temperatures, and torque in their curves."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def robot_paths(runs: Sequence[PathTrace], waypoints: ArrayLike, *, page: int = 
     return finished(figure, foot)
 
 
-# --- What the servos of a robot have done -----------------------------------------------------------------------------
+# --- Signals of a robot's servos --------------------------------------------------------------------------------------
 
 JOINTS_A_PAGE = 12
 """How many joints or servos a picture of a robot shows at once; assumed: whole rows of two and of three panels."""
@@ -138,7 +138,7 @@ class JointTrace(NamedTuple):
 
 
 class ServoTrace(NamedTuple):
-    """What a servo has drawn and how warm it got, over time [s]; what it does not have is None.
+    """Current and temperatures of a servo, over time [s]; what it does not have is None.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ class Cloud(NamedTuple):
 
 
 class ShaftTrace(NamedTuple):
-    """What a motion takes of a servo, beside its curves.
+    """The demands of a motion on a servo, beside its curves.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What comes nearest to a servo among MuJoCo's own actuators: numbers for `<position>`, `<dcmotor>` and their joint.
+"""The nearest of MuJoCo's own actuators to a servo: numbers for `<position>`, `<dcmotor>` and their joint.
 
 A servo stands off its goal by more where it has come up under a load than where it has come down: friction holds it. A
 spring k_p beside a friction loss F does so too, and under the load τ it is as far off as the servo if
@@ -34,7 +34,7 @@ from servotwin.robots.servos.mount import SERVOS
 from servotwin.simulation.simulator import simulate
 from servotwin.units import is_finite
 
-# --- What a servo does that a recipe of MuJoCo's actuators has to copy: what it lifts, and how far a load -------------
+# --- Behaviour that a recipe of MuJoCo's actuators has to copy: what it lifts, and how far a load ---------------------
 
 WAY, REST, RAMP, SETTLE = math.radians(60.0), 0.3, 1.6, 1.4  # rad, s: a goal stands, comes slowly, and stands
 LAST = 20  # of 0.01 s, over which what pulses do to a shaft that stands is averaged
@@ -107,7 +107,7 @@ _FROM = math.radians(60.0)  # rad below a goal: full drive
 
 
 class Actuator(NamedTuple):
-    """What one of MuJoCo's actuators does by a recipe.
+    """The behaviour of one of MuJoCo's actuators by a recipe.
 
     Parameters
     ----------
@@ -248,7 +248,7 @@ def _lifted(recipe: Recipe, actuator: str) -> float:
     return 0.5 * (low + high)
 
 
-# --- What comes nearest to a servo among MuJoCo's own actuators -------------------------------------------------------
+# --- The nearest of MuJoCo's own actuators to a servo -----------------------------------------------------------------
 
 STICKS = "0.9999 0.9999 0.001"
 """`solimpfriction` of a joint with which MuJoCo's friction loss all but holds; as it is by default, it creeps."""

@@ -35,7 +35,7 @@ from servotwin.simulation import VectorSimulator
 from servotwin.simulation.compile.calls import joint_addresses
 from servotwin.simulation.start import Status
 
-# --- What MuJoCo and the servos remember, as something to keep --------------------------------------------------------
+# --- The state of MuJoCo and the servos, to be kept -------------------------------------------------------------------
 
 @dataclass(frozen=True, eq=False)
 class DriveState:

@@ -1,4 +1,4 @@
-"""What the joints of a robot are to do, from a table or a recorded episode of LeRobot."""
+"""Motions of a robot's joints, from a table or a recorded episode of LeRobot."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from servotwin.logs.sidecar import read_json
 from servotwin.tables import TextTable, read_table
 from servotwin.units.words import scaled_unit, unit_word, units_written
 
-# --- What LeRobot's normalised goals mean: counts of a servo, and from these angles of a joint ------------------------
+# --- LeRobot's normalised goals: counts of a servo, and from these angles of a joint ----------------------------------
 
 # A calibration of LeRobot says of each joint between which counts it moves, `range_min` and `range_max`. A goal becomes
 # a whole count as `_unnormalize` makes it (huggingface/lerobot, src/lerobot/motors/motors_bus.py, commit
@@ -353,7 +353,7 @@ def joints_of_dataset(path: Path) -> tuple[str, ...]:
     return tuple(joint.name for joint in open_dataset(path).joints)
 
 
-# --- What the joints of a robot are to do, from a table or a recorded episode of LeRobot ------------------------------
+# --- Motions of a robot's joints, from a table or a recorded episode of LeRobot ---------------------------------------
 
 _TIMES = {"time": "s", "time_s": "s", "time_ms": "ms"}
 _DIMENSIONS = ("angle", "length")  # of a hinge and of a slide

@@ -1,4 +1,4 @@
-"""What touches what in a robot's model: overlaps of a pose, shapes that are left out of contact, and free fall.
+"""Contacts in a robot's model: overlaps of a pose, shapes that are left out of contact, and free fall.
 
 Shapes of real links do not overlap; those of a file often do: hulls of meshes at the base, boxes of a CAD exporter,
 feet that begin in the floor. A solver pushes them apart, and servos seem to fight for nothing. MuJoCo leaves the

@@ -30,7 +30,7 @@ from servotwin.simulation.progress import Progress, shown
 from servotwin.simulation.remarks import NOT_AT_REST, Sag, floor_of, held_back, may_fall, sag_in, watches_its_supply
 from servotwin.units import is_finite
 
-# --- What is odd about a motion ---------------------------------------------------------------------------------------
+# --- Oddities of a motion ---------------------------------------------------------------------------------------------
 
 _SLACK = math.radians(0.5)  # rad, of ends that goals are rounded to
 

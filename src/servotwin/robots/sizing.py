@@ -176,7 +176,7 @@ _COOL = Temperatures(REFERENCE_TEMPERATURE, REFERENCE_TEMPERATURE)
 
 
 class Demand(NamedTuple):
-    """What is asked of a shaft, or delivered by it, over time.
+    """The torque asked of a shaft, or delivered by it, over time.
 
     Parameters
     ----------

@@ -320,7 +320,7 @@ _DELAYS = 101
 
 @dataclass(frozen=True, kw_only=True)
 class Tracking:
-    """What one servo has done while it followed a motion.
+    """The tracking of one servo that followed a motion.
 
     Errors are goal less joint, of a hinge [rad], of a slide [m]; what a servo lacks is nan.
 

@@ -168,14 +168,14 @@ _SAME = 1e-12
 
 
 class PursuitState(NamedTuple):
-    """What a pursuit remembers: how far along its path it has come [m], and whether it has arrived."""
+    """State of a pursuit: how far along its path it has come [m], and whether it has arrived."""
 
     along: float = 0.0
     arrived: bool = False
 
 
 class PursuitDecision(NamedTuple):
-    """What a pursuit asks of the robot.
+    """The speeds that a pursuit asks for.
 
     Parameters
     ----------

@@ -71,7 +71,7 @@ _frames_run: dict[str, float] = {}  # in plain Python, of what a recipe would do
 
 
 class Rows(NamedTuple):
-    """What a run has left behind: rows of motions, of events, and numbers of common motions; status and end [s]."""
+    """The log of a run: rows of motions, of events, and numbers of common motions; status and end [s]."""
 
     motions: NDArray[Any]
     events: Array

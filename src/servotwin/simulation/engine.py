@@ -227,7 +227,7 @@ class Part(NamedTuple):
 
 @dataclass
 class RunLog:
-    """What a run leaves behind: rows of its motions, by the numbers that the servo had, and events in order.
+    """The log of a run: rows of its motions, by the numbers that the servo had, and events in order.
 
     Parameters
     ----------
@@ -410,7 +410,7 @@ def _make_beside() -> None:
 
 
 HELD = crossings.NAMES[crossings.HELD]
-"""What an event is called after which motor and output, that parted and met in no time, stay together for a while."""
+"""Name of an event after which motor and output, that parted and met in no time, stay together for a while."""
 
 
 def failure(status: Status, time: float) -> SimulationError:

@@ -17,7 +17,7 @@ from typing import Any
 
 from servotwin.errors import InputError, ServotwinError
 
-# --- What tells on stderr how far something is that lasts -------------------------------------------------------------
+# --- Progress on stderr -----------------------------------------------------------------------------------------------
 
 Progress = bool | Callable[[int, int], object]
 _PATIENCE = 1.0  # s before the bar appears

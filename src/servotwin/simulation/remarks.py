@@ -1,4 +1,4 @@
-"""What a completed run leaves to be said: refused pulses, an end stop, a load too heavy, trips, a shaft without rest.
+"""Remarks on a completed run: refused pulses, an end stop, a load too heavy, trips, a shaft without rest.
 
 A remark is no failure: the run reached its end, and `Status` says so. One look at the end of the run finds it.
 """
@@ -160,7 +160,7 @@ def watches_its_supply(model: Model) -> bool:
     return isinstance(model, DigitalServo) and model.servo.firmware.undervoltage is not None
 
 
-# --- What a completed run leaves to be said ---------------------------------------------------------------------------
+# --- Remarks on a completed run ---------------------------------------------------------------------------------------
 
 NOT_AT_REST, BUZZES = "does not come to rest", "buzzes at rest"
 HELD_BACK, BELOW_CHIP, BELOW_REGISTER = (
@@ -467,7 +467,7 @@ def of_columns(table: Mapping[str, NDArray[np.float64]]) -> tuple[LaneRemark, ..
     return tuple(sorted(found, key=lambda remark: remark.lane))
 
 
-# --- What is possible but odd in what is to be simulated: one warning for each, before anything runs ------------------
+# --- Odd but possible numbers of a simulation: one warning for each, before anything runs -----------------------------
 
 _TOO_MUCH = 2.0  # times the highest supply voltage of the sheet
 

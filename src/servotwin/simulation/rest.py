@@ -1,4 +1,4 @@
-"""What a servo does once nothing changes any more: whether its shaft comes to rest, and how its bridge drives there."""
+"""A servo under constant conditions: whether its shaft comes to rest, and how its bridge drives there."""
 
 from __future__ import annotations
 

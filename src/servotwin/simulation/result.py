@@ -1,4 +1,4 @@
-"""What a simulation gives back: named signals, events, metrics and energy, and the ways out to files."""
+"""The result of a simulation: named signals, events, metrics and energy, and the ways out to files."""
 
 from __future__ import annotations
 
@@ -162,7 +162,7 @@ def save_lanes(path: str | Path, time: NDArray[np.float64], signals: Mapping[str
     write_file(path, write, overwrite=overwrite)
 
 
-# --- What a simulation gives back: named signals, events, metrics and energy, and the ways out to files ---------------
+# --- The result of a simulation: named signals, events, metrics and energy, and the ways out to files -----------------
 
 @dataclass(frozen=True)
 class Stats:
@@ -287,7 +287,7 @@ class Result:
 
     @cached_property
     def remarks(self) -> tuple[Remark, ...]:
-        """What a completed run leaves to be said, (kind, time [s]): refused pulses, a stop, a heavy load, no rest."""
+        """Remarks on a completed run, (kind, time [s]): refused pulses, a stop, a heavy load, no rest."""
         return remarks_of(self)
 
     @cached_property

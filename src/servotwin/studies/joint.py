@@ -594,7 +594,7 @@ def _sides(servo: Servo) -> list[str]:
     return names
 
 
-# --- What a servo file states of its own spread, and how parameters follow from what is drawn of it -------------------
+# --- The spread that a servo file states, and how parameters follow from what is drawn of it --------------------------
 
 class Together:
     """All numbers of a servo that are fixed together, as far as a model reads what follows from them.

@@ -1,4 +1,4 @@
-"""What is kept of a lane: metrics from samples of many lanes at once, with the meanings of `StepMetrics`.
+"""Metrics of lanes, from samples of many at once, with the meanings of `StepMetrics`.
 
 Between two samples the angle is taken as the cubic through both angles and both speeds.
 """
@@ -25,7 +25,7 @@ from servotwin.simulation.progress import HERE
 from servotwin.simulation.remarks import columns
 from servotwin.simulation.rest import AT_REST, LEAST_REST, look_period, looks_at, still_since, swing_of
 
-# --- What is kept of a lane -------------------------------------------------------------------------------------------
+# --- Metrics of lanes -------------------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 
@@ -289,7 +289,7 @@ _AT_ONCE = 2**17  # numbers of one signal: they stay in a core's cache
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """What all chunks of a study share; picklable.
+    """Common parts of all chunks of a study; picklable.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from servotwin.signals import Signal
 
 
-# --- What can be varied: of a dotted name, the dimension, the physical range and the nominal value --------------------
+# --- Numbers that can be varied: of a dotted name, the dimension, the physical range and the nominal value ------------
 
 _RANGES = {POSITIVE: (TINY, math.inf), NOT_NEGATIVE: (0.0, math.inf), AT_LEAST_ONE: (1.0, math.inf),
            FRACTION: (0.0, 1.0)}

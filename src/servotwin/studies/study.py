@@ -1,4 +1,4 @@
-"""What a sweep found out."""
+"""The result of a sweep."""
 
 from __future__ import annotations
 
@@ -340,7 +340,7 @@ def variance_share(values: NDArray[Any], metric: NDArray[np.float64]) -> float:
     return max(0.0, 1.0 - (1.0 - between) * (len(y) - 1) / (len(y) - len(sizes)))
 
 
-# --- What a sweep found out -------------------------------------------------------------------------------------------
+# --- The result of a sweep --------------------------------------------------------------------------------------------
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 _MOST_WARNED = 100  # failures in a summary, and lanes of a kind of remark

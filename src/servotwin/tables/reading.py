@@ -250,7 +250,7 @@ def _check(path: Path, text: str, whole: str, *, damaged: bool) -> None:
         raise InputError(f"{path}: line {line}", got=NUL, allowed="a text; the file was damaged")
 
 
-# --- What the Arduino IDE makes of lines ------------------------------------------------------------------------------
+# --- Lines of the Arduino IDE -----------------------------------------------------------------------------------------
 
 ARRIVAL = "Serial Monitor"
 """Name of the column with the times that the Serial Monitor puts before lines."""

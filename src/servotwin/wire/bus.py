@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from servotwin.wire.service import Service
 
 
-# --- What is wrong with a wire ----------------------------------------------------------------------------------------
+# --- Faults of a wire -------------------------------------------------------------------------------------------------
 
 KINDS = {
     "lost": "a byte of an answer is lost, by `rate` of the answers",

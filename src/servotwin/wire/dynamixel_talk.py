@@ -1,4 +1,4 @@
-"""What Dynamixel's servos on a wire answer to a packet of protocol 2.0, and when."""
+"""Answers of Dynamixel's servos to a packet of protocol 2.0, and when."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What Feetech's servos on a wire answer to a packet, and when."""
+"""Answers of Feetech's servos to a packet, and when."""
 
 from __future__ import annotations
 

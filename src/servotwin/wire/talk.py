@@ -1,4 +1,4 @@
-"""What both protocols have in common: who answers a packet, and what is left where several do."""
+"""The common part of both protocols: who answers a packet, and what is left where several do."""
 
 from __future__ import annotations
 

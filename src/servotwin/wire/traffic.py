@@ -1,4 +1,4 @@
-"""What goes over a wire as logs: what servos told a program, and the truth beside."""
+"""Traffic on a wire as logs: what servos told a program, and the truth beside."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What carries bytes to a bench and back: one small interface, and all that fits it."""
+"""Backends, which carry bytes to a bench and back: one small interface, and all that fits it."""
 
 from servotwin.bench.backends.board_backend import Backend
 from servotwin.bench.backends.emulated import EmulatedBackend, MockBackend

@@ -1,4 +1,4 @@
-"""What carries bytes to a bench and back: a serial port, an emulator, a mock."""
+"""Backends, which carry bytes to a bench and back: a serial port, an emulator, a mock."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ _FAR = 2**62  # ticks; never
 
 
 class Plant(Protocol):
-    """What hangs on the pins of a board."""
+    """The plant at the pins of a board."""
 
     def rise(self, time: float) -> None:
         """Take the rising edge of a pulse [s]."""

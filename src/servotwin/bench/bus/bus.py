@@ -164,7 +164,7 @@ class Ticks:
         return self._tick
 
 
-# --- What a servo on a bus is told at which tick of an experiment -----------------------------------------------------
+# --- Goals of a servo on a bus at the ticks of an experiment ----------------------------------------------------------
 
 _KIND = "angle"
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Protocol
 from servotwin.bench.backends.board_backend import Backend
 from servotwin.errors import BenchError, MissingExtraError
 
-# --- What the makers' packages take for their port --------------------------------------------------------------------
+# --- The port that the makers' packages take --------------------------------------------------------------------------
 
 BITS = 10  # of a byte on the wire, with start and stop
 _SLICE = 0.01  # s of one read
@@ -78,7 +78,7 @@ class BusPort:
 # --- A wire with bus servos: ask one, ask several at once, tell one, tell several at once -----------------------------
 
 class Answer(NamedTuple):
-    """What a servo said.
+    """The answer of a servo.
 
     Parameters
     ----------

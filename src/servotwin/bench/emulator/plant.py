@@ -1,4 +1,4 @@
-"""What hangs on the pins of a board: a simulated servo, driven by the edges of its pulses."""
+"""The plant at the pins of a board: a simulated servo, driven by the edges of its pulses."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from servotwin.simulation import Result
 
 
-# --- What hangs on the pins of a board: a simulated servo, driven by the edges of its pulses --------------------------
+# --- The plant at the pins of a board: a simulated servo, driven by the edges of its pulses ---------------------------
 
 _NEVER = 1e9  # s
 _ENDLESS = 1e3  # s; no servo takes such a pulse

@@ -39,7 +39,7 @@ _SHUNT_ZERO = _assumed(0.0, "V", "no offset")
 
 @dataclass(frozen=True, kw_only=True)
 class Wiring:
-    """What is wired to the board, and by which numbers.
+    """The wires of the board, and by which numbers.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ SIGNALS = {"tap": "feedback_voltage_V", "shunt": "supply_current_A", "supply": "
 """Column of a log for each channel; that of the command is no signal of a log."""
 
 
-# --- What a multimeter says of the wires: reference of the converter, divider, shunt, each with its error -------------
+# --- Calibration of the wires by a multimeter: reference of the converter, divider, shunt, each with its error --------
 
 FEWEST = 3  # points: a line, and how far they are off it
 CHANNEL = {"reference": "command", "supply": "supply", "shunt": "shunt"}

@@ -19,7 +19,7 @@ from servotwin.logs.sidecar import FORMAT, sidecar_path, write_json
 if TYPE_CHECKING:
     from servotwin.bench.bus import Bus
 
-# --- What a servo may be asked for on a bench; said before anything moves ---------------------------------------------
+# --- Limits of a servo on a bench, checked before anything moves ------------------------------------------------------
 
 _WINDOW = 0.25  # s over which the current is averaged: a start draws the stall current for some tens of ms
 
@@ -63,7 +63,7 @@ class CurrentGuard:
             raise BenchError("supply current", f"{self._sum / len(self._seen):.3g} A in the mean of {_WINDOW:g} s, "
                                                f"above the limit of {self._limit:g} A")
 
-# --- What a recorder records from: a bench with its wires, whatever they are ------------------------------------------
+# --- Sources of a recorder: a bench with its wires, whatever they are -------------------------------------------------
 
 class Rig(Protocol):
     """A servo on a wire, with what measures it.
@@ -73,7 +73,7 @@ class Rig(Protocol):
 
     @property
     def kind(self) -> str:
-        """What an experiment for it commands: "pulse_width" or "angle"."""
+        """The commands of an experiment for it: "pulse_width" or "angle"."""
 
     @property
     def columns(self) -> Sequence[str]:
@@ -122,7 +122,7 @@ _FRAME_PERIOD, _VOLTAGE = "electronics.frame_period", "supply.open_circuit_volta
 
 @dataclass(frozen=True, kw_only=True)
 class About:
-    """What a log says of where it comes from.
+    """The origin of a log.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ class About:
 
 @dataclass(frozen=True)
 class Recorded:
-    """What a run left.
+    """The end of a run.
 
     Parameters
     ----------

@@ -266,7 +266,7 @@ _CONTRAST = 12.0  # grey levels (measured: 7, which is usual, loses half the mar
 
 
 class Finder:
-    """What finds marks, picture after picture; it looks first where they were last.
+    """A finder of marks, picture after picture; it looks first where they were last.
 
     Parameters
     ----------
@@ -622,7 +622,7 @@ class Filmed:
 
 @dataclass
 class _Seen:
-    """What the pictures of a clip show."""
+    """The marks in the pictures of a clip."""
 
     time: list[float] = field(default_factory=list)
     horn: list[NDArray[np.float64]] = field(default_factory=list)

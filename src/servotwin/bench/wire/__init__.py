@@ -1,4 +1,4 @@
-"""What goes over the wire to the microcontroller: frames, messages, and the text that defines them."""
+"""The wire to the microcontroller: frames, messages, and the text that defines them."""
 
 from servotwin.bench.wire.board import Board, Message
 from servotwin.bench.wire.frames import Clock, Field, Frame, Kind, Protocol, Splitter, from_wire, protocol, to_wire

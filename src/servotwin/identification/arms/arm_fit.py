@@ -1,4 +1,4 @@
-"""What the fit of a robot found: servos, supply, links, zeros and latency, and how far it is from the real one."""
+"""The result of a robot's fit: servos, supply, links, zeros and latency, and how far it is from the real one."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ from servotwin.identification.fitting.uncertainty import (
 from servotwin.parameters import Servo, Supply
 from servotwin.robots import RobotValidation
 
-# --- What the fit of a robot found ------------------------------------------------------------------------------------
+# --- The result of a robot's fit --------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 BELIEFS = "by beliefs"
@@ -49,7 +49,7 @@ HALF = 0.5  # of what is known of a number
 
 
 class ArmCause(NamedTuple):
-    """What would explain more: its name, a sentence, by how much the cost of the first stage falls, its joints."""
+    """A further cause: its name, a sentence, by how much the cost of the first stage falls, its joints."""
 
     name: str
     sentence: str
@@ -216,7 +216,7 @@ class ArmFit:
         return write_arm_report(self, Path(path), overwrite=overwrite)
 
 
-# --- What would explain more of a robot's episodes --------------------------------------------------------------------
+# --- Causes that would explain more of a robot's episodes -------------------------------------------------------------
 
 _LEAST_GAIN = 8.0  # of the cost
 _LEAST_SHARE = 0.008  # of the cost

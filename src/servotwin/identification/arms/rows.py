@@ -29,7 +29,7 @@ from servotwin.robots import Motion, Mount, joint_names, joint_ranges, read_moti
 from servotwin.robots.motion import episodes_of
 from servotwin.robots.servos.servo_groups import differing, of_one_form
 
-# --- What was recorded of a robot, made ready for a fit: goals and positions of its joints, side by side --------------
+# --- Recordings of a robot, made ready for a fit: goals and positions of its joints, side by side ---------------------
 
 _FEWEST = 30  # samples
 _SAME = 1e-6  # s

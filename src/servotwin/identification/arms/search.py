@@ -1,4 +1,4 @@
-"""What is fitted in the fit of a robot, and how far simulated joints are off it."""
+"""The problem of a robot's fit, and how far simulated joints are off it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from servotwin.robots.run import ticks_in
 from servotwin.robots.servos.coupling import couple, couplings_of
 from servotwin.simulation import VectorSimulator
 
-# --- What the measured motion of a robot asks of each joint: torques and inertias, link by link -----------------------
+# --- Demands of a robot's measured motion on each joint: torques and inertias, link by link ---------------------------
 
 # tau_j = M_jj q''_j + sum over others of M_jk q''_k + Coriolis + gravity
 #
@@ -444,10 +444,10 @@ class ArmSearch:
         return x
 
 
-# --- What is fitted in the fit of a robot, and how far simulated joints are off it ------------------------------------
+# --- The problem of a robot's fit, and how far simulated joints are off it --------------------------------------------
 
 class Problem(NamedTuple):
-    """What is fitted: robot, numbers, links, episodes and their samples, what is called, and what motions ask for."""
+    """A fit's robot, numbers, links, episodes and their samples, what is called, and what motions ask for."""
 
     plant: Any
     numbers: Numbers

@@ -1,4 +1,4 @@
-"""What a servo file leaves out or only assumes: by how much its ranges, as far as the logs allow, move a fit's numbers.
+"""Numbers that a servo file leaves out or only assumes: how far their ranges move a fit's numbers.
 
 Each such number is a nuisance with a uniform law over its range. A lane of each log, with that number moved, gives its
 derivative S beside that of the fitted numbers, J. Where the cost is a parabola the fitted numbers follow it by
@@ -29,7 +29,7 @@ from servotwin.identification.fitting.uncertainty import Rows, Uncertainty
 from servotwin.models import DigitalServo
 from servotwin.parameters import Servo
 
-# --- What logs, priors and bounds allow together, and servos drawn from that ------------------------------------------
+# --- Servos that logs, priors and bounds allow together ---------------------------------------------------------------
 
 # Near the best point the logs' cost is a parabola; along directions that they do not determine it is flat, and there a
 # prior counts, if there is one, or else any point within the bounds as much as any other. A number at a bound is drawn
@@ -383,7 +383,7 @@ def _end(search: Search, best: Outcome, doubt: Uncertainty, k: int, side: float,
     return at, share
 
 
-# --- What a servo file leaves out or only assumes ---------------------------------------------------------------------
+# --- Numbers that a servo file leaves out or only assumes -------------------------------------------------------------
 
 WANTED = 3.5
 """Standard errors from what the file says, beyond which the logs want a number elsewhere: as of priors."""

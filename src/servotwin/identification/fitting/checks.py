@@ -259,7 +259,7 @@ def shown(progress: Any) -> Iterator[Callable[[float, str], None]]:
             bar.stop()
 
 
-# --- What is wrong with logs before any fit ---------------------------------------------------------------------------
+# --- Faults of logs before any fit ------------------------------------------------------------------------------------
 
 _CHECKS: Mapping[str, Callable[[Sequence[Look]], list[Finding]]] = {
     "wrap": wraps, "stamps": wrong_stamps, "sign": turned, "span": spans, "rows": missing_rows,

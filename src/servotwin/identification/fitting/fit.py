@@ -1,4 +1,4 @@
-"""What a fit found: values with intervals, what the logs cannot say, and the errors on logs that it has not seen."""
+"""The result of a fit: values with intervals, what the logs cannot say, and the errors on logs that it has not seen."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def split(logs: Sequence[Log], holdout: Any, seed: int) -> tuple[list[int], list
     return sorted(set(range(len(logs))) - set(out)), sorted(out)
 
 
-# --- What a fit found -------------------------------------------------------------------------------------------------
+# --- The result of a fit ----------------------------------------------------------------------------------------------
 
 LINEARISED_TIMES = 3.0
 """Times as wide as where the problem is straight, assumed: among kinks those of a finished fit are up to so wide."""

@@ -41,7 +41,7 @@ _BY_BENDS = 0.2  # how surely second differences tell the noise's power, in its 
 
 @dataclass(frozen=True)
 class SensorSeries:
-    """What one sensor measured in one log, where it counts.
+    """Values of one sensor in one log, where it counts.
 
     Parameters
     ----------

@@ -497,7 +497,7 @@ def _lag(scores: Sequence[Array]) -> int:
     return min(2 * lag, longest // 2)
 
 
-# --- What logs cannot say, in words: which numbers only appear together, and what would tell them apart ---------------
+# --- Limits of logs, in words: which numbers only appear together, and what would tell them apart ---------------------
 _VAGUE = 1.0  # standard error of a direction that is not determined: a factor e, or as much as is typical
 _SHARE = 0.25  # what such a direction may add to the standard error of a number that counts as determined
 _WORDS_PART = 0.05  # of a direction

@@ -47,7 +47,7 @@ _ALONE = 1.0  # s: so far apart errors of a model are those of different motions
 
 @dataclass(frozen=True)
 class Cause:
-    """What would explain residuals that are not noise, tried on the logs.
+    """Causes of residuals that are not noise, tried on the logs.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def judge(series: Sequence[SensorSeries], sensor: str, rows: Sequence[Rows] = ()
         return Verdict(f"exact: what is left, {shown(left, sensor)}, is no more than the simulation is off", True,
                        left / noise.size, {sensor: noise.size}, 0.0)
     inner = [~isolated(one, noise.jitter) for one in series]
-    # What also the measured values alone show: fast errors of a wrong model are no outliers
+    # Changes that the measured values alone show too: fast errors of a wrong model are no outliers
     plain = [replace(one, simulated=np.zeros(len(one.time))) for one in series]
     lost = sum(float((isolated(one) & ~k).sum()) for one, k in zip(plain, inner, strict=True)) / sum(map(len, inner))
     scaled = [one.residual / noise.of(one) for one in series]

@@ -242,7 +242,7 @@ def _until(steps: Array, rises: Array) -> float:
     return last + share * (float(steps[k]) - last)
 
 
-# --- What would tell apart what logs cannot: further sensors and known loads, tried in simulation ---------------------
+# --- Remedies where logs tell numbers together only: further sensors and known loads, tried in simulation -------------
 _SENSORS = {"output_angle": "an encoder at the output", "feedback_voltage": "a potentiometer tap",
             "armature_current": "a motor current measurement", "supply_current": "a supply current measurement"}
 _NOISE = 0.01  # of a sensor's largest value, assumed of a further one
@@ -455,7 +455,7 @@ def settle(task: Task, found: Outcome, tell: Told) -> tuple[Outcome, tuple[Dropp
             if not trials:
                 break
             best = max(trial.gain for trial in trials)
-            # What fits as well is told apart by how far its own prior has to be left
+            # Fits that are as good are told apart by how far its own prior has to be left
             chosen = min((t for t in trials if t.gain > best - _REACH), key=lambda t: t.moved)
             gone, point = [chosen.dropped], chosen.end.point
             if len(going := [trial for trial in trials if math.isinf(trial.dropped.wide)]) > 1:

@@ -184,7 +184,7 @@ def _error(value: float) -> str:
     return f"{value:.3g}" if math.isfinite(value) else "–"
 
 
-# --- What the reports of fits and of validations share: frames of pictures, errors, and logs side by side -------------
+# --- Common parts of the reports of fits and validations: frames of pictures, errors, and logs side by side -----------
 
 _MOST_LOGS = 21  # that are drawn folded
 STYLE = """

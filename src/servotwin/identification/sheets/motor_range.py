@@ -293,7 +293,7 @@ def _together(points: Sequence[SheetPoint], alone: Sequence[SheetMotor], sheet: 
                       coulomb_torque=K * I_0 * (1.0 - load_share(min(eta, 1.0))))
 
 
-# --- What is wrong with a sheet, and what it lacks, in words that name the printed figures ----------------------------
+# --- Faults and gaps of a sheet, in words that name the printed figures -----------------------------------------------
 
 _SLIGHT = 0.4  # growth with the voltage to this power, of motors 1 and of most sheets 0.8, is remarkable
 _STEEP_DROP, _STEEP_RATIO = 0.4, 0.35  # what makes torque and speed grow fastest

@@ -1,1 +1,1 @@
-"""What a log says by itself, without a servo and without a fit."""
+"""Statements on a log alone, without a servo and without a fit."""

@@ -95,7 +95,7 @@ def _unit(steps: Array, period: float) -> float:
     return 0.0
 
 
-# --- What cannot be right in a log, and which experiment it lacks: sentences, each with what to do --------------------
+# --- Faults of a log, and experiments that it lacks: sentences, each with what to do ----------------------------------
 
 _ARRIVED = 0.6  # s of one command, within which any servo gets there
 _LATE = 0.2  # s: more than a servo's dead time
@@ -411,7 +411,7 @@ def _speed(time: Array, angle: Array) -> float:
     return float(np.abs((smooth[apart:] - smooth[:-apart]) / (time[apart:] - time[:-apart])).max())
 
 
-# --- What the values of a measured signal say of its sensor: noise, steps, ends of its range --------------------------
+# --- A sensor by the values of its signal: noise, steps, ends of its range --------------------------------------------
 
 _FEW = 8  # different values, at least, that show steps
 _MANY = 20_000  # different values: steps finer than that do not matter

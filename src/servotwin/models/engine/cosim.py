@@ -58,7 +58,7 @@ if TYPE_CHECKING:
     from servotwin.models.engine.memory import Memories
 
 
-# --- What another simulator decides of a servo, as changes of its numbers and of where it stands ----------------------
+# --- Decisions of another simulator on a servo, as changes of its numbers and of where it stands ----------------------
 
 def possible(given: float, followed: float, low: float, high: float, least: float, most: float) -> bool:
     """Tell whether a servo takes a command, as it is given and as the engine follows it.
@@ -405,7 +405,7 @@ def break_up(joined: Indices, shared: Any, rows: Any) -> None:
         shared[k].phase, shared[k].jumped = APART, 1
 
 
-# --- What a user should know of how a run ended: of its last pulses, of end stops, and of the load --------------------
+# --- Remarks on the end of a run: of its last pulses, of end stops, and of the load -----------------------------------
 
 ON_STOP, CANNOT_HOLD = 1, 2  # added up
 _AT_STOP = 1e-6  # rad, relative beyond 1 rad: single precision

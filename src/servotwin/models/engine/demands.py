@@ -1,4 +1,4 @@
-"""What a servo asks of whoever follows it, as its terms say it; what can come up at all, and what does not matter."""
+"""Demands of a servo on the loop that steps it, by its terms: what can come up at all, and what does not matter."""
 
 from __future__ import annotations
 

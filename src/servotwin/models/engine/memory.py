@@ -1,4 +1,4 @@
-"""What a servo remembers between two calls, whole: where it stands, what its chip has decided, and its clock.
+"""The state of a servo between two calls, whole: where it stands, what its chip has decided, and its clock.
 
 Times within it count from the beginning of a frame, a new one after so many, so that they keep their digits for days;
 `frames` says which one that is. An instant within a billionth of a frame of an edge *is* the edge, so that twenty ticks

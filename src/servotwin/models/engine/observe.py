@@ -1,4 +1,4 @@
-"""What shows of a servo as it stands: its electrical side, and the torques at its output shaft.
+"""Signals of a servo as it stands: its electrical side, and the torques at its output shaft.
 
 The numbers are those of this instant: at the temperatures of winding and housing, and with the bridge as it is off now.
 """

@@ -98,7 +98,7 @@ def in_linear_zone(zone: int) -> bool:
     return zone == LINEAR or zone == LINEAR_BACKWARD
 
 
-# --- What rounding leaves of a number ---------------------------------------------------------------------------------
+# --- The rest that rounding leaves of a number ------------------------------------------------------------------------
 
 UNIT = 2e-16  # relative to it
 IN_FLOATS = {"UNIT": 1.2e-7}

@@ -32,7 +32,7 @@ READS = (
     "motor.brush_drop_voltage", "electronics.off_state", "electronics.silence_state", "supply.bridge_drop_voltage",
     "supply.bridge_drop_resistance",
 )
-"""What may be given of a pulse servo."""
+"""Optional numbers of a pulse servo."""
 _COAST, _SILENT_COAST = place("electronics.off_state", "coast"), place("electronics.silence_state", "coast")
 
 

@@ -1,4 +1,4 @@
-"""What terms say of themselves: flags, which `|` unites.
+"""Flags of terms, which `|` unites.
 
 `depends` of a term says on what the acceleration depends through it in a mode; dependence on the speed in a straight
 line is not told, for every solution has it. `needs` says what else whoever follows a servo has to follow. `ACTS` says

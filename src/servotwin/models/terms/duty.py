@@ -18,7 +18,7 @@ from servotwin.physics.pwm import averaged_drop, averaged_resistance, chopped_re
 READS = (
     "motor.brush_drop_voltage", "supply.bridge_drop_voltage", "supply.bridge_drop_resistance", "firmware.off_state",
 )
-"""What may be given of a digital servo."""
+"""Optional numbers of a digital servo."""
 
 BRAKE, DIODE, COAST = 1.0, 2.0, 3.0  # what the bridge does in the pauses of its PWM
 OPEN, BRAKED = 2.0, 3.0  # stand in the place of a duty: torque is off

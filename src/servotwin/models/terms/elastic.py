@@ -21,7 +21,7 @@ from servotwin.parameters.groups import Relation
 from servotwin.physics.shaft import stretch_beyond_play, twist_torque
 
 READS = ("gear.backlash", "gear.stiffness", "gear.damping")
-"""What may be given of a pulse servo."""
+"""Optional numbers of a pulse servo."""
 
 _PART = 3.0  # steps cover at most this part of the time in which the two ring
 

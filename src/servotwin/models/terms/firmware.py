@@ -21,7 +21,7 @@ READS = tuple(f"firmware.{name}" for name in (
     "overload_output", "overload_latches", "trip_current", "trip_time", "trip_temperature", "undervoltage",
     "undervoltage_action", "restart_time", "signal_timeout", "signal_loss", "failsafe_angle", "soft_start_duty",
     "soft_start_time"))
-"""What may be given of a digital servo."""
+"""Optional numbers of a digital servo."""
 
 HOLD, LIMP, FAILSAFE = 0.0, 1.0, 2.0  # what it does without a command
 _GATE, _WHOLE, _OF_MEASUREMENT, _AT_REST, _SENSES_BUS, _BRAKES, _GOALS, _LATCHES, _RESETS, _LIMP, _SAFE = (

@@ -29,7 +29,7 @@ READS = (
     "electronics.supply_coupling", "electronics.pulse_timeout", "electronics.pulse_width_min",
     "electronics.pulse_width_max", "potentiometer.noise",
 )
-"""What may be given of a pulse servo."""
+"""Optional numbers of a pulse servo."""
 FRAME = 0.02  # s, from pulse to pulse where nothing says otherwise
 
 
@@ -93,10 +93,10 @@ def _edges_first(timeout: float, period: float) -> float:
     return timeout * (1.0 + 1e-11) if abs(timeout - frames * period) <= 1e-9 * period else timeout
 
 
-# --- What the chip does with each pulse -------------------------------------------------------------------------------
+# --- The chip at each pulse -------------------------------------------------------------------------------------------
 
 class Decision(NamedTuple):
-    """What a frame has decided: from `time` on, drive with `sign` for `duration`."""
+    """The decision of a frame: from `time` on, drive with `sign` for `duration`."""
 
     time: float
     sign: float

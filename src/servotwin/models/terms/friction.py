@@ -36,7 +36,7 @@ READS = (
     "friction.load_friction_motor_stribeck", "friction.load_friction_external_stribeck",
     "friction.load_friction_motor_quad", "friction.load_friction_external_quad",
 )
-"""What may be given of a pulse servo."""
+"""Optional numbers of a pulse servo."""
 
 
 class Friction(NamedTuple):

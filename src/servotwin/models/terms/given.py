@@ -1,4 +1,4 @@
-"""What is given of a servo and hangs on its shaft, as numbers alone: what terms make their own numbers of."""
+"""Given numbers of a servo and of its load, of which terms make their own."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from servotwin.loads import Load
 
 
-# --- What is given of a servo, as numbers alone -----------------------------------------------------------------------
+# --- Given numbers of a servo -----------------------------------------------------------------------------------------
 
 if TYPE_CHECKING:
 
@@ -101,7 +101,7 @@ def _words() -> dict[str, tuple[str, ...]]:
             if isinstance(f.metadata["rule"], tuple)}
 
 
-# --- What hangs on the shaft, as numbers alone ------------------------------------------------------------------------
+# --- The load on the shaft, as numbers alone --------------------------------------------------------------------------
 
 class Hung(NamedTuple):
     """A load in SI, each a number or a column of lanes; torques that depend on time alone are inputs."""

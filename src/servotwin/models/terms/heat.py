@@ -12,7 +12,7 @@ READS = (
     "thermal.winding_capacity", "thermal.housing_capacity", "thermal.winding_to_housing",
     "thermal.housing_to_ambient", "thermal.ambient", "thermal.magnet_coefficient",
 )
-"""What may be given of a pulse servo."""
+"""Optional numbers of a pulse servo."""
 
 
 class Heat(NamedTuple):

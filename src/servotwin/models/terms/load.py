@@ -1,4 +1,4 @@
-"""What hangs on the shaft, inertia and damping apart: dry friction, spring, pendulum, and torque over time."""
+"""The load on the shaft, inertia and damping apart: dry friction, spring, pendulum, and torque over time."""
 
 from __future__ import annotations
 

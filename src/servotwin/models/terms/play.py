@@ -22,7 +22,7 @@ IN_FLOATS = {"_LAST_IMPACT": 1e-6, "_ROUNDING": 1e-6}
 _BEARING = "friction.bearing_coulomb_torque"
 
 READS = (_BEARING,)
-"""What may be given of a servo with play, the play apart."""
+"""Optional numbers of a servo with play, the play apart."""
 
 
 class Play(NamedTuple):

@@ -21,7 +21,7 @@ READS = (
     "potentiometer.feedback_offset", "potentiometer.backlash", "potentiometer.quantisation",
     "potentiometer.linearity_angle", "potentiometer.linearity_error", "potentiometer.fixed_angle",
 )
-"""What may be given of a pulse servo."""
+"""Optional numbers of a pulse servo."""
 
 
 class Sensor(NamedTuple):

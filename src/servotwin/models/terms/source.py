@@ -10,7 +10,7 @@ from servotwin.models.terms.given import Given, either
 from servotwin.physics.supply import source_voltage
 
 READS = ("supply.internal_resistance", "supply.current_limit")
-"""What may be given of a pulse servo."""
+"""Optional numbers of a pulse servo."""
 
 
 class Source(NamedTuple):

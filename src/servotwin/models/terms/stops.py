@@ -9,7 +9,7 @@ from servotwin.models.terms.dependence import AT_STOPS
 from servotwin.models.terms.given import Given, either
 
 READS = ("stops.lower_angle", "stops.upper_angle", "stops.restitution")
-"""What may be given of a pulse servo."""
+"""Optional numbers of a pulse servo."""
 
 
 class Stops(NamedTuple):

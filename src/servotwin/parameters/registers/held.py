@@ -1,4 +1,4 @@
-"""What stands in the registers of a servo, and which numbers of its program follow from each."""
+"""Registers of a servo, and which numbers of its program follow from each."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from servotwin.parameters.registers.table import (
 )
 from servotwin.parameters.servo import Servo
 
-# --- What stands in the registers of a servo, and which numbers of its program follow from each -----------------------
+# --- Registers of a servo, and which numbers of its program follow from each ------------------------------------------
 
 _FAMILIES: dict[str, Callable[[Servo], Family]] = {
     "Feetech STS": family_as_set, "Dynamixel X": family_of_x, "Dynamixel MX": mx_family_of,

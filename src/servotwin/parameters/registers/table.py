@@ -1,4 +1,4 @@
-"""What a table of registers is, and the one reader that makes a firmware group of raw values."""
+"""Tables of registers, and the one reader that makes a firmware group of raw values."""
 
 from __future__ import annotations
 
@@ -338,7 +338,7 @@ VARIED: Mapping[str, tuple[Varied, ...]] = {
 """Registers that people and programs change, by the label of the family; the values are where a search begins."""
 
 
-# --- What a table of registers is, and the one reader that makes a firmware group of raw values -----------------------
+# --- Tables of registers, and the one reader that makes a firmware group of raw values --------------------------------
 
 Raw = Mapping[str, int]
 Value = float | str | None

@@ -1,6 +1,6 @@
 """Which controller a robot's servos have: plain commands, or one that knows them and the arm that they move.
 
-What a controller believes is its own: an inverse of each servo, and a MuJoCo model of the arm, which may differ from
+A controller has models of its own: an inverse of each servo, and a MuJoCo model of the arm, which may differ from
 the ones that it is wired to.
 """
 
@@ -277,7 +277,7 @@ class RigidBody:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Known:
-    """What a controller of an arm knows.
+    """Knowledge of an arm's controller.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ _BLEND = 2.0  # samples of the motion, over which ideal actuators blend it
 
 @dataclass(frozen=True, kw_only=True)
 class Belief:
-    """What a controller believes that may be wrong.
+    """Beliefs of a controller that may be wrong.
 
     Parameters
     ----------
@@ -303,7 +303,7 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-# --- What controllers make of servos: every task of an arm by every fidelity, and when it gets hard -------------------
+# --- Controllers of servos compared: every task of an arm by every fidelity, and when it gets hard --------------------
 
 # A case is a task, a fidelity of the servos, a controller and a condition. Controllers that drive the motors past the
 # chips do so on the parameters that the fidelity reads: the averaged servo has a supply without end, the bounded one no

@@ -1,4 +1,4 @@
-"""What the tool of an arm is to do: paths of the tool over time, which begin and end at rest.
+"""Tasks of an arm's tool: paths of the tool over time, which begin and end at rest.
 
 Along each stretch of a path the tool gets up to speed and comes to rest by smooth steps, so that its acceleration never
 jumps:
@@ -27,7 +27,7 @@ from servotwin.robots.motion import Motion
 from servotwin.robots.places import load_mujoco
 from servotwin.units import is_finite
 
-# --- What the tool of an arm is to do: paths of the tool over time, which begin and end at rest -----------------------
+# --- Tasks of an arm's tool: paths of the tool over time, which begin and end at rest ---------------------------------
 
 Place = tuple[float, float, float]
 SPEED = 0.08
@@ -537,7 +537,7 @@ class _Solver:
                           allowed=f"{factor * lower[at]:.4g} to {factor * upper[at]:.4g} {unit}, its limits")
 
 
-# --- What a redundant arm does with the joint that its tool does not need: criteria, each an object -------------------
+# --- The spare joint of a redundant arm: criteria, each an object -----------------------------------------------------
 
 # An arm of three links has for each place and turn of its tool a line of postures to choose from. A criterion says
 # which of them is best:

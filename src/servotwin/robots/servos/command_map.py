@@ -19,7 +19,7 @@ from servotwin.robots.servos.mount import Joint, Mount, joints_of
 from servotwin.simulation import VectorSimulator
 from servotwin.units import is_finite
 
-# --- What the servo at a joint is told --------------------------------------------------------------------------------
+# --- The command of the servo at a joint ------------------------------------------------------------------------------
 
 class Told(NamedTuple):
     """How a command of a joint becomes that of its servo: (command − zero)/gain.

@@ -44,7 +44,7 @@ from servotwin.simulation.compile.addresses import (
     words,
 )
 
-# --- What servos at joints remember, and where they and the engine keep it --------------------------------------------
+# --- The memory of servos at joints, and its place in the engine ------------------------------------------------------
 
 def word_at(base: int, offset: int) -> int:
     """Return the word that stands so many bytes behind an address."""
@@ -107,7 +107,7 @@ def complain(instance: Words, code: int, culprit: int) -> None:
         instance[place.CODE], instance[place.CULPRIT] = code, culprit
 
 
-# --- What is kept of a run of servos at joints: rows of what shows, and books of energy -------------------------------
+# --- The record of a run of servos at joints: rows of what shows, and books of energy ---------------------------------
 
 def keep(drive: Words, instance: Words, room: Rows, torque: Numbers, time: float, again: bool) -> None:
     """Write what shows of all servos into a row of the record; `again` over the last one."""
@@ -298,7 +298,7 @@ def go_on(instance: Words, room: Rows, dt: float, watched: bool) -> int:
     return lost
 
 
-# --- What joints would do without their servos, and the torques of all servos that follow from it ---------------------
+# --- Joints without their servos, and the torques of all servos that follow from it -----------------------------------
 
 def accelerations(m: int, d: int, drive: Words, block: Numbers, at: int, inverse: Rows, room: Rows, square: Rows,
                   known: bool, again: bool) -> None:

@@ -1,4 +1,4 @@
-"""What the servos of a robot have done: their signals at the end of each tick, as `simulate` names them."""
+"""Signals of a robot's servos at the end of each tick, as `simulate` names them."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def set_iterations(model: Any, joints: Sequence[Joint], solver: str) -> SolverNo
     return SolverNote(RAISED, f"MuJoCo's solver was raised, {found}, for {where} with play or an elastic gear")
 
 
-# --- What the servos of a robot have done -----------------------------------------------------------------------------
+# --- Signals of a robot's servos --------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 _COLUMNS = (*KEPT, *Observed._fields)
@@ -123,7 +123,7 @@ class Clipped(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ServoRecord(Mapping[str, Array]):
-    """What one servo has done: signals (SI) by name, shape (n,), as those of a `Result`.
+    """Signals of one servo: signals (SI) by name, shape (n,), as those of a `Result`.
 
     Beside those of its model there are `joint_angle` and `joint_command`, the angle [rad] or place [m] of the joint and
     what was asked of it (a pulse width [s] where its servo turns endlessly), and `joint_torque`, the mean torque [N m]
@@ -236,7 +236,7 @@ class ServoRecord(Mapping[str, Array]):
 
 
 class Record(Mapping[str, ServoRecord]):
-    """What all servos of a robot have done, by the names of their joints.
+    """Signals of all servos of a robot, by the names of their joints.
 
     Parameters
     ----------

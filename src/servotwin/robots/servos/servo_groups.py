@@ -453,7 +453,7 @@ class Harbour:
             self.table[0] = count
 
 
-# --- What compiled code reads of servos at the joints of a model, and what the model learns of them -------------------
+# --- Servos at the joints of a model for compiled code, and the model's part of them ----------------------------------
 
 Arrays = dict[str, NDArray[Any]]
 

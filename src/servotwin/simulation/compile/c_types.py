@@ -27,7 +27,7 @@ from servotwin.simulation.compile.text.kinds import (
     of_value,
 )
 
-# --- What kernels may call beside functions of their own, and its form in C -------------------------------------------
+# --- Functions that kernels may call beside their own, and their forms in C -------------------------------------------
 
 class Primitive(NamedTuple):
     """A function of Python that C has an expression for.

@@ -1,4 +1,4 @@
-"""What kernels are made of: a recipe names entries, and says what all that will run asks of them."""
+"""Recipes of kernels: a recipe names entries, and says what all that will run asks of them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from functools import cached_property
 from servotwin.models.engine.demands import certain, idle, impossible
 from servotwin.simulation.compile.c_types import MATH
 
-# --- What kernels are made of: a recipe names entries, and says what all that will run asks of them -------------------
+# --- Recipes of kernels: a recipe names entries, and says what all that will run asks of them -------------------------
 
 @dataclass(frozen=True)
 class Recipe:

@@ -1,4 +1,4 @@
-"""What the entries of kernels are called with: one table."""
+"""Arguments of the entries of kernels: one table."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `simulate_many` gives back: signals of all lanes, how each ended, and each lane as a result of its own."""
+"""The result of `simulate_many`: signals of all lanes, how each ended, and each lane as a result of its own."""
 
 from __future__ import annotations
 

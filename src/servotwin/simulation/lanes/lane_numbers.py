@@ -1,4 +1,4 @@
-"""What the lanes of a `VectorSimulator` are: checked inputs as numbers of the engine, and what of them shows."""
+"""Lanes of a `VectorSimulator`: checked inputs as numbers of the engine, and what of them shows."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 
-# --- What lanes are told at a tick, as the engine follows it: pulse width [s] or control voltage [V] ------------------
+# --- Inputs of lanes at a tick, as the engine follows it: pulse width [s] or control voltage [V] ----------------------
 
 _KINDS = {"pulse_width": "pulse_width", "command_angle": "angle", "command_voltage": "voltage"}
 
@@ -186,7 +186,7 @@ def _signal(name: str, rows: Array, lanes: Any, low: Any, high: Any) -> LaneSign
     return LaneSignal(_KINDS[name], LanePieces(rows, first, np.ones_like(first), low=low, high=high), None, None, lanes)
 
 
-# --- What the lanes of a `VectorSimulator` are ------------------------------------------------------------------------
+# --- Lanes of a `VectorSimulator` -------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -1,4 +1,4 @@
-"""What compiled code calls at a tick, and where it finds what is given."""
+"""Calls of compiled code at a tick, and the places of their arguments."""
 
 from __future__ import annotations
 

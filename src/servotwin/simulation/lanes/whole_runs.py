@@ -37,7 +37,7 @@ from servotwin.simulation.lanes.packed import (
     some_of,
 )
 
-# --- What lanes remember, as records ----------------------------------------------------------------------------------
+# --- The memory of lanes, as records ----------------------------------------------------------------------------------
 
 _RECORD, _FIRM = record_of(Memory), record_of(Firm)
 
@@ -75,7 +75,7 @@ def memories_of(tiles: NDArray[Any], places: Indices) -> Memories:
     return found
 
 
-# --- What the lanes of a `VectorSimulator` remember, as something to keep ---------------------------------------------
+# --- The state of a `VectorSimulator`'s lanes, to be kept -------------------------------------------------------------
 Array = NDArray[np.float64]
 
 

@@ -1,4 +1,4 @@
-"""What the page knows of the world: the catalog, lessons, names, ranges and rules, as plain values."""
+"""The world of the page: the catalog, lessons, names, ranges and rules, as plain values."""
 
 from __future__ import annotations
 
@@ -181,7 +181,7 @@ def limits() -> dict[str, Any]:
         "longest": session.LONGEST}
 
 
-# --- What registers make of a bus servo's program, as tables ----------------------------------------------------------
+# --- Programs of bus servos by their registers, as tables -------------------------------------------------------------
 
 # The registers of a catalog servo are written by the package's own laws, value by value; where a register does not go
 # by few straight lines it has no table, and the page says that only a server writes it.
@@ -307,7 +307,7 @@ def _on_line(now: Made, steps: int, at: tuple[Any, ...], slopes: tuple[float, ..
         for value, first, slope in zip(now, at, slopes, strict=True))
 
 
-# --- What the page as one file says, beside the refusals of the rules -------------------------------------------------
+# --- Refusals of the page as one file, beside the refusals of the rules -----------------------------------------------
 
 ONLY_WITH_SERVER = "only with the server: servotwin web"
 WORDS = {
@@ -365,7 +365,7 @@ WORDS = {
 """Messages by their names; {got} is what was given."""
 
 
-# --- What the page knows of the world: the catalog, lessons, names, ranges and rules, as plain values -----------------
+# --- The world of the page: the catalog, lessons, names, ranges and rules, as plain values ----------------------------
 
 _OF_ALL = ("name", "symbol", "unit", "dimension", "meaning", "shown", "rule", "choices")  # alike of all servos
 _SPREAD = ("std", "lower", "upper")

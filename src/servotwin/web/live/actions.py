@@ -1,4 +1,4 @@
-"""What can be done at a bench: command, numbers, a push, frames, registers, torque, the control circuit."""
+"""Actions at a bench: command, numbers, a push, frames, registers, torque, the control circuit."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ class ControlCircuit:
         self._looks = math.inf
 
 
-# --- What can be done at a bench --------------------------------------------------------------------------------------
+# --- Actions at a bench -----------------------------------------------------------------------------------------------
 
 @dataclass(frozen=True)
 class Action:

@@ -125,7 +125,7 @@ LOADS = (
     ("load.pendulum.length", "l", "length", "length of the arm", 0.01, 0.5),
     ("load.pendulum.hanging_angle", "", "angle", "angle at which the arm hangs down", -math.pi, math.pi),
 )
-"""What hangs on the shaft: name, symbol, dimension, meaning, and ends of its slider (SI; assumed)."""
+"""Numbers of the load on the shaft: name, symbol, dimension, meaning, and ends of its slider (SI; assumed)."""
 
 
 def facts_of(model: Model, scene: Scene, registers: Servo | None = None) -> dict[str, Any]:

@@ -99,7 +99,7 @@ def hung(models: Sequence[Model], load: Load, supply: Mapping[str, float]) -> tu
     return tuple(found)
 
 
-# --- What sends the pulses: a frame clock whose rate may change, and frames that get lost -----------------------------
+# --- The transmitter of pulses: a frame clock whose rate may change, and frames that get lost -------------------------
 
 
 class Transmitter:
@@ -198,7 +198,7 @@ class RestWatch:
         return [Remark(NOT_AT_REST, now, **found._asdict()).words] if self._said else []
 
 
-# --- What a bench begins with: its models, what hangs on their shafts, and the first command of each ------------------
+# --- The start of a bench: its models, what hangs on their shafts, and the first command of each ----------------------
 
 _ARM = 0.1  # m, of a scene that gives none
 _PLAY = "gear.backlash"

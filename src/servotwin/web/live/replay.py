@@ -33,7 +33,7 @@ _STRETCH = 0.5  # s between two calls of `progress`
 
 @dataclass(frozen=True, eq=False)
 class Replayed:
-    """What a bench did.
+    """The record of a bench.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def replay(scene: Scene | str, *, output_step: float = 1e-3, switches: bool = Tr
                     tuple(np.array(own, dtype=np.float64).reshape(-1, 2) for own in pulses))
 
 
-# --- What leaves the bench as files: a table of its signals, a servo file, a script that repeats it, its --------------
+# --- Files of the bench: a table of its signals, a servo file, a script that repeats it, its --------------------------
 
 KINDS = ("csv", "script", "servo", "scene")
 """Kinds of files."""

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 
-# --- What a servo is told: a command, which a servo of pulses hears once a frame --------------------------------------
+# --- The command of a servo; a servo of pulses follows it once a frame ------------------------------------------------
 
 _NEVER = 1e9  # s
 
@@ -56,7 +56,7 @@ class Taken(NamedTuple):
 
 
 class Told:
-    """What a servo is told: a command, which a servo of pulses hears once a frame, and others as it goes.
+    """The command of a servo; a servo of pulses follows it once a frame, and others as it goes.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def _train(pulses: Sequence[tuple[float, float]]) -> Signal:
                   edges=tuple(edge for edge, _ in pulses))
 
 
-# --- What rows of a bench show of a model, and how what it follows stands for commands --------------------------------
+# --- Columns of a bench by model, and how what it follows stands for commands -----------------------------------------
 
 def names_of(model: Model, load: Load) -> tuple[str, ...]:
     """Return the names of all signals that rows show of a model under a load.

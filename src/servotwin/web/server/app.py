@@ -152,7 +152,7 @@ def curves_data(name: str) -> dict[str, Any]:
     return {"id": name, **shown, "voltage": volts if isinstance(volts, float) else math.nan}
 
 
-# --- Who is let in: by the name under which the server was asked, and by the page that asks ---------------------------
+# --- Admission to the server: by the name under which the server was asked, and by the page that asks -----------------
 
 HEADERS = {
     "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "

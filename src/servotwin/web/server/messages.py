@@ -1,4 +1,4 @@
-"""What goes over the wire: messages in JSON, and pushes as a header with numbers behind it."""
+"""The wire of the page: messages in JSON, and pushes as a header with numbers behind it."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Allowance:
         return True
 
 
-# --- What goes over the wire: messages in JSON, and pushes as a header with numbers behind it -------------------------
+# --- The wire of the page: messages in JSON, and pushes as a header with numbers behind it ----------------------------
 
 VERSION = 1
 _BYTES = 8  # of a number

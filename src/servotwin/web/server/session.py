@@ -204,7 +204,7 @@ class Pace:
         return (end - start) / (last - first) if self.running and last > first else 0.0
 
 
-# --- What a page has to know of a bench as it is ----------------------------------------------------------------------
+# --- The state of a bench for a page ----------------------------------------------------------------------------------
 
 class Snapshot(NamedTuple):
     """A bench at an instant; nothing of it changes any more."""
@@ -256,7 +256,7 @@ def changes_of(seen: Snapshot, servos: list[int]) -> dict[str, Any]:
     return {"changed": [servo_facts(seen, k) for k in servos], "loads": load_facts(seen.scene, seen.load_numbers)}
 
 
-# --- What takes longer than a turn, beside the benches: in a thread of its own, for so long and no longer -------------
+# --- Work beside the benches that takes longer than a turn: in a thread of its own, for so long and no longer ---------
 
 Found = TypeVar("Found")
 LONGEST_ASIDE = 30.0

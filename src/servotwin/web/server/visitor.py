@@ -32,11 +32,11 @@ if TYPE_CHECKING:
     from servotwin.web.server.session import Room
 
 
-# --- What goes to one browser: the latest push, and short messages in order; a slow one misses pushes -----------------
+# --- Pushes and messages to one browser: the latest push, and short messages in order; a slow one misses pushes -------
 
 
 
-# --- What a page may say, and what is done then: one function a word --------------------------------------------------
+# --- Messages of a page, and what is done then: one function a word ---------------------------------------------------
 
 Answer = dict[str, Any]
 _LONGEST_EXPORT = 600.0  # s
@@ -184,7 +184,7 @@ WORDS: dict[str, Callable[[Visitor, dict[str, Any]], Awaitable[Answer]]] = {
     "fragment": _fragment,
     "view": _view, "text": _said, "export": _export, "lesson": _lesson, "mystery": _mystery, "guess": _guess,
     "log": _log, "fit": _fit}
-"""What a page may say."""
+"""Messages of a page."""
 
 
 # --- One browser: what it says is done in its room, and what it may not do is told in a line --------------------------

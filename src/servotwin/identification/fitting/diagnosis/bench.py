@@ -45,7 +45,7 @@ def teaching(time: Array, *, alternate: bool) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class Gain:
-    """What a trial gains on samples that did not teach it: rms error before and after (SI), and how surely."""
+    """The gain of a trial on samples that did not teach it: rms error before and after (SI), and how surely."""
 
     before: float
     after: float
@@ -159,7 +159,7 @@ def _hidden(part: LogPart, seen: NDArray[np.bool_]) -> LogPart:
 
 @dataclass(frozen=True)
 class Setting:
-    """What a trial changes: logs, servo, and what is searched from which values.
+    """Changes of a trial: logs, servo, and what is searched from which values.
 
     Parameters
     ----------

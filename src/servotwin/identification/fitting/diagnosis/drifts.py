@@ -1,4 +1,4 @@
-"""What changes in the course of logs: a supply that falls, drops or differs from log to log, a winding that warms.
+"""Changes in the course of logs: a supply that falls, drops or differs from log to log, a winding that warms.
 
 A number has another value in each stretch of a log. A log is simulated once for each of them, with that value
 throughout, and each simulation counts in its own stretch: a servo in its loop soon forgets what was before.
@@ -28,7 +28,7 @@ from servotwin.identification.fitting.verdict import Cause, shown
 from servotwin.logs.log import Log
 from servotwin.models import DigitalServo
 
-# --- What changes in the course of logs -------------------------------------------------------------------------------
+# --- Changes in the course of logs ------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 VOLTAGE, RESISTANCE = "supply.open_circuit_voltage", "motor.armature_resistance"

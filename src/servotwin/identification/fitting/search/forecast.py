@@ -1,4 +1,4 @@
-"""What a model says that logs should show, and how that changes with every searched number.
+"""Forecasts of logs by a model, and how they change with every searched number.
 
 All copies of a servo that differ a little in one number run beside the nominal one, in one batch: the Jacobian costs
 little more than a simulation, and it is that of the same exact solution.
@@ -150,7 +150,7 @@ class Batch:
 
 
 Done = list[dict[str, Array] | None]
-"""What comes of a batch: signals of each bundle, (n, T) each, None where it failed."""
+"""The result of a batch: signals of each bundle, (n, T) each, None where it failed."""
 
 
 def simulated(batch: Batch) -> Done:
@@ -454,7 +454,7 @@ def _steps(x: Array, lower: Array, upper: Array, sides: int, step: float) -> Arr
     return steps
 
 
-# --- What a model says that logs should show, and how that changes with every searched number -------------------------
+# --- Forecasts of logs by a model, and how they change with every searched number -------------------------------------
 
 _PERIOD = "electronics.frame_period"
 _CONTROL_PHASE = "firmware.control_phase"

@@ -1,4 +1,4 @@
-"""What is searched: named parameters of servo and load, each on a scale of its own, with bounds and priors."""
+"""Searched numbers: named parameters of servo and load, each on a scale of its own, with bounds and priors."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ JUMPS = (  # what acts by jumps, where no search finds its way
 )
 
 
-# --- What is searched -------------------------------------------------------------------------------------------------
+# --- Searched numbers -------------------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 Bounds = Mapping[str, tuple[float, float]]

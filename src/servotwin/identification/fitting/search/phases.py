@@ -114,7 +114,7 @@ class PulseChoice(NamedTuple):
 
 
 class PulseTrial(NamedTuple):
-    """What a trial found: its cost, and the time of the first pulse at which that was.
+    """The result of a trial: its cost, and the time of the first pulse at which that was.
 
     The cost counts how narrow the gaps are in which phases have to lie: less the logarithm of their share of a frame,
     and of a tick.

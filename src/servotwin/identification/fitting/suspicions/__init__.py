@@ -1,1 +1,1 @@
-"""What can be wrong with a log and shows without a fit: one check a file."""
+"""Faults of a log that show without a fit: one check a file."""

@@ -1,4 +1,4 @@
-"""What a log says without a fit: where the servo was asked to be, where its shaft was, and how fast it may be."""
+"""A log without a fit: where the servo was asked to be, where its shaft was, and how fast it may be."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from servotwin.identification.fitting.search.case import NORMAL, has_pulses, rob
 from servotwin.logs.log import Log
 from servotwin.models import Model
 
-# --- What a log says without a fit ------------------------------------------------------------------------------------
+# --- A log without a fit ----------------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

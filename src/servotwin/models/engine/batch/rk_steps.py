@@ -308,7 +308,7 @@ class Reached(NamedTuple):
 
 
 class Stride(NamedTuple):
-    """What a lane tries."""
+    """The steps that a lane tries."""
 
     u: float  # voltage behind the bridge [V]
     tau: float  # constant external torque [N m]

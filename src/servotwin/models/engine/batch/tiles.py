@@ -55,7 +55,7 @@ class Meter(NamedTuple):
 
 
 class Servo(NamedTuple):
-    """What a servo remembers between two windows; times count from now [s]."""
+    """The state of a servo between two windows; times count from now [s]."""
 
     q: float
     w: float

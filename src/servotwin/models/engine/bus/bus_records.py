@@ -1,4 +1,4 @@
-"""What servos on a bus work with while they go on: a record for each, and one for each that moves with others.
+"""Records of servos on a bus: a record for each, and one for each that moves with others.
 
 For a compiler these are numpy's records, in plain Python objects of the same names (`records.object_of`).
 """
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-# --- What servos on a bus work with while they go on ------------------------------------------------------------------
+# --- Records of servos on a bus ---------------------------------------------------------------------------------------
 
 ROOM = 42  # coefficients of a series at most
 DENSE = 49  # numbers of the dense output of a step
@@ -183,7 +183,7 @@ def drive_of(seat: Any) -> float:
     return drive
 
 
-# --- What a run of servos on a bus leaves behind ----------------------------------------------------------------------
+# --- The tape of a run of servos on a bus -----------------------------------------------------------------------------
 
 PLAIN = True  # the compiler takes it for False
 # Events besides those of guards: how the bridge drives after it, silence, a pulse that is not taken, a trip.

@@ -30,7 +30,7 @@ from servotwin.physics.pieces import piece_value
 # --- Several servos on one source -------------------------------------------------------------------------------------
 
 _EDGE = 1e-8  # of a limit: so near to it the sum of currents counts as being there
-# What the source does: it follows its resistance, gives its most, has broken down, or takes nothing back.
+# Regimes of the source: it follows its resistance, gives its most, has broken down, or takes nothing back.
 FOLLOWING, LIMITED, BROKEN_DOWN, KEEPING = range(4)
 
 

@@ -1,4 +1,4 @@
-"""What can end a mode.
+"""Guards that end a mode.
 
 A guard is at least zero as long as its mode lasts.
 """
@@ -37,7 +37,7 @@ from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.physics import motor
 from servotwin.physics.load_friction import torque_on_gear
 
-# What can end a mode: first what a shaft and a zone of its own have, then what play adds.
+# Guards that end a mode: first what a shaft and a zone of its own have, then what play adds.
 SPEED, CORE_FORWARD, CORE_BACKWARD, ZONE_UP, ZONE_DOWN, UPPER, LOWER, RELEASE_FORWARD, RELEASE_BACKWARD = range(9)
 MEET_FORWARD, MEET_BACKWARD, PART, PART_OUTPUT, PART_MOTOR = range(9, 14)
 MOTOR_SPEED, MOTOR_RELEASE_FORWARD, MOTOR_RELEASE_BACKWARD, SHARE, CREEPS = range(14, 19)

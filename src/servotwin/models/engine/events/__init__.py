@@ -1,1 +1,1 @@
-"""What ends a mode, and when."""
+"""Ends of modes."""

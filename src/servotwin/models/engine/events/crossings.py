@@ -1,4 +1,4 @@
-"""What comes after the end of a mode, and what events are called."""
+"""The mode after the end of another, and what events are called."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ from servotwin.models.terms import elastic, heat, play, source
 from servotwin.models.terms.friction import creeping_speed, smoothed
 from servotwin.models.terms.numbers import Numbers, warm
 
-# --- What comes after the end of a mode: how it goes on, and where a guard has reached zero ---------------------------
+# --- The mode after the end of another: how it goes on, and where a guard has reached zero ----------------------------
 
 def cross(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:
     """Return mode and state just after the guard `kind` of `mode` has reached zero."""
@@ -162,7 +162,7 @@ def _with_current_at_edge(numbers: Numbers, zone: int, kind: int, u: float, y: V
     return Vector(y.q, y.w, 0.0 if i == 0.0 else i, y.T_w, y.T_h, y.q_m, y.w_m)
 
 
-# --- What events are called: by a number in compiled code, by words everywhere else -----------------------------------
+# --- Names of events: by a number in compiled code, by words everywhere else ------------------------------------------
 
 NAMES = (
     *guards.EVENT_NAMES, "stick", "reversal", "current limited", "current stops", "current starts", "gear held",

@@ -32,7 +32,7 @@ from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.motor import back_emf
 from servotwin.physics.pieces import piece_rate, piece_value
 
-# --- What ends a motion of first order behind a bridge ----------------------------------------------------------------
+# --- Ends of a motion of first order behind a bridge ------------------------------------------------------------------
 
 def first_end(numbers: Numbers, mode: Mode, kinds: int, u: float, tau: float, laws: Apart, start: Vector,
               after: Vector, s0: float, s1: float) -> tuple[float, int]:

@@ -208,7 +208,7 @@ def _course_crossing(course: Any, terms: int, b: float, f_b: float, instant: flo
     return b
 
 
-# --- What ends the mode of a servo on a coupled leg, and when: guards along power series, and their roots -------------
+# --- Ends of modes on a coupled leg: guards along power series, and their roots ---------------------------------------
 _HALVINGS = 200
 _INSTANT, _ROUNDING = 1e-16, 1e-16  # s and units of a guard, within which a root is found
 

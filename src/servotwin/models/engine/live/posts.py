@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from servotwin.models.engine.live.screen import Floats
 
 
-# --- What sends the pulses: a frame clock whose rate may change, and frames that get lost -----------------------------
+# --- The transmitter of pulses: a frame clock whose rate may change, and frames that get lost -------------------------
 
 _SAME = 1e-9  # of a frame: instants that are nearer are one
 

@@ -1,4 +1,4 @@
-"""What shows of a servo at a bench, rows of all its signals and events, and the shapes of commands that it is given."""
+"""Signals of a servo at a bench, rows of all its signals and events, and the shapes of commands that it is given."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     Indices = NDArray[np.int64]
 
 
-# --- What shows of a servo at a bench ---------------------------------------------------------------------------------
+# --- Signals of a servo at a bench ------------------------------------------------------------------------------------
 
 USED, NEXT, LEFT = 5, 3, 4
 """Numbers of what is used: rows, events, pulses, which look is next, and how many steps are left; 0: as it takes."""
@@ -34,7 +34,7 @@ _ANGLE, _SPEED, _TORQUE = (COLUMNS.index(name) for name in ("motor_angle", "moto
 _OUTPUT = COLUMNS.index("output_angle")
 _LATE = 1e-12  # of an instant: so much before a tick it is the tick
 SHOWN = {code: name for code, name in enumerate(crossings.NAMES) if name != "zone" and not crossings.is_usual(code)}
-"""What events are called that do not come with every pulse, by their numbers."""
+"""Names of events that do not come with every pulse, by their numbers."""
 
 
 class Lines(NamedTuple):

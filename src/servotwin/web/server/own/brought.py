@@ -1,4 +1,4 @@
-"""What one visitor brought: a log, its twin beside it, and the fit that was begun with it."""
+"""Uploads of one visitor: a log, its twin beside it, and the fit that was begun with it."""
 
 from __future__ import annotations
 
@@ -234,7 +234,7 @@ class Desk:
         return found
 
 
-# --- What one visitor brought: a log, its twin beside it, and the fit that was begun with it --------------------------
+# --- Uploads of one visitor: a log, its twin beside it, and the fit that was begun with it ----------------------------
 
 READING, COMPARING = 60.0, 300.0  # s that it may take; the first comparison of its kind ever compiles
 _WORK_NICE = 10
@@ -253,7 +253,7 @@ class KeptLog(NamedTuple):
 
 
 class Brought:
-    """What one visitor brought.
+    """Uploads of one visitor.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What goes between a server and its processes: pieces of bytes, each behind its length, and a refusal with some."""
+"""Frames between a server and its processes: pieces of bytes, each behind its length, and a refusal with some."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def run_of(packed: bytes, run: int) -> Log:
     return logs[run]
 
 
-# --- What goes between a server and its processes: pieces of bytes, each behind its length, and a refusal -------------
+# --- Frames between a server and its processes: pieces of bytes, each behind its length, and a refusal ----------------
 
 HEAD = 8
 """Bytes of a length."""

@@ -23,7 +23,7 @@ _PATIENCE = 5.0  # s that a process has to go after it was ended
 
 
 class Done(NamedTuple):
-    """What came of a piece of work: plain facts, and bytes beside."""
+    """The result of a piece of work: plain facts, and bytes beside."""
 
     facts: dict[str, Any]
     blobs: list[bytes]
