@@ -21,7 +21,7 @@ FEWEST_LETTERS = 3  # that say something where another name holds them
 BEGINS, HOLDS = 3.0, 2.0  # how near such a name is at least
 HIDDEN = re.compile(r"[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u206f\ud800-\udfff\ufff9-\ufffb"
                     r"\ufffe\uffff]")
-"""What no reader sees of a text: control and bidirectional characters, line ends, halves of characters, none."""
+"""Invisible parts of a text: control and bidirectional characters, line ends, halves of characters, none."""
 
 
 def one_line(text: str) -> str:

@@ -1,6 +1,6 @@
 """Plug-ins: what other packages add, by entry points of their `pyproject.toml`.
 
-A group of entry points is `servotwin.` and one of `GROUPS`. What is built in goes before a plug-in of the same name,
+A group of entry points is `servotwin.` and one of `GROUPS`. A built-in part goes before a plug-in of the same name,
 and a plug-in that cannot be loaded is left out; a warning says either in one line.
 """
 
@@ -19,7 +19,7 @@ GROUPS = {
     "bus_models": "a function that returns pairs of register model and `servotwin.bench.bus.BusFamily`",
     "commands": "a function that typer can make a command of, or a `typer.Typer`, by the name of the command",
 }
-"""What an entry point of each group leads to."""
+"""The object of an entry point, by group."""
 
 
 def loaded(group: str, built_in: Container[str] = (), use: Callable[[Any], Any] | None = None) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """Free text on its way in and out: names of servos, joints, columns and scenes, and whatever a file says of itself.
 
-What people name may hold anything that Unicode has. On its way in a name is refused where it holds what no reader
+Names given by people may hold anything that Unicode has. On its way in a name is refused where it holds what no reader
 sees (`checked_name`); on its way out each kind of file gets it as letters that mean nothing there: a comment of C, XML,
 HTML, a terminal, the name of a file or of a function.
 """

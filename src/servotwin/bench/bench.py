@@ -259,7 +259,7 @@ class Bench:
 
     @property
     def load(self) -> Load:
-        """What hangs on the shaft."""
+        """The load on the shaft."""
         return self._simulator.load
 
     def pulse_width(self, command_voltage: float) -> float:
@@ -534,7 +534,7 @@ class Row(Protocol):
 
     @property
     def reading(self) -> Reading:
-        """What the display shows."""
+        """The text of the display."""
 
 
 def compare(rows: Sequence[Row], columns: Mapping[str, ArrayLike]) -> tuple[Comparison, ...]:

@@ -51,7 +51,7 @@ _LOAD_UNITS = "g, kg, oz, lb, N, kgf cm, N m, N cm"
 
 
 class Name(NamedTuple):
-    """What a name says.
+    """The meaning of a name.
 
     Parameters
     ----------
@@ -459,7 +459,7 @@ _ROLES = {"time": "time", "output_angle": "angle", "angle": "angle", "supply_cur
 
 
 class LiftRecord(NamedTuple):
-    """What one record of a lift says (SI).
+    """One record of a lift (SI).
 
     Parameters
     ----------

@@ -107,7 +107,7 @@ class _Course:
 
 @dataclass(frozen=True, kw_only=True)
 class _About:
-    """What the logs say of themselves, as it was typed."""
+    """The logs' own statements, as typed."""
 
     load: Annotated[Sequence[str], typer.Option(
         metavar="PART=VALUE", help="What hangs on the shaft, as for simulate: inertia=1e-3, arm=0.2kg:10cm.",

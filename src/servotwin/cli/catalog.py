@@ -85,7 +85,7 @@ _TASK, _LIMITS = "Task", "Candidates and limits"
 
 @dataclass(frozen=True, kw_only=True)
 class _Asked:
-    """What is to be done, on which supply, within which limits."""
+    """The task, its supply and its limits."""
 
     lift: tuple[float, float] | None
     motion: Motion | None

@@ -73,9 +73,9 @@ class Reading:
              ) -> list[Log]:
         """Return the logs of files and folders, with commands that count from the middle of the servo's travel.
 
-        What was guessed, said or found of columns is shown, unless `quiet`, and what was said or found is written into
-        sidecars. Where the user says the registers of the servo (`registers`), those that a dataset's robot has are
-        not assumed. Columns that are named after registers hold those of the family or model `raw`, else of the servo.
+        Guesses, words and findings on columns are shown, unless `quiet`; words and findings are written into sidecars.
+        Where the user says the registers of the servo (`registers`), those that a dataset's robot has are not assumed.
+        Columns that are named after registers hold those of the family or model `raw`, else of the servo.
 
         Raises
         ------

@@ -397,7 +397,7 @@ _HERE = ("arm", "torque")  # parts of a load that a sheet takes
 
 
 class AskedLift(NamedTuple):
-    """What is to be lifted, mass [kg] and arm [m], and a torque [N m] whose point on the curves is shown."""
+    """The lift, mass [kg] and arm [m], and a torque [N m] whose point on the curves is shown."""
 
     lift: tuple[float, float] | None
     torque: float | None
@@ -452,7 +452,7 @@ def loads_of(lift: str | None, arm: str | None, load: Sequence[str]) -> AskedLif
     return AskedLift(found, torque)
 
 
-# --- Individual pulses out of a file --------------------------------------------------------------------------------
+# --- Individual pulses out of a file ----------------------------------------------------------------------------------
 
 _EDGES = {"time_s": 1.0, "time_ms": 1e-3, "time": 1.0}
 _WIDTHS = {"pulse_width_us": 1e-6, "pulse_width_ms": 1e-3, "pulse_width_s": 1.0, "pulse_width": 1.0}

@@ -182,7 +182,7 @@ def _identity(path: Path) -> tuple[object, ...]:
 
 
 Writers = Mapping[str, Callable[[Path], object]]
-"""What writes a file, by the file's name."""
+"""Writers of files, by the file's name."""
 
 
 def write_files(targets: Sequence[Target], writers: Writers, *, force: bool,

@@ -245,7 +245,7 @@ _FORM = "NAME=VALUE, such as P_Coefficient=16, or the name of a set, such as ler
 
 
 class Registers(NamedTuple):
-    """What words say: names of sets, and single values, which go before them.
+    """Words of registers: names of sets, and single values, which go before them.
 
     Parameters
     ----------

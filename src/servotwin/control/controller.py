@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 # --- A controller -----------------------------------------------------------------------------------------------------
 
 Measured = Mapping[str, Any]
-"""What the sensors show: `time` and signals by name (SI), numbers of one servo or arrays (n,) of joints."""
+"""Signals of the sensors: `time` and signals by name (SI), numbers of one servo or arrays (n,) of joints."""
 
 VOLTAGE, ANGLE = "armature_voltage", "command_angle"
 """Commands of a controller: the voltage of the motor [V], past the servo's own loop, or an angle [rad]."""
@@ -50,7 +50,7 @@ class Controller(Protocol):
 
     @property
     def commands(self) -> str:
-        """What its commands are: "armature_voltage" or "command_angle"."""
+        """Kind of its commands: "armature_voltage" or "command_angle"."""
 
     @property
     def ahead(self) -> Any:
@@ -261,7 +261,7 @@ class Tap:
 
 
 class Readings:
-    """What sensors show as time goes on, each as old as its delay says, with noise that is drawn once for all of them.
+    """Signals of sensors over time, each as old as its delay, with noise that is drawn once for all of them.
 
     Parameters
     ----------

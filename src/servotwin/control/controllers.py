@@ -198,7 +198,7 @@ class DisturbanceObserver:
     Parameters
     ----------
     controller : Controller
-        Commands a voltage. What it already does against friction or a load would count twice: give a `Feedforward`
+        Commands a voltage. Its own terms against friction or a load would count twice: give a `Feedforward`
         the inverse `.frictionless`.
     inverse : ServoInverse
         Its own numbers; dry friction does not count.
@@ -312,7 +312,7 @@ class _Sided:
 
     @property
     def commands(self) -> str:
-        """What the controller commands."""
+        """The command of the controller."""
         return self.controller.commands
 
     @property

@@ -118,7 +118,7 @@ class ServoInverse:
 
     @property
     def damping(self) -> Any:
-        """What slows the shaft down with a shorted winding: b + B_L + K K_b/R [N m s/rad]."""
+        """The damping of the shaft with a shorted winding: b + B_L + K K_b/R [N m s/rad]."""
         return (self.viscous_friction + self.load_viscous_friction
                 + self.torque_constant * self.back_emf_constant / self.resistance)
 

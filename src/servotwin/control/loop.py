@@ -196,7 +196,7 @@ class ControlRun:
 
     @cached_property
     def reference(self) -> Reference:
-        """What was asked for at the ticks."""
+        """The reference at the ticks."""
         return self.path.at(self.time)
 
     def error(self, signal: str = "output_angle") -> Array:

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Wire:
-    """What is sent for a command.
+    """The value sent for a command.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ class Port(Protocol):
 
     @property
     def nominal(self) -> ServoInverse | None:
-        """What its maker knows of the servo, for a look at stability before running; None where nobody does."""
+        """The plant as its maker knows it, for a look at stability before running; None where nobody does."""
 
     @property
     def time(self) -> float:
@@ -218,14 +218,14 @@ class Port(Protocol):
 class SimulatedServo:
     """A servo on a `Simulator`, with the sensors, the steps and the delay of the one who controls it.
 
-    What it takes depends on the model: a motor and a `bare_bridge` take voltages, a servo takes angles. These go out as
+    Its commands depend on the model: a motor and a `bare_bridge` take voltages, a servo takes angles. These go out as
     pulses, by the sender's own calibration, or as goals on a bus.
 
     Parameters
     ----------
     model : Model
     load : Load, optional
-        What hangs on the shaft.
+        The load on the shaft.
     sensors : sequence of Sensor
         All that a controller sees; nothing unless given.
     believed : Servo, optional

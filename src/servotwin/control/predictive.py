@@ -34,7 +34,7 @@ class PredictiveState(NamedTuple):
 
 
 class _Horizon(NamedTuple):
-    """What angles and speeds of the next ticks follow: the state now, and the voltages."""
+    """The inputs of the next ticks' angles and speeds: the state now, and the voltages."""
 
     free_angle: Array  # (H, 2)
     free_speed: Array

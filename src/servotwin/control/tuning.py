@@ -1,6 +1,6 @@
 """Gains by rule, from what a controller believes of a servo: none is set by hand.
 
-What limits a loop is its delay. A voltage is held for a period T and comes late by what program and bus need, so that
+Its delay limits a loop. A voltage is held for a period T and comes late by what program and bus need, so that
 the loop is θ_0 = T/2 + lag late, without any filter. Every rule below is a share of 1/θ_0.
 """
 

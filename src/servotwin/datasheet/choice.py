@@ -123,7 +123,7 @@ class Candidate:
 
 @dataclass(frozen=True, kw_only=True)
 class AtRest:
-    """What takes simulating of a candidate.
+    """The simulated figures of a candidate.
 
     Parameters
     ----------

@@ -125,7 +125,7 @@ class FullDrive:
 
     @cached_property
     def voltage(self) -> float:
-        """What the plant follows at full drive: the supply behind its bridge, or an error that saturates it [V]."""
+        """The input of the plant at full drive: the supply behind its bridge, or an error that saturates it [V]."""
         plant = self._plant
         return plant.source.V if source.present(plant.source) else 2.0 * plant.follower.V_max / plant.follower.gain
 

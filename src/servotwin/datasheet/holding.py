@@ -358,7 +358,7 @@ def buzz(model: Model, load: Load | Part | None = None, command: Signal | None =
          duration: float = _DURATION) -> Buzz:
     """Return how often and with what current a servo drives at rest, and which number would stop it.
 
-    What stops it is found by simulation: a number is changed by factors of two until the servo is quiet, and then
+    The remedy is found by simulation: a number is changed by factors of two until the servo is quiet, and then
     bisected.
 
     Parameters

@@ -54,7 +54,7 @@ class Standing(NamedTuple):
 
 
 class Protection(NamedTuple):
-    """What trips a servo, and what it does then.
+    """A protection: its threshold, and its effect.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ class Loop:
 
     @cached_property
     def minimum_duty(self) -> float:
-        """What it adds to any duty that is not 0 [1]."""
+        """The duty added to any that is not 0 [1]."""
         return float(self._firmware.minimum)
 
     @cached_property
@@ -164,7 +164,7 @@ class Loop:
 
     @cached_property
     def friction_error(self) -> float:
-        """What that friction is worth as an error, dead zone apart: half of the band in which it sticks [rad]."""
+        """That friction as an error, dead zone apart: half of the band in which it sticks [rad]."""
         return self.friction_torque / self.stiffness
 
     @cached_property
@@ -189,7 +189,7 @@ class Loop:
 
     @property
     def cap_lifts(self) -> float:
-        """What it lifts there, friction taken off [N m]."""
+        """The torque that it lifts there, friction taken off [N m]."""
         return self._lifted(self.cap_torque)
 
     def asked(self, error: float) -> float:
@@ -234,7 +234,7 @@ class Loop:
 
     @cached_property
     def protections(self) -> tuple[Protection, ...]:
-        """What trips the servo: those that its numbers give, in the order of the signal `trip`."""
+        """Protections of the servo: those that its numbers give, in the order of the signal `trip`."""
         firmware, none = self._firmware, math.nan
         found = []
         if firmware.overload_duty < math.inf:
@@ -266,7 +266,7 @@ class Loop:
 
     @property
     def _count(self) -> float:
-        """What the program cuts angles to, where it knows no fractions of a count."""
+        """The step to which the program cuts angles, where it knows no fractions of a count."""
         return float(self._firmware.quantum if self._firmware.whole > 0.0 else 0.0)
 
     def _current(self, d: float) -> float:

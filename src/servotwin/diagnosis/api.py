@@ -336,7 +336,7 @@ BOARDS: Mapping[str, Board] = MappingProxyType({
 
 
 class Cure(NamedTuple):
-    """What keeps a board running: in words, and the least voltage with it [V]; nan where nothing was to simulate."""
+    """Remedies for a board: in words, and the least voltage with it [V]; nan where nothing was to simulate."""
 
     words: str
     voltage: float

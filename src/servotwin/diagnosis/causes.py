@@ -249,7 +249,7 @@ def _zone_now(patient: Patient) -> float | None:
 def finest_of(patient: Patient) -> float:
     """Return what a servo need not tell apart: its count, or its deadband, that of none wider than usual [rad].
 
-    What only a wide deadband makes is a symptom.
+    An effect of a wide deadband alone is a symptom.
     """
     own, usual = float(resolution(patient.model)), _zone_usual(patient).high
     if (_zone_now(patient) or 0.0) <= usual:
@@ -465,7 +465,7 @@ class Cause(NamedTuple):
 
     @property
     def cure(self) -> str:
-        """What to do, with its number."""
+        """The remedy, with its number."""
         number = self.number
         value = number.factor * (self.end if math.isnan(self.needed) else self.needed)
         return number.cure.format(f"{rounded(value, up=number.rises)} {number.unit}".strip())
@@ -557,7 +557,8 @@ def ranked(trials: Trials) -> tuple[list[Cause], tuple[Cause, Cause] | None]:
     """Return the causes of a symptom, the likeliest first, each by its best number, and a pair where none cures alone.
 
     Of those that cure, the first is the one whose number is furthest from what is usual; of those that are as usual,
-    the one that needs the smallest part of the way. What does not cure goes by the share that it takes away.
+    the one that needs the smallest part of the way. Causes that do not cure are ordered by the share that they take
+    away.
     """
     found = [each for each in map(trials.taken, NUMBERS) if each is not None]
     best: dict[str, Cause] = {}

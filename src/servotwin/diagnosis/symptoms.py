@@ -39,7 +39,7 @@ _TRIPS = "trips by "  # begins the events of a protection
 
 
 class Noise(NamedTuple):
-    """What a recorder adds to an angle.
+    """The noise that a recorder adds to an angle.
 
     Parameters
     ----------
@@ -265,7 +265,7 @@ def holds_of(time: Array, target: Array, angle: Array, noise: Noise | None = Non
              every: int = 1) -> tuple[Hold, ...]:
     """Return the stretches in which a target [rad] stands still, and what the shaft did there.
 
-    Without a noise it is a run that begins at rest. What the shaft of a log did before is not known: it may have come
+    Without a noise it is a run that begins at rest. The motion of a log's shaft before is not known: it may have come
     as far as the targets lie apart.
 
     Parameters

@@ -35,7 +35,7 @@ def c(model: Model, load: Load | Part | None = None, *, name: str | None = None,
       parameters: bool = False, dtype: str = "float64") -> CCode:
     """Return a servo as C: a header and a source of functions that start it, let it go on, and look at it.
 
-    What they compute is what `Simulator` computes, of the same kernels. The numbers of servo and load stand in a table;
+    They compute the same as `Simulator`, of the same kernels. The numbers of servo and load stand in a table;
     what these numbers have no use for is left out of the code.
 
     Parameters

@@ -454,7 +454,7 @@ def fmu(model: Model, load: Load | Part | None = None, *, fmi: str = "2.0", name
     model : Model
         As of `c`.
     load : Load, optional
-        What hangs on the shaft.
+        The load on the shaft.
     fmi : {"2.0", "3.0"}
     name : str, optional
         The model identifier; that of the servo unless given.

@@ -198,7 +198,7 @@ class _Window(NamedTuple):
 
 
 class _Task(NamedTuple):
-    """What all runs share."""
+    """The common part of all runs."""
 
     model: Model
     load: Load

@@ -242,7 +242,7 @@ class Tuning:
 
 
 class _Task(NamedTuple):
-    """What is tuned."""
+    """The tuned number."""
 
     model: _Tuned
     load: Load

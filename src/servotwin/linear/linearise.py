@@ -31,10 +31,11 @@ if TYPE_CHECKING:
 
 # --- Harmonic balance of a mean-voltage servo -------------------------------------------------------------------------
 
-# The output is taken for a sine, q = q_0 + a sin θ. What friction, springs and pendulums do then has a mean and a first
-# harmonic, and so has the voltage that this takes; the error whose mean and first harmonic make that voltage, through
-# deadband and limit, gives the command. Deadband, limit and friction are thus replaced by their describing functions,
-# the limit and the deadband with a bias (Gelb & Vander Velde, Multiple-Input Describing Functions, 1968, ch. 2 and 3).
+# The output is taken for a sine, q = q_0 + a sin θ. The torque of friction, springs and pendulums then has a mean and
+# a first harmonic, and so has the voltage that it takes; the error whose mean and first harmonic make that voltage,
+# through deadband and limit, gives the command. Deadband, limit and friction are thus replaced by their describing
+# functions, the limit and the deadband with a bias (Gelb & Vander Velde, Multiple-Input Describing Functions, 1968,
+# ch. 2 and 3).
 
 Array = NDArray[np.float64]
 

@@ -46,7 +46,7 @@ _DESCRIBED = (AveragedServo, AveragedServoInductive, BoundedServo, PulseServo)
 
 @dataclass(frozen=True, kw_only=True)
 class Sines:
-    """What a servo makes of commanded sines of one size.
+    """The response of a servo to commanded sines of one size.
 
     Parameters
     ----------

@@ -97,7 +97,7 @@ _ERRORS = np.geomspace(1e-3, 30.0, 60)  # of the command's amplitude, among whic
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Bursts:
-    """What decides at every frame, and what that does to the plant.
+    """The law at every frame, and its effect on the plant.
 
     Parameters
     ----------
@@ -216,7 +216,7 @@ class _Tick(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Ticks:
-    """What decides at every tick, and what that does to the plant.
+    """The law at every tick, and its effect on the plant.
 
     Parameters
     ----------

@@ -397,7 +397,7 @@ class Pendulum(_Numbers):
 class Flexible(_Numbers):
     """A body behind a spring on the shaft, such as a long arm: torque k (q − q_l) + c (q̇ − q̇_l) against the shaft.
 
-    What else the load has turns with the shaft. At the start the spring is not twisted.
+    All other parts of the load turn with the shaft. At the start the spring is not twisted.
 
     Parameters
     ----------

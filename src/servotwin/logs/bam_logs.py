@@ -29,7 +29,7 @@ _STS = ("feetech-sts3215",)
 
 @dataclass(frozen=True, kw_only=True)
 class BamActuator:
-    """What BAM's code says of one actuator.
+    """One actuator by BAM's code.
 
     Parameters
     ----------
@@ -434,7 +434,7 @@ def write_bam_parameters(servo: Servo, path: str | Path, *, model: str = "auto",
                          overwrite: bool = False) -> None:
     """Write the motor and the friction of a servo as a parameter file of BAM, at the output shaft.
 
-    What BAM does not know, such as deadband, bridge and play, is left out; `firmware.bus_latency` is
+    Numbers that BAM does not have, such as deadband, bridge and play, are left out; `firmware.bus_latency` is
     its command_delay.
 
     Parameters

@@ -25,7 +25,7 @@ _WORD = re.compile(r"""\s*(?P<signal>[^\s=:'"]+)\s*=\s*
 
 
 class Wanted(NamedTuple):
-    """What is said of one signal.
+    """The words on one signal.
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ class Stamps(NamedTuple):
 
     @property
     def form(self) -> str:
-        """What they are, in words."""
+        """Their meaning, in words."""
         return "dates" if self.unit == "iso" else "times of day"
 
 
@@ -153,7 +153,7 @@ _CAMEL = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^\W\d_]+|[°%]")
 
 
 class Meaning(NamedTuple):
-    """What a name says.
+    """The meaning of a name.
 
     Parameters
     ----------

@@ -71,7 +71,7 @@ class Step(NamedTuple):
 
     @property
     def command(self) -> str:
-        """What `--commanded` says of it: the command came with the first row, or before it."""
+        """The time of the command by `--commanded`: the command came with the first row, or before it."""
         return f"{math.degrees(self.after):.4g}deg@0s"
 
     @property
@@ -160,7 +160,7 @@ def layout_of(table: TextTable, sidecar: Mapping[str, Column] | None, wanted: Ma
               needs: Sequence[str] = NEEDS, unknown_step: bool = False, raw: RawRegisters | None = None) -> Layout:
     """Return which column of a table is which signal.
 
-    What `wanted` says counts before the sidecar, that before raw registers and the names of `servotwin`; what these
+    Words of `wanted` count before the sidecar, that before raw registers and the names of `servotwin`; what these
     leave out is guessed from names, units and values: time, a command and an angle where they lack, currents, voltage
     and speed if there is one of each.
 
@@ -472,7 +472,7 @@ def _check(table: TextTable, made: Mapping[str, tuple[Column, str]], needs: Sequ
             raise InputError(f"{table.path}: column {column.column}", got=f"{seen[column.column]} and {signal}",
                              allowed="one of both")
 
-# --- What boards print when they start, in the middle of a log --------------------------------------------------------
+# --- Lines that boards print when they start, in the middle of a log --------------------------------------------------
 
 _ESP32 = re.compile(r"rst:0x[0-9a-f]+ \((\w+)\)", re.IGNORECASE)  # of the ROM's boot loader: RESET_REASON in rom/rtc.h
 _BROWNOUT = "Brownout detector was triggered"  # of ESP-IDF and the Arduino core

@@ -27,7 +27,7 @@ MENDS: Mapping[str, str] = {
     CLOCK16: "joins times of a counter of 16 bits",
     THOUSANDS: "takes marks within whole numbers for thousands separators",
 }
-"""What a reader mends when it is asked to; the certain faults are mended unasked."""
+"""Mends of a reader when it is asked to; the certain faults are mended unasked."""
 
 
 # --- How a file was read: which of its columns is what, and what was passed over --------------------------------------

@@ -144,8 +144,8 @@ def read_logs(path: str | Path, format: str = "auto", *, sidecar: str | Path | N
     sidecar : str or Path, optional
         What holds for all CSV files, in place of a `logs.json` in their folder.
     columns : str or mapping, optional
-        Which column of the CSV files is which signal, in which unit: ``"time=t:ms angle=pos:deg-90"``. What it leaves
-        out is known by name or guessed; `Log.reading` shows it.
+        Which column of the CSV files is which signal, in which unit: ``"time=t:ms angle=pos:deg-90"``. Columns that it
+        leaves out are known by name or guessed; `Log.reading` shows it.
     joints : str or mapping, optional
         Which joints of a LeRobot dataset, and their unit: ``"shoulder_pan:deg"``.
     mend : sequence of str

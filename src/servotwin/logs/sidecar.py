@@ -269,7 +269,7 @@ _MOST_BITS = 64
 
 @dataclass(frozen=True, kw_only=True)
 class Sidecar:
-    """What a sidecar says; what it leaves out has its default.
+    """The content of a sidecar; keys that it leaves out have their defaults.
 
     Parameters
     ----------

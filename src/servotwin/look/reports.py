@@ -104,7 +104,7 @@ class Beside:
 
 @dataclass(frozen=True)
 class Html:
-    """What only a page shows."""
+    """A part that only a page shows."""
 
     html: str
 

@@ -32,7 +32,7 @@ _SIGNALS = (
 
 
 class _Averaged(Model):
-    """What the two averaged servos share: (38) with offsets, (41), and the command chain."""
+    """The common part of the two averaged servos: (38) with offsets, (41), and the command chain."""
 
     optional = ("electronics.command_offset", "electronics.command_pulse_offset", "electronics.pulse_width_min",
                 "electronics.pulse_width_max", "potentiometer.feedback_offset", "gear.output_inertia")

@@ -138,7 +138,7 @@ class Model(ABC):
 
     @property
     def given(self) -> Given:
-        """What the servo gives of what this model reads, each a number or a column of lanes."""
+        """The servo's numbers that this model reads, each a number or a column of lanes."""
         if self._given is None:
             self._given = given_of(self._servo, (*self.requires, *self.optional))
         return self._given

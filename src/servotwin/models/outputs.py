@@ -32,7 +32,7 @@ _torques, _torques_of_two = (array_form(law, __name__) for law in (observe.torqu
 
 
 class _Laws(NamedTuple):
-    """What the engine observes, as laws over numbers or over arrays."""
+    """Observed signals of the engine, as laws over numbers or over arrays."""
 
     electrical: Callable[..., Any]
     armature_current: Callable[..., Any]

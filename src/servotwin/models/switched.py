@@ -31,13 +31,13 @@ MOTOR = (
     "motor.motor_viscous_friction", "gear.gear_reduction", "friction.coulomb_torque_forward",
     "friction.coulomb_torque_backward", "supply.open_circuit_voltage",
 )
-"""What no such servo can do without."""
+"""Required numbers of every such servo."""
 SHAFT = ("output_angle", "output_speed")
 HIDDEN = ("winding_temperature", "housing_temperature", "motor_angle", "motor_speed")
 """States, angle and speed first."""
 _HEAT = ("winding_temperature", "housing_temperature")
 _NO_PULSES = ("command_voltage", "command_angle")
-"""What stands for no pulse where the shaft turns without end."""
+"""The word for no pulse where the shaft turns without end."""
 
 
 class SwitchedServo(Model):
@@ -98,7 +98,7 @@ class SwitchedServo(Model):
 
     @property
     def standing_error(self) -> Any:
-        """What the potentiometer's table adds where the feedback stands [V]; 0 where it does not."""
+        """The voltage that the potentiometer's table adds where the feedback stands [V]; 0 where it does not."""
         table: list[Any] = [self.servo.get(f"potentiometer.linearity_{name}") for name in ("angle", "error")]
         if not self.endless or None in table:
             return 0.0

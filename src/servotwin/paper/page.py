@@ -72,7 +72,7 @@ class Robots:
 
 @dataclass(frozen=True, kw_only=True)
 class RobotsPart:
-    """What the report has of the robots: pictures, tables and words, headline numbers, and why they are left out."""
+    """The robots of the report: pictures, tables and words, headline numbers, and why they are left out."""
 
     drawings: tuple[Drawing, ...]
     words: str  # HTML; FIGURES where the pictures belong

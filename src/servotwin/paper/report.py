@@ -33,7 +33,7 @@ _TABLES = ("table-2.csv", "fits.csv", "parameters.csv")
 
 @dataclass(frozen=True, kw_only=True)
 class PaperReport:
-    """What was written.
+    """The written files.
 
     Parameters
     ----------

@@ -190,7 +190,7 @@ class PaperStudy:
 
     @property
     def full_torque(self) -> float:
-        """What the motor gives at the output shaft, at rest and with all that the supply leaves it [N m]."""
+        """The motor's torque at the output shaft, at rest and with all that the supply leaves it [N m]."""
         return (self.value("gear.gear_reduction") * self.value("motor.torque_constant") * self.voltage_limit
                 / self.value("motor.armature_resistance"))
 
@@ -202,7 +202,7 @@ class PaperStudy:
 
     @property
     def voltage_limit(self) -> float:
-        """What the supply leaves for the motor, V_oc − V_ce0 [V]."""
+        """The voltage that the supply leaves for the motor, V_oc − V_ce0 [V]."""
         drop = self.servo.get("supply.bridge_drop_voltage")
         return self.supply - (float(drop) if isinstance(drop, int | float) else 0.0)
 

@@ -42,11 +42,11 @@ class Range(NamedTuple):
 
 RULES = {POSITIVE: Range(0.0, open=True), NOT_NEGATIVE: Range(0.0), ANY: Range(), AT_LEAST_ONE: Range(1.0),
          FRACTION: Range(0.0, 1.0)}
-"""What numbers each rule allows."""
+"""Numbers that each rule allows."""
 
 
 class Relation(NamedTuple):
-    """What has to hold between fields of a group; of columns, lane by lane, or for all lanes alike."""
+    """Relations between fields of a group; of columns, lane by lane, or for all lanes alike."""
 
     what: str
     holds: bool | NDArray[np.bool_]
@@ -75,7 +75,7 @@ class Plausible(NamedTuple):
 
 
 class Basis(NamedTuple):
-    """What plausible ranges are taken from."""
+    """Sources of plausible ranges."""
 
     source: str
 

@@ -150,7 +150,7 @@ OUTPUT_SIDE: dict[str, OutputSide] = {
     "output_coulomb_torque_backward": OutputSide(("friction.coulomb_torque_backward",), 1, "torque", "N F_ec2"),
     "output_stribeck_speed": OutputSide(("friction.stribeck_speed",), -1, "output speed", "v_s/N"),
 }
-"""By name. What moves at the output stays the same when N changes and these do not."""
+"""By name. The motion of the output stays the same when N changes and these do not."""
 
 
 def output_value(servo: Servo, name: str) -> float | None:

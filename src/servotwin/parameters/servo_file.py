@@ -161,7 +161,7 @@ _FIGURES = {**POINT, **WHOLE}
 
 @dataclass(frozen=True, kw_only=True)
 class PrintedPoint:
-    """What is printed for one supply voltage; None is not printed.
+    """Printed figures for one supply voltage; None is not printed.
 
     Parameters
     ----------

@@ -2,8 +2,8 @@
 
 C libraries and processors differ in the last digits of theirs. Methods and coefficients are those of fdlibm (Sun
 Microsystems, 1993, "Freely distributable LIBM"); `power` sums a logarithm of 64 bits as there. Errors are at most two
-units in the last place (`tests/physics/test_elementary.py`, against 60 digits). What leaves the range of numbers is inf
-or 0, what has no value is nan. In float32 kernels have the functions of C's library instead, arrays have NumPy's.
+units in the last place (`tests/physics/test_elementary.py`, against 60 digits). A result beyond the range of numbers is
+inf or 0, one without a value nan. In float32 kernels have the functions of C's library instead, arrays have NumPy's.
 """
 
 from __future__ import annotations

@@ -40,7 +40,7 @@ _BELOW = 1.5  # levels between two trains of pulses
 
 
 class Curve(NamedTuple):
-    """What is drawn: a line, or points with the half length of their error bars where it is given.
+    """A curve: a line, or points with the half length of their error bars where it is given.
 
     Parameters
     ----------
@@ -261,7 +261,7 @@ _MARKERS = ("D", "s", "o", "^", "v")
 def speed_curves(sheet: DataSheet, *, width: float = 8.4, height: float = 5.6, page: int = 1) -> Figure:
     """Return torque, current, power and efficiency of a servo over its speed, cold and hot, at each voltage.
 
-    What the sheet prints for a voltage stands beside its curves as open marks. All pages have the same axes.
+    Printed figures of a voltage stand beside its curves as open marks. All pages have the same axes.
 
     Parameters
     ----------
@@ -307,7 +307,7 @@ def speed_curves(sheet: DataSheet, *, width: float = 8.4, height: float = 5.6, p
 def compared_curves(sheets: Sequence[DataSheet], *, page: int = 1) -> Figure:
     """Return torque and current over speed of several servos, cold, each at the first of its voltages.
 
-    What a sheet prints for that voltage stands beside as open marks. All pages have the same axes.
+    Printed figures of that voltage stand beside as open marks. All pages have the same axes.
 
     Parameters
     ----------
@@ -522,7 +522,7 @@ def tool_paths(line: Array, traces: Sequence[ToolTrace], *, page: int = 1) -> Fi
 
 
 class JointUse(NamedTuple):
-    """What of the ranges of its joints an arm uses, and the torque that takes.
+    """The parts of its joints' ranges that an arm uses, and the torque that takes.
 
     Parameters
     ----------

@@ -262,7 +262,7 @@ _LEAST = 0.1  # of the droop that the linear zone has without friction: what sta
 class Recipe:
     """A servo as a torque that follows the angle's error and is limited, beside a friction loss: all that MuJoCo has.
 
-    What it does not say is in `lacks`, and how far it is off its servo in `error`.
+    Its gaps are in `lacks`, and how far it is off its servo in `error`.
 
     Parameters
     ----------
@@ -308,7 +308,7 @@ class Recipe:
 
     @property
     def most_torque(self) -> float:
-        """What the motor gives at most: what the servo lifts, and friction [N m]."""
+        """The most that the motor gives: what the servo lifts, and friction [N m]."""
         return self.lift + self.friction_loss
 
     def joint(self) -> str:
@@ -341,7 +341,7 @@ class Recipe:
 
     @property
     def lacks(self) -> tuple[str, ...]:
-        """What of the servo has no place in it."""
+        """Parts of the servo that have no place in it."""
         has = {name for name in self.model.servo.names() if self.model.servo.get(name)}
         return tuple(words for words, names in _LACKS if any(name in has for name in names))
 

@@ -207,8 +207,8 @@ class ServoDrive:
         """Return MuJoCo's control callback with these servos: `mujoco.set_mjcb_control(drive.callback())`.
 
         It is compiled, and serves the viewer, `mujoco.rollout` and everything else that steps. It is one for the whole
-        process: other models have no servos meanwhile; `mujoco.set_mjcb_control(None)` ends it. What goes wrong is
-        kept for `check`.
+        process: other models have no servos meanwhile; `mujoco.set_mjcb_control(None)` ends it. Errors are kept for
+        `check`.
 
         Raises
         ------

@@ -30,11 +30,11 @@ _LOST = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")  # after each of 
 class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordConstructorArgs):
     """A Gymnasium environment on MuJoCo whose joints real servos move, in the place of its actuators.
 
-    What the environment writes into `data.ctrl` stays there, for its rewards, and is the command of the servo by a map
-    that `maps` shows. The control of a position actuator means the angle that it meant. Of a motor, and of anything
-    else, the control range goes linearly onto where the joint can go that the servo can be told to go to as well.
-    Action space, observations and rewards are those of the environment. A policy for torques has to be trained anew:
-    the action now says where to go.
+    Controls that the environment writes into `data.ctrl` stay there, for its rewards, and are the command of the servo
+    by a map that `maps` shows. The control of a position actuator means the angle that it meant. Of a motor, and of
+    anything else, the control range goes linearly onto where the joint can go that the servo can be told to go to as
+    well. Action space, observations and rewards are those of the environment. A policy for torques has to be trained
+    anew: the action now says where to go.
 
     The servos begin anew at `reset`. In `qfrc_actuator` and `actuator_force` there is nothing of them: MuJoCo has their
     torques [N m], or forces [N], among the passive ones. After each step `info` has them as "servo_torque", currents of

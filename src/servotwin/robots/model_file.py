@@ -208,7 +208,7 @@ def robot_model(source: Any, packages: Mapping[str, str | Path] = MappingProxyTy
     ----------
     source : MjModel, MjSpec, Plant, str or Path
         A path is of an MJCF or URDF file, or of one with xacro's macros where `xacro` is installed; a string may be the
-        name of a robot that comes with the package. What is read from a file gets a sky and light where it has none:
+        name of a robot that comes with the package. A model of a file gets a sky and light where it has none:
         pictures would be black.
     packages : mapping of str to path
         Folders of ROS packages that ``package://`` names, where they are not among the file's parents.

@@ -224,7 +224,7 @@ class Goals:
 
 @dataclass(frozen=True, kw_only=True)
 class _Form:
-    """What a joint's goals are: their form, after scale and offset."""
+    """The goals of a joint: their form, after scale and offset."""
 
     form: str
     degrees: Callable[[NDArray[np.float64]], NDArray[np.float64]] = lambda goals: goals

@@ -70,7 +70,7 @@ COMMON = (
     Gains(name="<position> kp 50", stiffness=50.0, damping=1.0, friction=0.1, armature=0.005),
     Gains(name="<position> kp 17.8", stiffness=17.8, damping=0.60, friction=0.052, armature=0.028, force=3.35),
 )
-"""What people write for an SO-100 or SO-101."""
+"""Words for an SO-100 or SO-101."""
 
 
 def position_run(run: RobotRun, gains: Gains) -> dict[str, Array]:

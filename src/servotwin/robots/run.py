@@ -202,7 +202,7 @@ class RobotRun:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is odd about the motion, one sentence each."""
+        """Oddities of the motion, one sentence each."""
         return notes_of(self)
 
     @property
@@ -329,7 +329,7 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
 
 
 class _Lying(NamedTuple):
-    """What of a robot lies in what: sentences, the deepest pair where its motion begins, and why nothing is judged."""
+    """Overlaps of a robot: sentences, the deepest pair where its motion begins, and why nothing is judged."""
 
     said: tuple[str, ...] = ()
     deepest: str = ""

@@ -265,7 +265,7 @@ class Sizing:
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """What is wrong, the worst first; empty where the servo is big enough."""
+        """Faults, the worst first; empty where the servo is big enough."""
         if self.unjudged:
             return (f"not judged: {self.unjudged}",)
         found = [f"{trip.kind} at {trip.time:.2f} s" for trip in self.trips]

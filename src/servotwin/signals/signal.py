@@ -148,7 +148,7 @@ class Signal:
     edges: tuple[float, ...] | None = None
     silences: tuple[tuple[float, float], ...] = ()
     header: bytes = field(init=False, repr=False, compare=False)
-    """What `headers` reads of it."""
+    """The attributes that `headers` reads."""
 
     def __repr__(self) -> str:
         pieces, edges = len(self.pieces.table), "" if self.edges is None else f", {len(self.edges)} edges"
@@ -266,7 +266,7 @@ class Signal:
 
     @property
     def kind(self) -> str:
-        """What is commanded: "angle", "pulse_width" or "voltage"."""
+        """The kind of the command: "angle", "pulse_width" or "voltage"."""
         return kind_of(self.unit)
 
     def __call__(self, time: ArrayLike) -> NDArray[np.float64]:

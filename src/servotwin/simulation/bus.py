@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 Indices = NDArray[np.int64]
 OF_BUS = ("supply.open_circuit_voltage", "supply.internal_resistance", "supply.current_limit")
-"""What a bus has in the place of the servo's own."""
+"""The supply's numbers on a bus in place of the servo's own."""
 MODELS = (PulseServo, PulseServoInductive, DigitalServo)
 MODEL_NAMES = "PulseServo, PulseServoInductive or DigitalServo"
 _OF_SERVO = ("bridge_drop_voltage", "bridge_drop_resistance")
@@ -236,7 +236,7 @@ class Fleet(Mapping[str, Result]):
 
     @cached_property
     def remarks(self) -> tuple[ServoRemark, ...]:
-        """What is to be said of each servo, (servo, kind, time [s]), as `Result.remarks`."""
+        """Remarks on each servo, (servo, kind, time [s]), as `Result.remarks`."""
         return tuple(ServoRemark(name, *remark) for name, result in self.results.items() for remark in result.remarks)
 
     @cached_property
@@ -339,7 +339,7 @@ def simulate_bus(servos: Mapping[str, Sequence[Any]], *, supply: Supply, duratio
     ----------
     servos : mapping of str to tuple
         (model, command) or (model, command, load) by a name of your choice; the models are `PulseServo`,
-        `PulseServoInductive` or `DigitalServo`. What their servo files say of the source is replaced by `supply`.
+        `PulseServoInductive` or `DigitalServo`. The source of their servo files is replaced by `supply`.
     supply : Supply
         Its open_circuit_voltage, internal_resistance and current_limit; the drop of a bridge is the servo's own.
     duration : float

@@ -55,7 +55,7 @@ class Event(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """What stays the same during a run.
+    """The constant part of a run.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class Plan:
 
     @cached_property
     def inputs(self) -> Inputs:
-        """What the servo is told, as a step reads it."""
+        """The commands of the servo, as a step reads them."""
         period = (self.firmware.T_f if self.digital else self.chip.frame_period) if self.edges is None else 0.0
         return Inputs(self.command.table, self.torque.table, self.external_torque, period, self.edges or (),
                       self.curve, self.seed, self.accuracy, (self.firmware,))
@@ -165,7 +165,7 @@ class State:
 
     @property
     def memory(self) -> Memory:
-        """What the engine remembers."""
+        """The memory of the engine."""
         if isinstance(self._held, bytes):
             self._held = _memory_in(self._held)
         return self._held

@@ -124,7 +124,7 @@ def shown(progress: Progress, total: int, what: str) -> Iterator[Callable[[int],
             bar.stop()
 
 
-# --- Whoever does pieces of work --------------------------------------------------------------------------------------
+# --- Executors of pieces of work --------------------------------------------------------------------------------------
 
 _MANY = 32  # workers of an executor that does not say
 _TRIES = 4  # of a piece whose worker is lost: more, and it is the piece that ends the worker

@@ -169,7 +169,7 @@ REFUSED, ON_STOP, CANNOT_HOLD = KINDS = ("pulses refused", "ended on a stop", "c
 COLUMNS = {kind: kind.replace(" ", "_") for kind in KINDS}
 """Name of a table's column that holds the time of a kind."""
 TRIPS = ("overload", "current", "heat", "undervoltage")
-"""What a digital servo trips by; the number of one in the signal `trip` is its place from 1 on."""
+"""Protections of a digital servo; the number of one in the signal `trip` is its place from 1 on."""
 STAYS_TRIPPED = "stays tripped"
 _TRIPPED = {f"tripped by {kind}": f"trips by {kind}" for kind in TRIPS}  # kinds, and the events that they are of
 
@@ -225,7 +225,7 @@ class _Kind(NamedTuple):
 
 
 class Remark(_Kind):
-    """What a user should know of a run; a pair (kind, time), with some numbers by name in `numbers`.
+    """A remark on a run; a pair (kind, time), with some numbers by name in `numbers`.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 AT_REST = math.radians(0.1)
-"""What swings by less is at rest [rad]: about one count of an encoder of 12 bit (0.088 deg)."""
+"""The swing below which a shaft is at rest [rad]: about one count of an encoder of 12 bit (0.088 deg)."""
 
 LEAST_REST = 0.5
 """For which command and load have stood still at the end [s]; in as much the bridge is looked at."""
@@ -66,7 +66,7 @@ class Driven(NamedTuple):
 
 
 class Rest(NamedTuple):
-    """What a servo does at the end of a run, where command and load stand still.
+    """A servo at the end of a run, where command and load stand still.
 
     Parameters
     ----------

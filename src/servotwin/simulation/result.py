@@ -308,7 +308,7 @@ class Result:
 
     @cached_property
     def rest(self) -> Rest | None:
-        """What the servo does where command and load stand still at the end; None where that is under half a second."""
+        """The servo at the end, where command and load stand still; None where that is under half a second."""
         return rest_of(self)
 
     @cached_property

@@ -137,7 +137,7 @@ class Motions(Sequence[Segment]):
 
     @cached_property
     def resolution(self) -> Array:
-        """What `engine.run.at.resolution` finds of each, shape (3, n) [s]."""
+        """The result of `engine.run.at.resolution` for each, shape (3, n) [s]."""
         found = np.empty((3, len(self)))
         for plan, places in self._by_plan():
             own = np.empty((3, len(places)))

@@ -71,7 +71,7 @@ class Joint(ABC):
     """Numbers that are fixed together."""
 
     coordinates: Mapping[str, Coordinate]
-    """What may be drawn, by name."""
+    """Numbers that may be drawn, by name."""
     covers: frozenset[str]
     """Dotted names of parameters that follow, so that their own spreads do not count."""
 
@@ -195,8 +195,8 @@ _RATE, _ZERO = "calibration.angle_per_pulse", "calibration.zero_pulse"
 class CalibrationJoint(Joint):
     """Angle per pulse width 1/(p · one_shot_slope) and pulse at angle 0, T_0 + one_shot_slope · b_o, of a servo.
 
-    The slope is drawn for itself: p and b_o follow, so that a pulse means the same angle whatever it is. What the
-    averaged models have of the chip follows too, as far as it does so in the file: k_p2 = 1/slope, the offset b_i, the
+    The slope is drawn for itself: p and b_o follow, so that a pulse means the same angle whatever it is. The averaged
+    models' numbers of the chip follow too, as far as they do so in the file: k_p2 = 1/slope, the offset b_i, the
     deadband w/slope in volts, and A k_s = (V_oc − V_ce0) K slope/T_f.
 
     Parameters
@@ -398,7 +398,7 @@ def sheet_numbers(servo: Servo) -> SheetNumbers | None:
 
 
 class _Twin(NamedTuple):
-    """What the servo of the file has at the sheet's voltage; friction [N m] and what of it no load changes [1]."""
+    """The file's servo at the sheet's voltage; friction [N m] and what of it no load changes [1]."""
 
     no_load_speed: float
     stall_torque: float

@@ -134,7 +134,7 @@ def output_times(duration: float, step: float, start: float, decisions: Array) -
 
 
 class Judged(NamedTuple):
-    """What decides whether a shaft has arrived, and rests.
+    """The limits by which a shaft has arrived, and rests.
 
     Parameters
     ----------

@@ -183,7 +183,7 @@ _LEAST_REACH = 0.01  # of the farthest bar
 
 
 class Bar(NamedTuple):
-    """What one parameter does to a metric.
+    """The effect of one parameter on a metric.
 
     Parameters
     ----------
@@ -411,7 +411,7 @@ class Study:
 
     @cached_property
     def remarks(self) -> tuple[LaneRemark, ...]:
-        """What is to be said of lanes that reached their end, (lane, kind, time [s]), as `Result.remarks`."""
+        """Remarks on lanes that reached their end, (lane, kind, time [s]), as `Result.remarks`."""
         return of_columns(self.table)
 
     def remarked(self) -> dict[str, tuple[int, ...]]:

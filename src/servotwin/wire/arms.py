@@ -88,7 +88,7 @@ _SERVO_KEYS = ("id", "servo", "joint", "registers", "angle_deg")
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
-    """What a person asks for.
+    """The goals of a person.
 
     Parameters
     ----------

@@ -231,7 +231,7 @@ _ROUNDING = 1e-12  # s
 
 @dataclass
 class Counts:
-    """What a bus has seen so far.
+    """The traffic of a bus so far.
 
     Parameters
     ----------
@@ -523,7 +523,7 @@ class Bus:
 
     @property
     def service(self) -> Service | None:
-        """What serves the port, with its `timing`; None while it is not open."""
+        """The server of the port, with its `timing`; None while it is not open."""
         return self._service
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""A servo behind an ID: registers that speak for a twin. What both makers' have in common."""
+"""A servo behind an ID: registers that speak for a twin. The common part of both makers' servos."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class ControlTable:
         return changed
 
 
-# --- A servo behind an ID: registers that speak for a twin. What both makers' have in common --------------------------
+# --- A servo behind an ID: registers that speak for a twin. The common part of both makers' servos --------------------
 
 COUNT = 2.0 * math.pi / 4096.0  # rad
 MIDDLE, TURN = 2048, 4096  # count at angle 0, counts a turn
@@ -192,7 +192,7 @@ class Device:
 
     @property
     def seen(self) -> Seen:
-        """What shows of the twin."""
+        """Signals of the twin."""
         return self.crew.seen(self.lane)
 
     @property

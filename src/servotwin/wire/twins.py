@@ -28,7 +28,7 @@ _COLD = 298.15  # K, shown where a servo has no thermal numbers
 
 
 class Seen(NamedTuple):
-    """What shows of a servo, in SI; angles at the output shaft."""
+    """Signals of a servo, in SI; angles at the output shaft."""
 
     angle: float
     speed: float

@@ -67,7 +67,7 @@ class X(Device):
 
     @property
     def error(self) -> int:
-        """What stands in every answer: whether something is wrong."""
+        """The status of every answer: whether something is wrong."""
         self.alert |= _TRIPS.get(self.seen.trip, 0) | self.forced
         return ALERT if self.alert else 0
 

@@ -13,7 +13,7 @@ class Backend(Protocol):
 
     @property
     def name(self) -> str:
-        """What it is, for messages: a port, "emulator", "mock"."""
+        """Its name in messages: a port, "emulator", "mock"."""
 
     def open(self) -> None:
         """Take the wire.

@@ -390,7 +390,7 @@ class EmulatedBackend:
 
     @property
     def lines(self) -> Sequence[str]:
-        """What its display shows, two lines of 16 characters."""
+        """The text of its display, two lines of 16 characters."""
         return self._display.lines
 
     @property

@@ -24,7 +24,7 @@ _ALERT = 128  # of a status byte of protocol 2
 
 
 class BusServo:
-    """What is known of a servo.
+    """Known facts of a servo.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ _KIND = "angle"
 
 
 class Order(NamedTuple):
-    """What holds at a tick.
+    """The state at a tick.
 
     Parameters
     ----------

@@ -106,7 +106,7 @@ class Display:
 
     @property
     def lines(self) -> tuple[str, str]:
-        """What is read on it; blanks where it is off."""
+        """Its text; blanks where it is off."""
         if not self._on:
             return " " * COLUMNS, " " * COLUMNS
         return "".join(self._memory[:COLUMNS]), "".join(self._memory[_ROW:_ROW + COLUMNS])

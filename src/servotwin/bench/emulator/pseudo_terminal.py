@@ -24,8 +24,8 @@ _FULL = 1 << 16  # bytes that wait for a program that does not read; older ones 
 class Terminal:
     """A pseudo-terminal in front of a backend; what a program writes is sent, what the board says can be read.
 
-    What is written before anybody has opened it is lost, as with a board that is not plugged in: a program has to shake
-    hands. A program that closes it and opens it again finds the board as it was left.
+    Bytes written before a program has opened it are lost, as with a board that is not plugged in: a program has to
+    shake hands. A program that closes it and opens it again finds the board as it was left.
 
     Parameters
     ----------

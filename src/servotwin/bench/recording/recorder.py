@@ -263,7 +263,7 @@ class _Log:
 
     @property
     def recorded(self) -> Recorded:
-        """What there is of it."""
+        """Its values so far."""
         return Recorded(self.path, self._rows, self._last)
 
     def begin(self, *, overwrite: bool) -> None:

@@ -30,7 +30,7 @@ _DELAY = ("where in the exposure a picture's time stands, its rows (rolling shut
 
 @dataclass(frozen=True, kw_only=True)
 class FilmLog:
-    """What is written.
+    """The written files.
 
     Parameters
     ----------

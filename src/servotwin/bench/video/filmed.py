@@ -385,7 +385,7 @@ class Plane:
 
     @property
     def local(self) -> NDArray[np.float64]:
-        """What the homography is near the axis: the derivative there, shape (2, 2) [pixels per side]."""
+        """The homography near the axis: the derivative there, shape (2, 2) [pixels per side]."""
         h = self.homography
         return np.asarray((h[:2, :2] - np.outer(h[:2, 2] / h[2, 2], h[2, :2])) / h[2, 2])
 

@@ -20,7 +20,7 @@ _FIRMWARE = "servotwin bench flash puts the firmware onto it"
 
 
 class Message(NamedTuple):
-    """What came over the wire.
+    """Frames that came over the wire.
 
     Parameters
     ----------

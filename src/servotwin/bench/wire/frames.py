@@ -130,7 +130,7 @@ class Kind:
 
 @dataclass(frozen=True)
 class Protocol:
-    """What the text says.
+    """The protocol of the text.
 
     Parameters
     ----------

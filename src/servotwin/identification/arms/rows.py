@@ -425,7 +425,7 @@ def model_columns(models: Sequence[Model], columns: Sequence[Mapping[str, Array]
 # --- Copies of a robot, at points of the numbers that are searched ----------------------------------------------------
 
 class Copies(ABC):
-    """What simulates the joints of an episode at several points.
+    """Simulators of the joints of an episode at several points.
 
     Parameters
     ----------

@@ -66,7 +66,7 @@ class Asked:
 
 
 class Demand:
-    """What motions of a robot ask of its joints, of zeros near those that were asked for before: worked out once.
+    """Demands of a robot's motions on its joints, of zeros near those that were asked for before: worked out once.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class Demand:
 
 
 class _Known(NamedTuple):
-    """What an episode asks for at some zeros, and how the torque changes with those that were asked for."""
+    """Demands of an episode at some zeros, and how the torque changes with those that were asked for."""
 
     episode: Episode
     zeros: Array

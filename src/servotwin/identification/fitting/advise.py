@@ -184,7 +184,7 @@ def advise(known: Fit | Servo, *, model: type[Model] | None = None, free: Sequen
 
 @dataclass(frozen=True, eq=False)
 class _Known:
-    """What is known before the next experiment."""
+    """Knowledge before the next experiment."""
 
     model: Model
     space: Space

@@ -390,7 +390,7 @@ WANTED = 3.5
 HINTED = 1.5
 """The same where what is left is no noise, and widens standard errors by as much: then a search has to tell."""
 CLOCK, ROUNDED = "clock", "rounded commands"
-"""What is no parameter of a servo."""
+"""Numbers that are no parameters of a servo."""
 _STEP, _WIDE = 0.05, 0.1  # of a range: over which a number is looked at, as much again after it; among kinks
 _CHAINS, _END_SWEEPS = 200, 16  # of the sampling of the law of what is left out: its moments to a tenth
 _OHMS = 1.0  # of a supply, assumed: four fresh alkaline AA cells have 0.6 to 1.2 (Energizer E91: 0.15 to 0.3 each)
@@ -403,7 +403,7 @@ _FARTHEST = 1.5  # of a range, assumed: a number that a search takes farther sta
 _BRAKES = "motor.motor_viscous_friction"
 _LIKE_BRAKES = {"output_torque_constant", "motor.torque_constant", "motor.back_emf_constant",
                 "motor.armature_resistance"}
-"""What K²/R is made of: where all of it is known, an angle tells viscous friction."""
+"""The numbers of K²/R: where all of it is known, an angle tells viscous friction."""
 _NEUTRAL = {"friction.breakaway_ratio": 1.0}
 _UNTOLD = 0.25  # of a range: a uniform law has 0.29
 _NOTHING = 1e-9  # of the precision of a range: the logs do not tell
@@ -468,7 +468,7 @@ class Assumption:
 
 
 class Systematic(NamedTuple):
-    """What left-out numbers do to the fitted ones (scaled): where their mean would be, and its covariance."""
+    """Effects of left-out numbers on the fitted ones (scaled): where their mean would be, and its covariance."""
 
     numbers: tuple[Assumption, ...]
     shift: Array
@@ -600,7 +600,7 @@ class _Law(NamedTuple):
 
 
 class _Effect(NamedTuple):
-    """What a number does on its way through its range: how the fitted ones follow, and what they do not imitate.
+    """Effects of a number on its way through its range: how the fitted ones follow, and what they do not imitate.
 
     That is the change of residuals, and of beliefs about the logs' own numbers, over one step and over the next.
     """
@@ -623,7 +623,7 @@ def _way(one: Assumption) -> float:
 
 @dataclass(frozen=True)
 class _Known:
-    """What is known where a search ended, as of `systematic`."""
+    """Knowledge where a search ended, as of `systematic`."""
 
     task: Task
     point: Point

@@ -342,8 +342,8 @@ def identified_servo(servo: Servo, space: Space, shared: Array, doubts: Doubts, 
                      yielded: Sequence[str] = ()) -> Servo:
     """Return a servo with the values of a point.
 
-    What the logs determine is "identified", and its range is the interval. What they leave open keeps its origin, its
-    source and its spread; its value is the one that goes with the others.
+    Numbers that the logs determine are "identified", and their range is the interval. Those that they leave open keep
+    origin, source and spread; their values are those that go with the others.
 
     Parameters
     ----------

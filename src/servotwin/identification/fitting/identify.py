@@ -284,7 +284,7 @@ def with_verdict(task: Task, point: Point, fit: Fit, course: Course, slew: Mappi
     except KeyboardInterrupt:
         trials, fit = False, replace(fit, warnings=("stopped: not all causes were tried", *fit.warnings))
     if verdict.undecided and any(cause.name != "outliers" for cause in causes):
-        # What a number of the model tells of samples that it was not fitted to is no noise
+        # Errors that a number of the model tells of samples that it was not fitted to are no noise
         verdict = replace(verdict, holds=False, sentence=f"residuals are {verdict.ratio:.2g} times the noise of "
                           f"{shown(verdict.noise[sensor], sensor)} that neighbours show, and follow a better model: "
                           f"this one lacks something; {UNHELD}")
@@ -385,7 +385,7 @@ def _series(trace: Trace) -> SensorSeries:
 
 LINEARISED = ("intervals (those here are of the problem made straight at the best so far, "
               f"{LINEARISED_TIMES:g} times as wide)")
-"""What is not known, where there are such."""
+"""Unknown numbers, where there are such."""
 
 
 def hurried(task: Task, found: Outcome, level: float) -> tuple[Outcome, Doubts]:

@@ -243,7 +243,7 @@ _FIRST = {  # where a term begins that the rung before does not have: little of 
 _ALIKE = {"friction.load_friction": _DIRECTED, "friction.load_friction_stribeck": _DIRECTED_STRIBECK}
 EXTRAS: dict[str, str] = {
     "soft supply": "supply.internal_resistance", "soft bridge": "supply.bridge_drop_resistance"}
-"""What gives way beside friction, and what is searched of it; the name of such a rung is "M4, soft supply"."""
+"""The part that gives way beside friction, and its searched numbers; the name of such a rung is "M4, soft supply"."""
 _ON_THE_BUS = "soft supply"
 _SOFT_SHARE = 0.2  # of the armature's resistance, where that of what gives way begins: nearer to 0 it may stay there
 _STIFFER = 0.9  # of the armature's resistance, that then begins lower
@@ -276,8 +276,8 @@ def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] | None
     gives_way : bool, optional
         Whether the laws up to the one that is chosen are fitted once more with an internal resistance of the supply
         and once with one of the bridge, and where one of these is chosen the richer laws with it too: "M4, soft
-        supply". Unless given, where all laws are tried. What logs or `free` say already, or the model does not read,
-        is not tried; nor is a supply whose bus was measured.
+        supply". Unless given, where all laws are tried. Parts that logs or `free` say already, or that the model does
+        not read, are not tried; nor is a supply whose bus was measured.
     progress : bool or callable
         As of `identify`, over all rungs.
     **options
@@ -334,7 +334,7 @@ def _place(rung: Rung) -> tuple[int, int]:
 
 
 class _Climb(NamedTuple):
-    """What all rungs have in common, and those that were fitted."""
+    """The common options of all rungs, and those that were fitted."""
 
     logs: Sequence[Log]
     servo: Servo
@@ -469,11 +469,11 @@ def _start(base: Servo, name: str, servo: Servo) -> Servo:
 
 KINDS = ("analog", "digital")
 BRIDGES: dict[str, tuple[str, ...]] = {"analog": ("brake", "coast"), "digital": ("brake", "diode")}
-"""What a bridge may do while it does not drive, by the kind of servo; the simplest first."""
+"""States of a bridge that does not drive, by the kind of servo; the simplest first."""
 
 SPRINGS: dict[str, tuple[str, ...]] = {
     "gear": ("gear.stiffness", "gear.damping"), "arm": ("load.flexible.stiffness", "load.flexible.damping")}
-"""What may give way, and what is searched of it beside all else."""
+"""Parts that may give way, and their searched numbers beside all else."""
 
 _FIRST_LAW = "M1"
 _STIFFNESS, _DAMPING = 100.0, 0.05  # N m/rad, N m s/rad, where a search begins: guesses for small gears

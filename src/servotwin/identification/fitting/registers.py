@@ -104,7 +104,7 @@ def of_no_robot(logs: Sequence[Log]) -> list[Log]:
 
 @dataclass(frozen=True)
 class Tried:
-    """What may stand in the registers, and how far the servo is off the logs then.
+    """A candidate set of registers, and how far the servo is off the logs with it.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ class OddJoint(NamedTuple):
 
 @dataclass(frozen=True)
 class RegisterSearch:
-    """What was found of registers that nobody recorded.
+    """The result of a search for registers that no log records.
 
     Parameters
     ----------
@@ -176,12 +176,12 @@ class RegisterSearch:
 
     @property
     def taken(self) -> Tried | None:
-        """What a fit begins from in place of the servo as it was given; None where that is good enough."""
+        """The start of a fit in place of the servo as it was given; None where that is good enough."""
         return self.best[0] if self.best and self.best[0].error < TAKEN * self.given.error else None
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What is to be known of it, a line each."""
+        """Sentences on it, a line each."""
         said = []
         if self.taken is not None:
             also = [one.said for one in self.best[1:] if not {*one.registers} >= {*self.taken.registers}][:2]
@@ -201,7 +201,7 @@ class RegisterSearch:
 
     @property
     def facts(self) -> dict[str, Any]:
-        """What was found as plain data (SI)."""
+        """The result as plain data (SI)."""
         def of(one: Tried | None) -> dict[str, Any] | None:
             return None if one is None else {"registers": dict(one.registers), "error": one.error, "delay": one.delay}
         joints = {joint: {"registers": dict(one.registers), "error": one.error,
@@ -275,7 +275,7 @@ class Bench(ABC):
     ----------
     servos : sequence of Servo
     moved : ndarray of bool, optional
-        Which of them moved; all unless given. What others leave says nothing.
+        Which of them moved; all unless given. The errors of others say nothing.
     within : Within, optional
         The time that it may take; then `tried` raises TimeoutError.
 
@@ -618,7 +618,7 @@ def _recorded(logs: Sequence[Log], varied: Sequence[Varied]) -> frozenset[str]:
 
 
 class _Found(NamedTuple):
-    """What leaves the least error, and hardly more; the numbers that the logs tell; and where else they may be."""
+    """The sets with the least error, or hardly more; the numbers that the logs tell; and where else they may be."""
 
     best: tuple[Tried, ...]
     moves: Mapping[str, Varied]

@@ -140,7 +140,7 @@ def noise_of(series: Sequence[SensorSeries]) -> Noise:
     if not guesses:
         size = next((value for value in (repeats, white) if math.isfinite(value)), 0.0)
         return Noise(max(size, floor), math.nan, white, (), repeats, count, _jitter(series))
-    # What stands is counted off by the same each time
+    # A shaft that stands is counted off by the same each time
     found = tuple(NoiseGuess(max(g.size, floor), g.memory if g.size > 0.5 * count else max(g.memory, _COUNTED))
                   for g in guesses)
     middle = found[len(found) // 2]

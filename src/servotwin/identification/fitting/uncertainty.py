@@ -152,7 +152,7 @@ _MOST_LEVER = 0.95
 
 @dataclass(frozen=True, eq=False)
 class Counts:
-    """What an instrument that counts does to the residuals of a log.
+    """The effect of a counting instrument on the residuals of a log.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ class Counts:
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """What one log says of the shared numbers once its own numbers have been fitted too.
+    """Rows of one log on the shared numbers, its own numbers fitted too.
 
     Parameters
     ----------
@@ -324,7 +324,7 @@ def uncertainty(rows: Sequence[Rows], prior: Prior, held: NDArray[np.bool_],
     plain = _meat(rows, 0, [_lever(r, curvature) for r in rows])
     freedom, freedoms, uneven = math.inf, None, False
     if len(rows) >= _MANY_LOGS * p:
-        # Whatever varies within logs or from log to log is in this
+        # All that varies within logs or from log to log is in this
         scores = np.array([r.slope.T @ r.score for r in rows])
         meats = [scores.T @ scores * len(rows) / (len(rows) - 1.0) * count / max(count - p, 1)]
         method, freedom = "between logs", len(rows) - 1.0
@@ -419,7 +419,7 @@ def _freedom(rows: Sequence[Rows], curvature: Array) -> Array:
 def _widest(covariances: Sequence[Array]) -> Array:
     """Return the first covariance with those variances larger that another has larger.
 
-    What is compared is what numbers vary by: of gradients, whose parts largely cancel, one must not be changed alone.
+    The variances of numbers are compared: of gradients, whose parts largely cancel, one must not be changed alone.
     """
     first, *others = covariances
     for other in others:

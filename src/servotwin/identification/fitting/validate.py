@@ -55,7 +55,7 @@ _PERIOD = "electronics.frame_period"
 DELAYS = (0.0, 0.02, 0.04, 0.06, 0.09)
 """Where a search for the delay may begin [s]."""
 RIG = ("delay", "angle_offset")
-"""What a rig has that a servo has not: how late commands act, and where its angle is 0."""
+"""Numbers of a rig: how late commands act, and where its angle is 0."""
 _FEW = 6  # steps of a search that only has to show what they would leave
 _ROUNDS = 3  # of noise and search
 _MOST = 20  # steps of a search
@@ -396,7 +396,7 @@ _NUMBERS = {2: "both", 3: "all three", 4: "all four", 5: "all five"}
 
 
 class Contradicted(Protocol):
-    """What logs say of a number, and what a file says (SI)."""
+    """A number by logs, and by a file (SI)."""
 
     @property
     def name(self) -> str: ...  # noqa: D102 - as of `Yielded`

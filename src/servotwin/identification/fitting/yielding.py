@@ -48,7 +48,7 @@ _WAY = (0.02, 0.05, 0.1, 0.2, 0.35, 0.55, 0.8, 1.0)  # of the way to the bounds,
 
 @dataclass(frozen=True)
 class Doubts:
-    """What a fit knows of its uncertainty.
+    """The uncertainty of a fit.
 
     Parameters
     ----------
@@ -154,7 +154,8 @@ def allowed(task: Task, found: Outcome, rows: Sequence[Rows], directions: Array,
                    np.zeros((2, directions.shape[1])), stretch)
     tried = [made] if not adds.any() else [made, replace(made, by_logarithm=np.zeros(p, np.bool_), by_value=adds)]
     reached = [_reach(task, found, one, inflation) for one in tried]
-    # What the logs leave open is straight where numbers are taken as they stand in it: in products, or in sums
+    # Directions that the logs leave open are straight where numbers are taken as they stand in it: in products, or in
+    # sums
     best = int(np.argmax([way for _, way in reached]))
     return replace(tried[best], reach=reached[best][0])
 
@@ -162,7 +163,7 @@ def allowed(task: Task, found: Outcome, rows: Sequence[Rows], directions: Array,
 def _in_proportion(task: Task, x: Array, directions: Array) -> NDArray[np.bool_]:
     """Tell which numbers may be drawn by their logarithm although they are searched as they are.
 
-    What is in a product with others keeps it by moving in proportion; and of a size that nothing is known of, each
+    Factors of a product keep it by moving in proportion; and of a size that nothing is known of, each
     factor is as likely as any other.
     """
     space = task.forecast.space

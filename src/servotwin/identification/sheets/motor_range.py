@@ -1,10 +1,10 @@
 """The motor behind a sheet, as far as the sheet says, and the ranges that come from what it does not say.
 
-What a sheet leaves open is assumed within a range: the drop of bridge and brushes, the efficiency of the gear where no
-stall current is printed, the no-load current where that is not. The motor is solved for every combination of their
-ends and some values between, for all voltages together and for each alone; the range of a parameter is from the least
-to the greatest of these, as far as the gear stays possible. Every parameter is monotone in every assumption, so that
-the ends are enough.
+Numbers that a sheet leaves open are assumed within a range: the drop of bridge and brushes, the efficiency of the gear
+where no stall current is printed, the no-load current where that is not. The motor is solved for every combination of
+their ends and some values between, for all voltages together and for each alone; the range of a parameter is from the
+least to the greatest of these, as far as the gear stays possible. Every parameter is monotone in every assumption, so
+that the ends are enough.
 """
 
 from __future__ import annotations

@@ -170,7 +170,7 @@ _DEG = math.pi / 180.0
 
 @dataclass(frozen=True, kw_only=True)
 class _Made:
-    """What all groups are made from."""
+    """The source of all groups."""
 
     sheet: Sheet
     motor: MotorRange

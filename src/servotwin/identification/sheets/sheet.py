@@ -22,9 +22,9 @@ from servotwin.text import checked_name
 
 MODULATIONS = ("analog", "digital", "bus", "")
 ENDLESS = ("endless", "continuous")
-"""What stands for the travel of a servo that turns without end."""
+"""The word for the travel of a servo that turns without end."""
 _USUAL_VOLTAGE = 6.0  # where makers print most
-# What no servo has, from the smallest to the largest: a figure outside it is one in another unit
+# Figures that no servo has, from the smallest to the largest: a figure outside it is one in another unit
 _PLAUSIBLE: dict[str, tuple[float, float, str]] = {
     **dict.fromkeys(("supply_voltage", "voltage_min", "voltage_max"), (1.0, 60.0, "V")),
     "stall_torque": (1e-4, 200.0, "N m"), "no_load_speed": (0.02, 300.0, "rad/s"),
@@ -38,7 +38,7 @@ _PLAUSIBLE: dict[str, tuple[float, float, str]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class SheetPoint:
-    """What is printed for one supply voltage; None is not printed.
+    """Printed figures for one supply voltage; None is not printed.
 
     Parameters
     ----------

@@ -44,7 +44,7 @@ class Gap(NamedTuple):
 
 
 class Clock(NamedTuple):
-    """What is to be said of time stamps.
+    """Remarks on time stamps.
 
     Parameters
     ----------
@@ -421,7 +421,7 @@ _MOVES = 0.5  # of neighbouring rows differ where there is noise
 
 
 class Values(NamedTuple):
-    """What is to be said of a measured signal, in SI.
+    """Remarks on a measured signal, in SI.
 
     Parameters
     ----------
@@ -513,7 +513,7 @@ class Lowest(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Survey:
-    """What a log says by itself, in SI.
+    """The survey of a log, in SI.
 
     Parameters
     ----------

@@ -99,7 +99,7 @@ def placed(point: Point, angle: float, speed: float, sets_angle: bool, sets_spee
 
     Motor and potentiometer go along as far as their play. Where the speed is set too, the shaft is one that another
     simulator moves: the motor goes along so that the play stays as it is, or teeth that have met within a tick would be
-    apart again. What is at the other end of a spring (`sprung`) goes along so that the twist stays, and keeps its
+    apart again. The other end of a spring (`sprung`) goes along so that the twist stays, and keeps its
     speed.
     """
     q, w, i, T_w, T_h, q_motor, w_motor = point.y
@@ -234,7 +234,7 @@ def change(has: Indices, given: Floats, which: Indices, before: Any, load_total:
            inertias: Floats, voltages: Floats, numbers: Any) -> int:
     """Put imposed inertias and voltages into the numbers of some lanes, `before` as servo and load say them.
 
-    Return 1 where a lane may have to run in another way from now on, else 0. What is imposed stays in `inertias` and
+    Return 1 where a lane may have to run in another way from now on, else 0. Imposed values stay in `inertias` and
     `voltages`.
     """
     otherwise = 0
@@ -286,7 +286,7 @@ def gather_lost(which: Indices, status: Any, command: Floats, pieces: Floats, ti
                 places: Indices, lanes: Indices, durations: Floats, memories: Memories) -> int:
     """Put together the lanes of tiles that were given up; return how many there are. They owe nothing any more.
 
-    What they are told is put into their `pieces`.
+    Their commands are put into their `pieces`.
     """
     n = 0
     for k in range(which.size):

@@ -31,7 +31,7 @@ numbers_at = reader("numbers_at", Numbers)
 
 
 class Lanes(NamedTuple):
-    """What comes in, for all lanes of a chunk; each array has a column, an entry or a place in a tile for each lane."""
+    """Inputs of all lanes of a chunk; each array has a column, an entry or a place in a tile for each lane."""
 
     numbers: Any  # tiles of Numbers
     chips: Any  # tiles of Chip
@@ -49,7 +49,7 @@ class Lanes(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """What goes out: (B, T) each, or (0, 0) where it is not wanted."""
+    """Outputs: (B, T) each, or (0, 0) where it is not wanted."""
 
     angle: Floats
     speed: Floats
@@ -66,7 +66,7 @@ class Outputs(NamedTuple):
 
 
 class Tables(NamedTuple):
-    """What lanes have besides their columns: rows of torque over time, and tables of their potentiometers."""
+    """Parts of lanes besides their columns: rows of torque over time, and tables of their potentiometers."""
 
     torques: Floats
     torque_first: Indices
@@ -77,7 +77,7 @@ class Tables(NamedTuple):
 
 
 class Told(NamedTuple):
-    """What all lanes are told, and what hangs on their shafts."""
+    """Commands of all lanes, and the loads on their shafts."""
 
     lanes: Lanes
     tables: Tables

@@ -18,11 +18,11 @@ PAUSED = -1
 ALONE, SERIES, DENSE = range(3)
 """How a motion is known: by its own law, or by numbers of a common one, a series or a step."""
 MOTIONS, EVENTS, NUMBERS, LEFT, IDLE, SHORT, BEGUN, KEEPS, READ = range(9)
-"""What a log counts: rows and numbers written, steps left, steps in no time one after the other, short ones between
+"""Counters of a log: rows and numbers written, steps left, steps in no time one after the other, short ones between
 two contacts; whether any motion was written, what it keeps, and how many readings were taken."""
 COUNTS = 9
 FEW, ALL, READINGS = range(3)
-"""What a log keeps: events, as far as there is room; motions and events, with room for both; readings at given times
+"""The parts of a log: events, as far as there is room; motions and events, with room for both; readings at given times
 alone, for which there is always room."""
 _AT_ONCE = 6  # events of one step at most
 

@@ -70,14 +70,14 @@ class Memory(NamedTuple):
 
 
 class Memories(NamedTuple):
-    """What lanes remember: records of `Memory`, and beside them of `Firm`."""
+    """States of lanes: records of `Memory`, and beside them of `Firm`."""
 
     rows: Any
     firms: Any
 
 
 class Inputs(NamedTuple):
-    """What a servo is told and what hangs on its shaft: tables of pieces, a row each; frames of pulses."""
+    """Commands of a servo and the load on its shaft: tables of pieces, a row each; frames of pulses."""
 
     command: Sequence[Sequence[float]] | NDArray[np.float64]
     torque: Sequence[Sequence[float]] | NDArray[np.float64]  # no row: none

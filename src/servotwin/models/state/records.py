@@ -183,7 +183,7 @@ def put_fields(record: Any, values: Any) -> None:
 def record_reader(name: str, kind: type[Kind]) -> Callable[..., Kind]:
     """Return the function `name(record)` that reads a named tuple with those in it; a compiler gets it as text.
 
-    What is a sequence of the named tuple has to be given beside the record.
+    A sequence of the named tuple has to be given beside the record.
     """
     kinds: dict[str, type[Any]] = {}
     given = "".join(f", {field}" for field, hint in fields_of(kind) if get_origin(hint) is Sequence)

@@ -1,6 +1,6 @@
 """One tick of a digital servo: measure, follow the profile, compute the law, limit, protect.
 
-What the program remembers is changed in place, in a record of compiled code or in an object with the same names.
+The state of the program is changed in place, in a record of compiled code or in an object with the same names.
 """
 
 from __future__ import annotations
@@ -215,7 +215,7 @@ def told_by(firm: Any) -> tuple[float, float, float, int]:
 
 
 class Sensed(NamedTuple):
-    """What the program measures at a tick, its own angle apart."""
+    """Measured values of the program at a tick, its own angle apart."""
 
     i: float  # of the motor [A]
     V_bus: float

@@ -7,7 +7,7 @@ of each number of a term where it acts; a number that it does not name may act a
 
 from __future__ import annotations
 
-# What `depends` says
+# Answers of `depends`
 ON_Q, ON_I = 1, 2  # in a straight line: on the angle, on a current with inertia
 CURVED_Q, CURVED_W, CURVED_T = 4, 8, 16  # on angle, speed and time
 STEEP_W = 32  # on the speed, and much of it within a short range
@@ -16,7 +16,7 @@ TWO_BODIES = 128  # motor and output move apart
 FADING = 512  # on the speed, in no straight line while the shaft creeps
 BY_SHARE = 256  # on the torques through the gear, in a straight line as long as the share keeps its sign
 
-# What `needs` says
+# Answers of `needs`
 REGULATED = 1 << 10  # the source gives so much current at most
 DROPS = 1 << 11  # between drives a current begins and ends
 SILENCE = 1 << 12  # without pulses the bridge is off in another way than between drives

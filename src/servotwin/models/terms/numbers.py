@@ -74,7 +74,7 @@ def warm(numbers: Numbers, y: Vector) -> Numbers:
 ROOMS: dict[str, Any] = {**dict(fields_of(Numbers)), "chip": Chip, "firmware": Firmware}
 """The records of all terms, by name."""
 NOTHING: dict[str, Any] = {**NEUTRAL._asdict(), "chip": NO_CHIP, "firmware": NO_FIRMWARE}
-"""What they are where they are absent."""
+"""Their values where they are absent."""
 
 
 def paths(prefix: str = "", rooms: Any = None) -> Iterator[tuple[str, Any, str]]:

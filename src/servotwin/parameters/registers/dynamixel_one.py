@@ -154,7 +154,8 @@ def dynamixel_mx(registers: Given, *, servo: str | Path | Servo) -> Servo:
     registers : mapping of str to int
         Raw values by the e-manual's names with underscores, such as ``{"P_Gain": 32}``. Angle 0 is at count 2048.
     servo : str, Path or Servo
-        Catalog id, path of a servo file, or a servo. What is not given stays as it has it, or is the factory's.
+        Catalog id, path of a servo file, or a servo. A register that is not given keeps its value, or has the
+        factory's.
 
     Raises
     ------
@@ -182,7 +183,8 @@ def dynamixel_ax(registers: Given, *, servo: str | Path | Servo) -> Servo:
         Raw values by the e-manual's names with underscores, such as ``{"CW_Compliance_Slope": 64}``. Angle 0 is at
         count 512, of 300°/1023.
     servo : str, Path or Servo
-        Catalog id, path of a servo file, or a servo. What is not given stays as it has it, or is the factory's.
+        Catalog id, path of a servo file, or a servo. A register that is not given keeps its value, or has the
+        factory's.
 
     Raises
     ------
@@ -393,7 +395,8 @@ def dynamixel_xl320(registers: Given, *, servo: str | Path | Servo) -> Servo:
         Raw values by the e-manual's names with underscores, such as ``{"P_Gain": 32}``. Angle 0 is at count 512, of
         300°/1023.
     servo : str, Path or Servo
-        Catalog id, path of a servo file, or a servo. What is not given stays as it has it, or is the factory's.
+        Catalog id, path of a servo file, or a servo. A register that is not given keeps its value, or has the
+        factory's.
 
     Raises
     ------

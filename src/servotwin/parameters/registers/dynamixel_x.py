@@ -259,7 +259,8 @@ def dynamixel_x(registers: Given, *, servo: str | Path | Servo) -> Servo:
         Raw values by the e-manual's names with underscores, such as ``{"Position_P_Gain": 400}``; all of a dump may be
         given. Angle 0 is at count 2048.
     servo : str, Path or Servo
-        Catalog id, path of a servo file, or a servo. What is not given stays as it has it, or is the factory's.
+        Catalog id, path of a servo file, or a servo. A register that is not given keeps its value, or has the
+        factory's.
 
     Raises
     ------

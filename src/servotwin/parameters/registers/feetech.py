@@ -163,7 +163,8 @@ def feetech_sts(registers: Given, *, servo: str | Path | Servo) -> Servo:
         given. Angle 0 is at count 2048. ``"lerobot"`` stands for what LeRobot writes into the servos of an SO-100 or
         SO-101 follower, ``"lerobot-gripper"`` for what it writes into the one of the gripper.
     servo : str, Path or Servo
-        Catalog id, path of a servo file, or a servo. What is not given stays as it has it, or is the factory's.
+        Catalog id, path of a servo file, or a servo. A register that is not given keeps its value, or has the
+        factory's.
 
     Raises
     ------

@@ -91,7 +91,7 @@ class Register:
 
     @property
     def allowed(self) -> str:
-        """What may be written, in words."""
+        """Allowed values, in words."""
         values = " or ".join(str(value) for value in self.only) or f"a whole number from {self.lower} to {self.upper}"
         return f"{values}; {self.why}" if self.why else values
 
@@ -131,7 +131,7 @@ def is_read_only(name: str, one: Register) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class RegisterModel:
-    """What differs between models of a family.
+    """Differences between models of a family.
 
     Parameters
     ----------
@@ -241,14 +241,14 @@ _ARM = {"Return_Delay_Time": 0, "Operating_Mode": 0, "P_Coefficient": 16, "I_Coe
 LEROBOT_SETS: Mapping[str, Mapping[str, int]] = {
     LEROBOT: _ARM,
     LEROBOT_GRIPPER: {**_ARM, "Max_Torque_Limit": 500, "Protection_Current": 250, "Overload_Torque": 25}}
-"""What LeRobot writes into the servos of an SO-100 or SO-101 follower when it connects, the one of the gripper apart.
+"""Registers that LeRobot writes into the servos of an SO-100 or SO-101 follower on connecting, the gripper apart.
 
 Source: github.com/huggingface/lerobot, robots/so_follower/so_follower.py, configure; motors/feetech/feetech.py,
 configure_motors.
 """
 LEROBOT_X_SETS: Mapping[str, Mapping[str, int]] = {
     LEROBOT_ELBOW: {"Position_P_Gain": 1500, "Position_I_Gain": 0, "Position_D_Gain": 600}}
-"""What LeRobot writes into the elbow of a Koch or an OMX follower; the other joints keep the factory's gains.
+"""Registers that LeRobot writes into the elbow of a Koch or an OMX follower; the other joints keep the factory's gains.
 
 Source: github.com/huggingface/lerobot, robots/koch_follower/koch_follower.py and robots/omx_follower/omx_follower.py,
 configure.
@@ -258,7 +258,7 @@ _NO_PROFILE: Mapping[str, float | None] = {"firmware.acceleration_limit": None, 
 
 
 class RegisterSet(NamedTuple):
-    """What may stand in registers of which nobody recorded anything.
+    """Candidate sets of registers that no log records.
 
     Parameters
     ----------
@@ -476,8 +476,8 @@ Given = Mapping[str, int] | str
 def set_registers(family: Family, registers: Given, servo: str | Path | Servo, *, assumed: bool = False) -> Servo:
     """Return a servo whose firmware group follows from registers.
 
-    What is given makes the numbers that depend on it. The other numbers stay as the servo has them; where it has none
-    of this family, they follow from the factory's values.
+    A given register makes the numbers that depend on it. The other numbers stay as the servo has them; where it has
+    none of this family, they follow from the factory's values.
 
     Parameters
     ----------
@@ -645,7 +645,7 @@ def _differs(one: Any, other: Any) -> bool:
 
 
 class _Value(NamedTuple):
-    """What a register holds, whether that is assumed, and whether somebody gave it."""
+    """The value of a register, whether it is assumed, and whether it was given."""
 
     raw: int
     assumed: bool = False

@@ -340,7 +340,7 @@ class Case(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What a case gave: metrics, or in one line why there are none."""
+    """The outcome of a case: metrics, or in one line why there are none."""
 
     case: Case
     metrics: TaskMetrics | None
@@ -349,7 +349,7 @@ class Outcome(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Condition:
-    """What is harder than nominal.
+    """A condition harder than nominal.
 
     Parameters
     ----------

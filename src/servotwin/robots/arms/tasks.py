@@ -176,7 +176,7 @@ def pick_and_place(first: Place, second: Place, *, lift: float = _LIFT, turn: fl
 
     Up and down it is half as fast: the servo of a rack turns through half its travel then.
 
-    What it carries is no part of the path: an arm has its payload all the time.
+    The payload is no part of the path: an arm has its payload all the time.
 
     Parameters
     ----------

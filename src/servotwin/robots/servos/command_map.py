@@ -71,13 +71,13 @@ _OF_PLACE = 1  # MuJoCo's word for a control that is a place, from 4 on
 
 @dataclass(frozen=True)
 class CommandMap:
-    """What a control asks of a servo: angle of the joint = `offset` + `scale` · control.
+    """The map of a control to a servo: angle of the joint = `offset` + `scale` · control.
 
     Parameters
     ----------
     joint : str
     low, high : float
-        Ends of the control, infinite where it has none. What is beyond them counts as the end, as in MuJoCo.
+        Ends of the control, infinite where it has none. A control beyond them counts as the end, as in MuJoCo.
     scale, offset : float
     unit : str
         Of the angle: "rad", or "m" of a slide; "s" of the pulses of a servo that turns endlessly.
@@ -109,12 +109,12 @@ class CommandMap:
 
     @property
     def angle_low(self) -> float:
-        """What the lowest control asks for [rad or m]."""
+        """The place of the lowest control [rad or m]."""
         return self.angle(self.low)
 
     @property
     def angle_high(self) -> float:
-        """What the highest control asks for [rad or m]."""
+        """The place of the highest control [rad or m]."""
         return self.angle(self.high)
 
     @property

@@ -36,14 +36,14 @@ and the address of a signal stand, and arrays."""
 PIECE = ("address", "rows", "stride", "bytes")
 """A part of their memory."""
 RECORD = ("row", "capacity", "used", "rows")
-"""What is kept of a run: numbers in a row, rows that there is room for, that there are, and where."""
+"""The record of a run: numbers in a row, rows that there is room for, that there are, and where."""
 KEPT = ("output_angle", "output_speed", "command_angle", "joint_torque", "asked", "joint_work")
 """Of each servo in a row of the record, before what `models.engine.observe` sees; "asked" is the command before it was
 clipped."""
 ROW = ("time", "energy", "energy_from_nowhere")
-"""What stands first in a row."""
+"""The first numbers of a row."""
 BLOCK = ("start", "end", "calls", "fresh", "serial", "restored", "half")
-"""What servos remember of a tick: its times, the calls of the engine's step in it, whether it is the first, who worked
+"""The memory of servos of a tick: its times, the calls of the engine's step in it, whether it is the first, who worked
 it out last, whether it was restored with its constraint forces, and which half of the memories is of its beginning.
 Behind it stand the numbers of `OF_EACH`, the constraint forces that it took, and both halves."""
 _CARRIED = ("known torque", "known acceleration", "share")
@@ -54,7 +54,7 @@ much of another acceleration of its joint the servo takes up, from 0 (nothing) t
 command; what the joint was told to, of one without an actuator, and whether it was (0: not)."""
 
 ASK_NEW, ASK_RESET, ASK_ROOM = range(3)
-"""What compiled code asks Python for."""
+"""Calls of compiled code to Python."""
 
 WELL, NOT_FINITE, TOO_LONG, FAILED, REFUSED, FOREIGN, RESTARTED = range(7)
 MESSAGES = {
@@ -65,4 +65,4 @@ MESSAGES = {
     FOREIGN: "another control callback is installed",
     RESTARTED: "MuJoCo has met a number that is not finite, or too large, and has started anew",
 }
-"""What can be wrong."""
+"""Faults."""

@@ -44,7 +44,7 @@ RAISED, TOO_FEW = "solver iterations raised", "few solver iterations"
 
 
 class SolverNote(NamedTuple):
-    """What was done about a model's solver: kind of the remark, `RAISED` or `TOO_FEW`, and a sentence."""
+    """A remark on a model's solver: kind of the remark, `RAISED` or `TOO_FEW`, and a sentence."""
 
     kind: str
     words: str
@@ -216,7 +216,7 @@ class ServoRecord(Mapping[str, Array]):
 
     @property
     def clipped(self) -> Clipped | None:
-        """What became of commands beyond the ends that there are; None if all were followed as they were given."""
+        """Commands beyond their ends, and their fate; None if all were followed as they were given."""
         asked, given = (self.columns[:, _COLUMNS.index(name)] for name in ("asked", "command_angle"))
         off = np.abs(asked - given)
         changed = np.flatnonzero(off > _ROUNDING * (np.abs(given) + (0.0 if self._told.unit == "s" else 1.0)))

@@ -42,7 +42,7 @@ from servotwin.simulation.lanes.c_entry import CEntry
 # --- Unlike servos of one kind side by side: what differs among them, as numbers of each ------------------------------
 
 OF_THE_BUS = ("supply.open_circuit_voltage", "supply.internal_resistance", "supply.current_limit")
-"""What servos on a shared supply have from that."""
+"""Numbers of servos on a shared supply."""
 _SHARE, _SHARES = "friction.load_friction", ("friction.load_friction_motor", "friction.load_friction_external")
 _ABSENT = {  # numbers that say the same as nothing: those of files that change least
     "firmware.duty_slew": 1e5, "firmware.undervoltage": 0.5, "motor.motor_viscous_friction": 0.0,

@@ -1,7 +1,7 @@
 """Kernels with their arguments, to be called by address: from compiled code, and from Python again and again.
 
-A number is a word; an array is its address and its lengths; a tuple is all that is in it. What changes from call to
-call, `Now` and `Some`, is put into the words by a call before.
+A number is a word; an array is its address and its lengths; a tuple is all that is in it. Values that change from call
+to call, `Now` and `Some`, are put into the words by a call before.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ _FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
 DRIVERS = Recipe("drivers", tuple(f"servotwin.{entry}" for entry in (
     "simulation.compile.tick:renew", "simulation.compile.tick:advance", "robots.servos.joints:control",
     "robots.servos.joints:step")), by_numbers=True)
-"""What is called with numbers, by kernels, by a program in C and by a rigid-body engine."""
+"""Functions called with numbers, by kernels, by a program in C and by a rigid-body engine."""
 
 
 def call_of(recipe: Recipe, entry: str, *arguments: Any, returns: bool = False) -> Call:

@@ -14,7 +14,7 @@ TICK = ("version", "lanes", "duration", "simulator", *GIVEN, *SHOWN, "status")
 """Members of `struct servotwin_tick`, in their order."""
 
 STAGES = ("clock", "accept", "change", "refit", "impose", "follow", "advance", "show", "look")
-"""What happens at a tick: programs, each a list of chains of calls."""
+"""Calls of a tick: programs, each a list of chains of calls."""
 HANDLE = ("lanes", "given", "has", "now", "status", "shaft", "seen", "fresh", "renew", *STAGES)
 """Words of a simulator: a number, and addresses."""
 
@@ -35,4 +35,4 @@ MESSAGES = {
     cosim.BEYOND_RECORD: "a recorded torque ends before",
     NOT_RENEWED: "lanes that run in another way now could not be prepared",
 }
-"""What the numbers mean that a tick returns."""
+"""Meanings of the numbers that a tick returns."""

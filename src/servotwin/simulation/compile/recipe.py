@@ -13,7 +13,7 @@ from servotwin.simulation.compile.c_types import MATH
 
 @dataclass(frozen=True)
 class Recipe:
-    """What to derive.
+    """The functions to derive.
 
     Parameters
     ----------

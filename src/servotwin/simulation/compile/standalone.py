@@ -48,7 +48,7 @@ class Standalone:
 
     @property
     def types(self) -> Types:
-        """What values are called in the text."""
+        """Names of values in the text."""
         return self._printer.types
 
     def add(self, recipe: Recipe, signatures: Mapping[str, Sequence[Kind]]) -> dict[str, str]:

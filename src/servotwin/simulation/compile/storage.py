@@ -1,6 +1,6 @@
 """Where compiled kernels are kept, under which names, and whether what lies there may be loaded or run.
 
-What is loaded may do all that this user may. On POSIX it has to be a file that belongs to this user or root and that
+A loaded library may do all that this user may. On POSIX it has to be a file that belongs to this user or root and that
 nobody else may write, in a folder of which the same holds; else it is made anew, in a folder of this process's own.
 """
 

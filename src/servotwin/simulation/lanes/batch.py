@@ -180,7 +180,8 @@ class Batch:
     def to_dataframe(self) -> pd.DataFrame:
         """Return all signals (SI) as a pandas DataFrame, a row for each lane and time.
 
-        What differs between lanes is not in it; `to_xarray` has it as coordinates, and a file of `save` as columns.
+        Values that differ between lanes are not in it; `to_xarray` has them as coordinates, and a file of `save` as
+        columns.
 
         Examples
         --------
@@ -197,7 +198,7 @@ class Batch:
         """Write all signals to a CSV or Parquet file, a row for each lane and time.
 
         Columns are `lane`, what differs between lanes by its dotted name (SI), `time_s`, and the signals, the unit of
-        each in its name. What a failed lane has not reached is nan.
+        each in its name. Times that a failed lane has not reached are nan.
 
         Parameters
         ----------
@@ -223,5 +224,5 @@ class Batch:
 
     @property
     def _varied(self) -> dict[str, NDArray[Any]]:
-        """What differs between lanes, by its dotted name."""
+        """Values that differ between lanes, by dotted name."""
         return {**self.lanes.numbers, **self.lanes.words}

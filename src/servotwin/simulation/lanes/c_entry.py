@@ -38,7 +38,7 @@ class CTick(ctypes.Structure):
 
 
 class CEntry:
-    """What a program in C needs to go on with a `VectorSimulator`, which lives for as long as this does.
+    """The entry of a `VectorSimulator` for a program in C, which lives for as long as this does.
 
     Attributes
     ----------
@@ -143,7 +143,7 @@ class CEntry:
 
     @property
     def seen(self) -> Array:
-        """What shows of the lanes where a signal is asked for, shape (lanes, signals of `models.engine.observe`)."""
+        """Signals of the lanes where one is asked for, shape (lanes, signals of `models.engine.observe`)."""
         return self._store.room.seen
 
     def memory(self) -> tuple[Piece, ...]:

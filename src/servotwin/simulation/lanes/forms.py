@@ -97,14 +97,14 @@ _BY_FORM = {getattr(tiles, form): _side(f"by_{form.lower()}", form) for form in 
 # --- Lanes one by one -------------------------------------------------------------------------------------------------
 _PLAIN = _EVERYWHERE | DROPS | SILENCE | FREE_RUNNING | STEPS | TABLE | ON_Q
 PLAIN = _PLAIN | PULSES | FOLLOWS | RECORDED
-"""What servos may ask for that move by plain laws."""
+"""Allowed demands of servos that move by plain laws."""
 _LEFT_TO_EVENTS = AT_STOPS | SHOWN | PULSES | STEPS
 CALM = Recipe("calm", ("servotwin.models.engine.batch.event_free:go",), knows=PLAIN & ~(
     _LEFT_TO_EVENTS | RECORDED | TABLE), leaves=_LEFT_TO_EVENTS)
 """Ticks of lanes in which nothing happens, three times faster; the others are for `RUNS`."""
 _TICKS = _PLAIN & ~ON_Q | _DIGITAL
 LEGS = _TICKS | PLAY | TWO_BODIES | BY_SHARE
-"""What legs follow exactly."""
+"""Parts that legs follow exactly."""
 _ALWAYS, _LEFT_TO_RUNS = PROGRAM | PWM, AT_STOPS | SHOWN | AT_COMMANDS
 _BY_TICKS_ALONE = (
     # A spring, a pendulum and friction that fades count as if their torques stayed within a tick: where that is asked
@@ -186,7 +186,7 @@ _SMALLEST = 2.0**-150  # what is not more is zero in float32
 
 
 class Terms:
-    """What lanes ask of whoever follows them, and what they have; each question is asked once."""
+    """Demands of lanes on their kernels, and their parts; each question is asked once."""
 
     def __init__(self, numbers: Numbers, chip: Chip, firmware: Firmware, swept: Any = False, inputs: Any = 0) -> None:
         self.numbers, self.chip = numbers, chip
@@ -198,7 +198,7 @@ class Terms:
 
     @cached_property
     def demands(self) -> Any:
-        """What all lanes, or each, ask for: flags of `terms.dependence`."""
+        """Demands of all lanes, or of each: flags of `terms.dependence`."""
         return (_said(may_depend, self.numbers, self._wave) | _said(needed, self.numbers, self.chip, self._firmware)
                 | self._inputs)
 

@@ -144,7 +144,7 @@ LAWS: dict[type[Model], str] = {
 
 @dataclass(frozen=True, eq=False)
 class LaneInputs:
-    """What is simulated: what all lanes share once, what differs as arrays (B,).
+    """The inputs: values common to all lanes once, others as arrays (B,).
 
     Parameters
     ----------

@@ -58,7 +58,7 @@ class _Scale(NamedTuple):
 
 
 class _Bounds(NamedTuple):
-    """What each lane takes: given from low to high, as the engine follows it between least and most; (lanes,)."""
+    """Commands of each lane: given from low to high, as the engine follows it between least and most; (lanes,)."""
 
     low: Any
     high: Any
@@ -205,7 +205,7 @@ def _in_rows(tiles: Any) -> Array:
 
 
 class Imposed(NamedTuple):
-    """What another simulator decides; nan where it does not, shape (lanes,)."""
+    """Decisions of another simulator; nan where there are none, shape (lanes,)."""
 
     load_inertia: Array
     bus_voltage: Array
@@ -307,7 +307,7 @@ class LaneNumbers:
 
     @cached_property
     def translate(self) -> Translator:
-        """What translates commands of these lanes."""
+        """The translation of these lanes' commands."""
         return Translator(self)
 
     def now(self, kind: Any, which: Indices | None = None) -> Any:

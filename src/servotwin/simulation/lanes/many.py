@@ -53,8 +53,8 @@ def simulate_many(
 ) -> Batch:
     """Simulate many servos (lanes) from t = 0 to `duration`.
 
-    Whatever differs from lane to lane is an array, or a sequence, of one length B; all are zipped, and a single value
-    holds for all lanes. `grid` makes arrays of all combinations.
+    A value that differs from lane to lane is an array, or a sequence, of one length B; all are zipped, and a single
+    value holds for all lanes. `grid` makes arrays of all combinations.
 
     Parameters
     ----------

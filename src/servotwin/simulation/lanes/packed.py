@@ -38,7 +38,7 @@ class Torques:
 
 
 class Packed(NamedTuple):
-    """What lanes are; picklable.
+    """The lanes; picklable.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class Packed(NamedTuple):
 
     @property
     def inputs(self) -> tuple[Floats, Floats, Indices, Indices]:
-        """What the kernels read beside the lanes: table of the potentiometers, and torques."""
+        """Tables that the kernels read beside the lanes: table of the potentiometers, and torques."""
         own = self.torque
         return as_kernels_take(self.curve), *map(as_kernels_take, (own.rows, own.first, own.count))
 
@@ -126,7 +126,7 @@ def programs_of(firmware: Firmware | None, lanes: int) -> NDArray[Any]:
 
 @dataclass(frozen=True)
 class Asked:
-    """What every chunk is asked for.
+    """The question to every chunk.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ class Asked:
 
 @dataclass(frozen=True)
 class Work:
-    """What a chunk of lanes needs; picklable.
+    """The inputs of a chunk of lanes; picklable.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ class Work:
 
 @dataclass(frozen=True)
 class Raw:
-    """What comes back.
+    """The answer of a chunk.
 
     Parameters
     ----------

@@ -146,12 +146,12 @@ class Chunk:
 
     @cached_property
     def drive(self) -> LanePieces:
-        """What the model follows."""
+        """The signal that the model follows."""
         return cast("LanePieces", self.model.command(cast("Any", self.commands.signal(self.which))))
 
     @cached_property
     def numbers(self) -> Numbers:
-        """What the lanes are, each a number or a column."""
+        """The lanes' numbers, each a number or a column."""
         with np.errstate(all="ignore"):
             return self.model.pack(self.load)
 

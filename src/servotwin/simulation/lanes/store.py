@@ -1,6 +1,6 @@
 """Where the lanes of a `VectorSimulator` are kept and moved: in tiles side by side, or in records one by one.
 
-What a set does is calls of kernels, of whose words the arrays stay where they are: from Python and from compiled code
+A set calls kernels, of whose words the arrays stay where they are: from Python and from compiled code
 the same.
 """
 

@@ -80,7 +80,7 @@ Array = NDArray[np.float64]
 
 
 class Common(NamedTuple):
-    """What lanes on shared supplies remember together.
+    """The common memory of lanes on shared supplies.
 
     Each lane's bus and its place among those that move together there (−1: none), shape (lanes,); and a record of
     `models.engine.bus.bus_records.Shared` for each bus.

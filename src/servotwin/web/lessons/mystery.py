@@ -38,7 +38,7 @@ HIDDEN = (
     Hidden("motor.rotor_inertia", "inertia of the rotor", 0.4, 3.0),
     Hidden(FRICTION, "friction at the motor, both ways alike", 0.5, 2.0),
 )
-"""What is hidden."""
+"""The hidden numbers."""
 BOTH_WAYS = ("friction.coulomb_torque_forward", "friction.coulomb_torque_backward")
 
 

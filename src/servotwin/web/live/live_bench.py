@@ -295,7 +295,7 @@ WHOLE = ("command", "push", "torque")  # of these the last at an instant is all 
 
 
 class ServoPush(NamedTuple):
-    """What shows of a servo: rows by `columns`, and edges and widths [s] of its pulses, width 0 of a lost one."""
+    """Signals of a servo: rows by `columns`, and edges and widths [s] of its pulses, width 0 of a lost one."""
 
     columns: tuple[str, ...]
     points: list[Row]
@@ -303,7 +303,7 @@ class ServoPush(NamedTuple):
 
 
 class Push(NamedTuple):
-    """What shows of a stretch of time up to `time` [s]; events are (time, kind, servo)."""
+    """Signals of a stretch of time up to `time` [s]; events are (time, kind, servo)."""
 
     time: float
     servos: tuple[ServoPush, ...]
@@ -313,7 +313,7 @@ class Push(NamedTuple):
 class LiveBench:
     """Servos that go on side by side under the same commands.
 
-    What a scene says was done is done at its times; what is done with `do` meanwhile comes beside.
+    Actions of a scene are done at their times; those of `do` meanwhile come beside.
 
     Parameters
     ----------
@@ -351,7 +351,7 @@ class LiveBench:
         self.time = 0.0
         """[s]"""
         self.load_numbers: dict[str, float] = {}
-        """What was changed of loads since the start, by dotted name (SI)."""
+        """Changes of loads since the start, by dotted name (SI)."""
         self._catch_up(_AT_FIRST)
         self.rows: list[Row] = [station.now() for station in self._stations]
         """The latest row of each servo."""

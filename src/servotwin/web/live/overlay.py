@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from servotwin.parameters import Servo
 
 RIG = ("delay", "frame_phase", "angle_offset")
-"""What belongs to the rig of a log and not to its servo."""
+"""Numbers of a log's rig, not of its servo."""
 _FRAME_PERIOD = "electronics.frame_period"
 _ALIKE, _TINY = 1.02, 1e-6  # times the error, and rad or V beside: what is no better
 STRETCHES = 500  # of a picture: of each, the extremes are shown

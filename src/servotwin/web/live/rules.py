@@ -181,11 +181,11 @@ FRAME_RATE = 50.0  # Hz, unless a scene gives another
 MOST_SAMPLES = 200_000  # of a recorded command
 LONGEST = 1e6  # s
 LOAD_FIELDS = ("inertia", "viscous_friction", "torque", "coulomb_torque", "mass", "arm", "hanging_angle")
-"""What a load can have: [kg m²], [N m s/rad], [N m], [N m], [kg], [m], [rad]."""
+"""Numbers of a load: [kg m²], [N m s/rad], [N m], [N m], [kg], [m], [rad]."""
 SUPPLY_FIELDS = ("open_circuit_voltage", "internal_resistance", "current_limit")
-"""What a supply that all share can have: [V], [ohm], [A]."""
+"""Numbers of a supply that all share: [V], [ohm], [A]."""
 CONTROL_FIELDS = ("command_share", "reference_share", "sampling_delay")
-"""What a control circuit can be given: as `servotwin.bench.ControlSupply` [1], [1], [s]."""
+"""Numbers of a control circuit: as `servotwin.bench.ControlSupply` [1], [1], [s]."""
 _MOST_PUSH = 1e3  # N m: beyond any servo
 _MOST_STEPS = 1000  # of a staircase, one way
 _SEEDS = 2**53 - 1
@@ -243,7 +243,7 @@ ACTIONS: dict[str, Rule] = {
                  "each": {"is": "whole", "what": "register {name}", "allowed": "a whole number"}},
     "torque": {"is": "truth", "what": "torque", "allowed": "true or false"},
     "control": CONTROL}
-"""What is done at a bench, by the kinds of actions."""
+"""Actions at a bench, by kind."""
 FOR_ALL = ("frames", "control")
 """Kinds of actions that no single servo hears."""
 
@@ -282,7 +282,7 @@ SCENE: dict[str, Rule] = {
     "frame_rate": _span("frame_rate of a scene", *RATES, usual=FRAME_RATE),
     "end": _span("end of a scene", 0.0, LONGEST, usual=0.0),
     "load": _numbers("load", LOAD_FIELDS), "supply": _numbers("supply", SUPPLY_FIELDS), "control": CONTROL}
-"""What a scene holds beside its servos, its actions, its view and its lesson."""
+"""Parts of a scene beside its servos, its actions, its view and its lesson."""
 
 _SHOWN = {"time": "us", "angle": "deg", "inertia": "g cm2", "inductance": "mH", "torque": "mN m",
           "torque per current": "mN m/A"}

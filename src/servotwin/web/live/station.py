@@ -86,12 +86,12 @@ class Told:
         if control and not self.pulsed:
             raise InputError("model at a control circuit", got=type(model).__name__, allowed="one of pulses")
         self.control: ControlCircuit | None = None
-        """What makes its pulses; None: they are as the command says."""
+        """The source of its pulses; None: they are as the command says."""
         self._taken = _taken(model, command, 0.0, controlled=bool(control))
         if control:
             self.control = ControlCircuit(control, float(self._taken.shape(0.0)))
         self.signal = self._silence() if self.pulsed else self._taken.shape
-        """What the model follows now."""
+        """The signal that the model follows now."""
 
     @property
     def widest(self) -> float:
@@ -260,7 +260,7 @@ class Endless:
 
 
 class Seen(NamedTuple):
-    """What shows of a stretch of time: rows of (time, signals), and (time, kind) of events."""
+    """Signals of a stretch of time: rows of (time, signals), and (time, kind) of events."""
 
     rows: list[Row]
     events: list[tuple[float, str]]
@@ -293,7 +293,7 @@ class Station:
         self.state = self._simulator.initial(self.told.signal)
         """Everything that it remembers."""
         self.post = post_of(model)
-        """What kernels keep of it."""
+        """Its record in kernels."""
         self._look_with(model, load)
         self.push = 0.0  # N m, by hand
         self.tell: Callable[[float], object] | None = None
@@ -379,7 +379,7 @@ class Station:
 
     @property
     def plan(self) -> Plan:
-        """What the engine needs for what it is told now."""
+        """The engine's inputs for the present command."""
         return self._simulator.of(self.state).plan(self.told.signal, self.push)
 
     def now(self) -> Row:

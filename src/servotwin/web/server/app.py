@@ -160,7 +160,7 @@ HEADERS = {
     "x-content-type-options": "nosniff", "referrer-policy": "no-referrer", "cache-control": "no-cache",
     "cross-origin-opener-policy": "same-origin", "cross-origin-resource-policy": "same-origin",
 }
-"""What every answer says to a browser."""
+"""Headers of every answer to a browser."""
 _LOOPBACK = ("localhost", "127.0.0.1", "[::1]")
 _FOREIGN = 4403
 
@@ -264,7 +264,7 @@ TOKEN = "x-visitor"
 async def take_log(request: Request, desk: Desk) -> Response:
     """Take a log and read it; answer how it was read.
 
-    What was taken but cannot be read is answered with a line, too: it can be read again with other words.
+    A file that was taken but cannot be read is answered with a line, too: it can be read again with other words.
 
     Parameters
     ----------
@@ -363,9 +363,9 @@ class House:
         self._scene = scene
         self._visitors = 0
         self.teacher = secrets.token_urlsafe(18) if classroom else None
-        """What the teacher's link says, in a class."""
+        """The teacher's part of a link, in a class."""
         self.code = "".join(secrets.choice(_LETTERS) for _ in range(6)) if classroom else None
-        """What watchers have to say."""
+        """Messages of watchers."""
         self._tries = Allowance(rate=5.0, burst=60.0)
         self._shared: Room | None = None
         self._teachers = self._watchers = 0

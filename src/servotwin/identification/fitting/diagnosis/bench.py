@@ -289,7 +289,7 @@ class TrialBench:
     def apart(self, group: Sequence[int]) -> tuple[Array, ...]:
         """Return the residuals of the angle with numbers for some logs alone, from the base or from the servo's values.
 
-        What is better on what teaches counts.
+        The one that is better on samples that teach counts.
         """
         forecast = self.forecast(self.setting)
         forecast.noise = dict(self.base.forecast.noise)
@@ -371,7 +371,7 @@ class TrialBench:
     def may_gain(self, setting: Setting) -> bool:
         """Tell whether a setting can gain enough to count, as far as its effect at its start tells: in proportion.
 
-        What is searched from the servo's values, or changes which numbers there are, is not foretold.
+        Settings searched from the servo's values, or with other numbers, are not foretold.
         """
         if setting.afresh or setting.without or setting.nuisance not in (None, self.setting.nuisance):
             return True

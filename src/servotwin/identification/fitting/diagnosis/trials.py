@@ -199,7 +199,8 @@ def numbers(values: Sequence[Mapping[str, float]], fixed: Mapping[str, float | s
             price: float = 1.0) -> Callable[[TrialBench], Sequence[Setting]]:
     """Return settings that search numbers of the servo which it leaves out, from several values (SI).
 
-    What the servo gives already, other than the value that changes nothing, or what is searched already, is not tried.
+    Numbers that the servo gives already, other than the value that changes nothing, or that are searched already, are
+    not tried.
     """
     def settings(bench: TrialBench) -> Sequence[Setting]:
         old = bench.setting.model
@@ -374,7 +375,7 @@ TABLE: tuple[Candidate, ...] = (
                                          price=10.0)),
     Candidate("play", "play in the gear", "search gear.backlash, with gear.output_inertia above 0", backlash),
 )
-"""What is tried, the cheap first; of candidates that gain alike the earlier one is named first."""
+"""The candidates, the cheap first; of candidates that gain alike the earlier one is named first."""
 
 
 def possible(candidate: Candidate, bench: TrialBench) -> Sequence[Setting]:

@@ -87,7 +87,7 @@ class Point(NamedTuple):
 
 
 class LogPart(NamedTuple):
-    """What one log says: simulated less measured, and the derivatives of that.
+    """One log at a point: simulated less measured, and the derivatives of that.
 
     Parameters
     ----------
@@ -252,7 +252,7 @@ def with_loop_gain(log: Log, model: Model) -> Log:
 
     A log's condition `gain` is the register for P: of a servo whose sheet names its registers it makes the duty per
     angle as they do, and of others as the log's convention of pulses does, times the error_gain_ratio of a file of
-    BAM. What stands for pulses in such a log is left out: a bus servo has none.
+    BAM. Pulses of such a log are left out: a bus servo has none.
 
     Parameters
     ----------

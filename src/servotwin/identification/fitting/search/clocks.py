@@ -56,7 +56,7 @@ _GAINS = 0.5  # of the cost: less is not worth a look
 
 
 class Parabolas(NamedTuple):
-    """What choices, along the first axis, cost as the shared numbers move; a log's own go to where they fit best.
+    """Costs of choices, along the first axis, as the shared numbers move; a log's own go to where they fit best.
 
     Parameters
     ----------
@@ -255,7 +255,7 @@ def _with_ticks(task: Task, point: Point, tell: Told, began: float) -> Point:
 def ticking(task: Task, point: Point, tell: Told, began: float) -> Point:
     """Return where a search ends in which ticks take other commands, as long as that pays.
 
-    What counts is where all parameters would go with these.
+    The point to which all parameters would go with these counts.
     """
     if not task.forecast.ticked:
         return point

@@ -114,12 +114,12 @@ class Bundle:
 
     @cached_property
     def key(self) -> bytes:
-        """What is the same where bundles are looked at at the same times."""
+        """The common key of bundles with the same times."""
         return self.times.tobytes()
 
     @property
     def cost(self) -> float:
-        """What it takes, in seconds of one lane of which nothing is looked at."""
+        """Its price, in seconds of one lane of which nothing is looked at."""
         return self.lanes * (self.duration + _LOOK * len(self.times))
 
 

@@ -40,7 +40,7 @@ def scatter_of(forecast: Forecast, parts: Sequence[LogPart], cases: Sequence[int
 
     Where a servo mostly stands still, the median of all would call every motion an outlier: so it is at least a share
     of the rms. That in turn is put together from medians where the simulated signal moves and where it stands, so that
-    true outliers do not count. What is not finite keeps the noise that it has.
+    true outliers do not count. A sensor whose noise is not finite keeps the noise that it has.
     """
     gathered: dict[str, list[_Piece]] = {}
     for k, part in zip(cases, parts, strict=True):
@@ -219,7 +219,7 @@ Tell = Callable[[int, Outcome], None]
 
 
 class Ask(NamedTuple):
-    """What a search has to know next: what the logs say at a point, perhaps with derivatives."""
+    """The next question of a search: the logs at a point, perhaps with derivatives."""
 
     point: Point
     derivatives: bool

@@ -281,9 +281,9 @@ def credible(scan: Scan, cases: Sequence[int]) -> dict[int, list[PulseChoice]]:
 def drifts(forecast: Forecast, loss: Loss, point: Point, cases: Sequence[int], *, remember: bool = True) -> bool:
     """Tell whether the pulses of some logs come later or earlier and earlier in the course of a log.
 
-    What each window of a log says of its delay scatters as residuals make it, or more (chi squared). What a model lacks
-    makes it too, so that this says only whether it is worth to look. `remember=False` takes residuals as independent:
-    pulses that are far off leave residuals which follow each other.
+    Delays of the windows of a log scatter as residuals make it, or more (chi squared). A wrong model makes them scatter
+    too, so that this says only whether it is worth to look. `remember=False` takes residuals as independent: pulses
+    that are far off leave residuals which follow each other.
     """
     from scipy.special import chdtrc
 

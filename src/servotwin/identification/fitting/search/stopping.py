@@ -30,7 +30,7 @@ _RISES = 1.1  # times the least that was said
 
 
 class TimeLeft:
-    """What a fit has left, from what was measured of it.
+    """The time that a fit has left, by its measured stages.
 
     Stages whose length nobody knows before, such as the search, count with the long side of what is usual, and causes
     that may have to be tried count until they need not be.
@@ -143,7 +143,7 @@ class Within:
 
 
 class Stops:
-    """What stops a fit, and whom it tells how far it is: stages say which share of the fit is done.
+    """The stop of a fit, and its progress: stages say which share of the fit is done.
 
     Parameters
     ----------

@@ -2,10 +2,10 @@
 
 A lane of which something else is due at a tick than its law, as a goal on its way or a protection that counts, decides
 alone, as `control.tick` has it. One that hits a stop leaves in the middle of its tick, and what is left of the call is
-for `runs`. What a lane does never depends on its neighbours.
+for `runs`. A lane never depends on its neighbours.
 
 Between two ticks the duty is constant, so that a shaft goes through one arc, or through two where it comes to rest in
-between. What is near a limit is marked for a lane to decide alone.
+between. A value near a limit is marked for a lane to decide alone.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ TOGETHER = 64  # lanes: what they work with fits into the nearest cache
 
 
 class Body(NamedTuple):
-    """What moves: motor and shaft, the friction that it slides against [N m], and between which stops."""
+    """The moving part: motor and shaft, the friction that it slides against [N m], and between which stops."""
 
     motor: Motor
     shaft: Shaft
@@ -79,7 +79,7 @@ class Body(NamedTuple):
 
 
 class Loop(NamedTuple):
-    """What a servo remembers from tick to tick, as `control.Firm` has it."""
+    """The state of a servo from tick to tick, as `control.Firm` has it."""
 
     q: float
     w: float
@@ -121,7 +121,7 @@ class Place(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """What is worked out in one tick."""
+    """Arrays of one tick."""
 
     delayed: float  # 1: a duty waits for the next tick
     alone: float  # 1: it always decides alone

@@ -2,7 +2,7 @@
 
 For servos whose voltage follows the error, of one body without terms of their own: their motion is `second_order`'s. On
 its way the acceleration h fulfils ḧ + 2a ḣ + c h = 0, so that |ḣ| ≤ √(ḣ₀² + c h₀²) and speed and angle stay near where
-they are. Whatever might leave its mode goes from event to event, as everything else does.
+they are. A lane that might leave its mode goes from event to event, as everything else does.
 """
 
 from __future__ import annotations

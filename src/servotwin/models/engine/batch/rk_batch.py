@@ -1,6 +1,6 @@
 """How lanes that have to be integrated go through a phase: stride by stride, so many together as there are slots.
 
-A lane that is through makes room for the next one. What a lane does depends on itself alone: it takes the same strides
+A lane that is through makes room for the next one. A lane depends on itself alone: it takes the same strides
 whoever its neighbours are.
 """
 

@@ -3,7 +3,7 @@
 It serves servos that are warm, or carry a pendulum or a spring, under any friction that sticks. Time is what a stride
 goes by; the last one before a standstill goes by the speed instead and so ends exactly there: dq/dw = w/ẇ, dt/dw = 1/ẇ.
 Where static friction fades as a power of the speed it goes by the root of it, by which even that is smooth.
-What ends a law otherwise, a zone of the current or the sign of a share, leaves the acceleration continuous, so that the
+Any other end of a law, a zone of the current or the sign of a share, leaves the acceleration continuous, so that the
 instant is found to enough digits by trying again. Everything here asks the laws of the general engine.
 
 Every loop over the slots is innermost and goes over all of them, busy or not, so that a compiler can run it in vectors.
@@ -82,7 +82,7 @@ class Met(NamedTuple):
 
 
 class Judged(NamedTuple):
-    """What a stride has led to."""
+    """The end of a stride."""
 
     taken: bool  # else it is tried again
     aim: Aim  # the next one, where it is known already
@@ -327,7 +327,7 @@ class Stride(NamedTuple):
 
 
 class Busy(NamedTuple):
-    """Who is in a slot, and in which mode."""
+    """The lane in a slot, and its mode."""
 
     lane: int  # in its tile, or NOBODY
     zone: int

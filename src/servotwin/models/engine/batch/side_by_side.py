@@ -1,7 +1,7 @@
 """Pulse servos side by side: a tile of lanes goes from window to window, each through up to four phases.
 
 A lane that hits a stop, has two decisions waiting or needs too many arcs stays where the window began, and what is
-left of the call is for `runs`. What a lane does never depends on its neighbours.
+left of the call is for `runs`. A lane never depends on its neighbours.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ ONE_FORMULA, BANDS, STRIDES, COILS, GAPS = range(5)
 
 
 class Meter(NamedTuple):
-    """What the chip meets when it measures while a current flows."""
+    """The voltages at the chip when it measures while a current flows."""
 
     V: float
     R_b: float
@@ -113,7 +113,7 @@ class Count(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """What is worked out for one window."""
+    """Arrays of one window."""
 
     window: float
     at_edge: float  # 1: a pulse rises at its beginning
@@ -172,7 +172,7 @@ class Plan(NamedTuple):
 
 
 class More(NamedTuple):
-    """What only few forms change of what a servo remembers, by the names that it has in `Servo`."""
+    """The parts of a servo's state that only few forms change, by the names that it has in `Servo`."""
 
     i: float
     T_w: float
@@ -184,7 +184,7 @@ class More(NamedTuple):
 
 
 class Hung(NamedTuple):
-    """What hangs on the shafts of lanes that read their own numbers."""
+    """Loads on the shafts of lanes that read their own numbers."""
 
     torque: float  # constant, external [N m]
     half_slack: float  # half of the play of the potentiometer

@@ -52,7 +52,7 @@ class Track(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """What shows of a program."""
+    """Signals of a program."""
 
     duty: float  # of the bridge, or `OPEN`, `BRAKED`
     goal: float
@@ -135,7 +135,7 @@ class Mate(NamedTuple):
 
 
 class Shared(NamedTuple):
-    """What servos on one source remember besides what each does; times by the clock of the first of them [s]."""
+    """The common state of servos on one source, besides that of each; times by the clock of the first of them [s]."""
 
     phase: int
     state: int  # what the source does

@@ -65,7 +65,7 @@ def through(told: Any, firms: Any, count: int, shared: Any, seats: Any, mates: A
     """Go on until servos have gone as far as their seats say; return a status, and when since the start.
 
     The first `count` seats are taken, by servos that remember where they stand; seats and `shared` are kept up to date.
-    What they are `told` is found by `told.inputs_at`, what their programs remember in `firms`; they know their next
+    Their inputs in `told` are found by `told.inputs_at`, the states of their programs in `firms`, which have the next
     tick.
     """
     for j in range(count):

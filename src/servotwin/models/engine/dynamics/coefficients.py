@@ -104,7 +104,8 @@ def speed_coefficients(numbers: Numbers, mode: Mode, u: tuple[float, ...], again
     """Return the coefficients of the speed of a motor with inductance, without feedback or spring.
 
     From L di/dt = v − R i − K_b w and J ẇ = K i − b w − τ, where `against` is (value, slope) of all constant and
-    external torque τ, and `u` as in `linear_coefficients`. What friction takes of the torques is a part of K, b and τ.
+    external torque τ, and `u` as in `linear_coefficients`. The share of the torques that friction takes is a part of K,
+    b and τ.
     """
     R, L, K_b = numbers.motor.R, numbers.motor.L, numbers.motor.K_b
     of_motor, of_load = _taken(numbers, mode)

@@ -319,7 +319,7 @@ def _play_guard(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, d
 def _pressing_rate(numbers: Numbers, mode: Mode, u: float, dtau: float, y: Vector, dy: Vector) -> float:
     """Return the rate of `contacts.pressing` where the current has inertia; nan where it has none.
 
-    There it goes with the speed, and one way where that does. What friction that fades adds is left out.
+    There it goes with the speed, and one way where that does. The part of fading friction is left out.
     """
     if not inductive(numbers.motor) or y.w == 0.0:
         return math.nan

@@ -347,7 +347,7 @@ def put_duty(unit: Any, now: float) -> None:
 def settle(units: Any, count: int, common: Any) -> int:
     """Find the modes of servos whose duties are others, and of all that these change; return `LEFT` or not.
 
-    What another voltage of the bus has ended of a mode in which something moves, its guards tell.
+    The guards of a mode in which something moves tell what another voltage of the bus has ended.
     """
     changed = common.jumped != 0
     for k in range(count):
@@ -549,7 +549,7 @@ def doubtful(unit: Any, common: Any, length: float) -> int:
 def _by_torque(unit: Any, x0: float, x: float, bend: float) -> int:
     """Return which may fall of the guards of a share, and of motor and output that press together.
 
-    What drives the current is given, at both ends [V].
+    The voltage that drives the current is given, at both ends [V].
     """
     law, w, after, kinds = unit.law, unit.y.w_m, unit.after.w_m, 0
     heated = (1.0 + law.R_slope * law.conducts * (unit.after.T_w - unit.y.T_w)) / (

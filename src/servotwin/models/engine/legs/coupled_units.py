@@ -86,7 +86,7 @@ class Law(NamedTuple):
 
 
 class Unit(NamedTuple):
-    """A servo; times by its own clock [s]. What legs look at stands first."""
+    """A servo; times by its own clock [s]. Fields that legs look at stand first."""
 
     active: int  # 1: it moves, or gets warm
     kinds: int  # of guards that can end its mode
@@ -130,7 +130,7 @@ class Unit(NamedTuple):
 
 
 class Coupling(NamedTuple):
-    """What servos have in common along a leg."""
+    """The common part of servos along a leg."""
 
     V: float  # of the supply without current
     R_b: float
@@ -218,7 +218,7 @@ def per_torque_of(numbers: Numbers, mode: Mode) -> float:
 
 
 class Line(NamedTuple):
-    """What depends on a motor's torque and on a speed by straight lines: without both, per torque and per speed."""
+    """A value linear in a motor's torque and in a speed: without both, per torque and per speed."""
 
     still: float
     forward: float  # per torque forward

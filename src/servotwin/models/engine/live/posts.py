@@ -135,7 +135,7 @@ class Circuit(NamedTuple):
 
 
 class Told(NamedTuple):
-    """What servos at a bench are told: a table of pieces, one of potentiometers, and edges of pulses [s]."""
+    """Commands of servos at a bench: a table of pieces, one of potentiometers, and edges of pulses [s]."""
 
     commands: Floats  # the first rows are for trains, as many for each servo as there are edges
     curves: Floats
@@ -310,7 +310,7 @@ _NONE = Follow(0.0, 0.0)
 
 
 class Weights(NamedTuple):
-    """What hangs on a shaft at a bench (SI); `torque` pushes towards smaller angles."""
+    """The load on a shaft at a bench (SI); `torque` pushes towards smaller angles."""
 
     inertia: float
     viscous_friction: float

@@ -28,7 +28,7 @@ USED, NEXT, LEFT = 5, 3, 4
 TOO_LONG = -2  # as a status: no steps are left
 COMMANDS = ("command_voltage", "command_angle", "pulse_width")
 COLUMNS = ("time", *Observed._fields, "output_angle", "output_speed", *COMMANDS)
-"""What a row has, before one picks what a servo really shows (SI)."""
+"""Columns of a row, before those of a servo are picked (SI)."""
 WIDTH = len(COLUMNS)
 _ANGLE, _SPEED, _TORQUE = (COLUMNS.index(name) for name in ("motor_angle", "motor_speed", "motor_torque"))
 _OUTPUT = COLUMNS.index("output_angle")
@@ -92,7 +92,7 @@ def first_look(start: float, rate: float) -> int:
 
 
 class Said(NamedTuple):
-    """What shows of a chip or a program, by the names of what it remembers."""
+    """Signals of a chip or a program, by the names of their states."""
 
     drive: float
     error: float
@@ -178,7 +178,7 @@ FIELDS: dict[str, tuple[str, ...]] = {
     "staircase": ("low", "high", "steps", "dwell"),
     "recorded": ("time", "value", "hold"),
 }
-"""What each shape is given by, beside its `unit`."""
+"""Numbers of each shape, beside its `unit`."""
 PERIODS = 1000  # of a step that repeats: then it stays
 _HOLD, _STEP, _SINE, _SWEEP, _STAIRCASE, RECORDED = range(6)
 _TURN = 2.0 * math.pi

@@ -56,7 +56,7 @@ NO_COEFFICIENTS = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Motion(NamedTuple):
-    """What moves, from where, and how."""
+    """The moving part, its start, and its law."""
 
     kind: int
     numbers: Numbers

@@ -93,7 +93,7 @@ class Crept(NamedTuple):
 
 
 class _Course(NamedTuple):
-    """What a shaft creeps by: torques of motor and load on the gear, each as its value at rest and its slope."""
+    """Causes of a shaft's creep: torques of motor and load on the gear, each as its value at rest and its slope."""
 
     way: float  # −1 or +1
     m_0: float  # [N m]
@@ -118,7 +118,7 @@ class _Panel(NamedTuple):
 
 
 class _Line(NamedTuple):
-    """What the nodes of a panel are told by."""
+    """The inputs of a panel's nodes."""
 
     anchor: float
     pull: float
@@ -169,7 +169,7 @@ def longest_step(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) 
 def part_before(numbers: Numbers, mode: Mode, before: Vector, after: Vector) -> float:
     """Return the part of a step by time after which friction begins to fade; 1 where it leads no further.
 
-    What of a step lies beyond would not be seen, and spoils what lies before.
+    The part of a step beyond would not be seen, and spoils what lies before.
     """
     if not fades(numbers.friction) or not slides(geared(numbers, mode)) or creeping(numbers, mode, before):
         return 1.0

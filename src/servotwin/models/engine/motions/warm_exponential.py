@@ -37,7 +37,7 @@ _FIFTH = 4e-13  # error of the rule for e^x over 1, by x^10
 
 
 class Law(NamedTuple):
-    """What a body goes by, at the temperatures of the start."""
+    """The law of a body at the temperatures of the start."""
 
     rate: float  # λ ≥ 0 [1/s]
     per_rate: float  # 1/λ [s]; 0 for λ = 0
@@ -56,7 +56,7 @@ class Law(NamedTuple):
 
 
 class Node(NamedTuple):
-    """What a state adds to the acceleration, beside the law at the start, and the rates of its temperatures."""
+    """The acceleration that a state adds, beside the law at the start, and the rates of its temperatures."""
 
     more: float  # [rad/s²]
     warms: float  # [K/s]

@@ -33,7 +33,7 @@ _APART = 4.0  # times: the fast rate is more than the slow one
 
 
 class Rough(NamedTuple):
-    """What a fading current does to itself by its heat [A/s]: that much of the powers of e = e^(−fast t)."""
+    """The effect of a fading current's heat on itself [A/s]: that much of the powers of e = e^(−fast t)."""
 
     by_t: float  # of t e [A/s²]
     by_0: float  # of 1
@@ -46,7 +46,7 @@ _SMOOTH = Rough(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Law(NamedTuple):
-    """What motor and current go by at the temperatures of the start; rates are 0 of what does not move."""
+    """The law of motor and current at the temperatures of the start; rates are 0 of what does not move."""
 
     slow: float  # [1/s]
     fast: float

@@ -40,7 +40,7 @@ READY, NOT_FINITE, NOT_POSSIBLE, BEFORE = 0, -1, -2, -3  # what a call is answer
 
 
 class Alone(NamedTuple):
-    """What a servo is, its program and its table apart."""
+    """The numbers of a servo, its program and its table apart."""
 
     plant: Numbers
     chip: Chip
@@ -86,7 +86,7 @@ def answer(servo: Alone, command: float, torque: float) -> int:
 def advance(servo: Alone, inputs: Inputs, memories: Memories, until: float, command: float, log: Log) -> int:
     """Go on to a time [s]; return a status, and leave the memory as it was unless that is `READY`.
 
-    What happens is written into the log, as far as that has room for events, and counted.
+    Events are written into the log, as far as that has room for them, and counted.
     """
     memory = memory_at(memories, 0)
     if not until - until == 0.0:

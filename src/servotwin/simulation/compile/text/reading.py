@@ -1,10 +1,10 @@
 """Which numbers of the terms a recipe's kernels do not know, told by which of their functions read them.
 
-What they do not know would be as if it were not there. They know a number that a function of their own reads, which the
-general form has not. Else all functions that read it in the general form have to be among them, and no function of
-their own may read what these read beside it: it would be another form of their law; and it may not belong to a term
-that is left out. Of a number whose term says where it acts, less is asked: they know it where they read it at all, and
-need not where they follow nothing of that.
+Parts of Python unknown to them would be as if they were not there. They know a number that a function of their own
+reads, which the general form has not. Else all functions that read it in the general form have to be among them, and no
+function of their own may read what these read beside it: it would be another form of their law; and it may not belong
+to a term that is left out. Of a number whose term says where it acts, less is asked: they know it where they read it at
+all, and need not where they follow nothing of that.
 """
 
 from __future__ import annotations

@@ -77,7 +77,7 @@ class Values:
 
     @property
     def space(self) -> dict[str, Any]:
-        """What the derived module has besides functions."""
+        """The values of the derived module."""
         space: dict[str, Any] = self.module.derived.space
         return space
 

@@ -48,7 +48,7 @@ MOST = 500_000_000
 
 
 class RefusedError(ServotwinError):
-    """What is wrong, in a line, with bytes that are given back nevertheless."""
+    """An error, in a line, with bytes that are given back nevertheless."""
 
     def __init__(self, line: str, blobs: list[bytes]) -> None:
         super().__init__(line)

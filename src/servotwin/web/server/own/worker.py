@@ -118,7 +118,7 @@ class EndedError(InputError):
 
 
 class WorkError(InputError):
-    """What a piece of work says is wrong, with the bytes that it gives back nevertheless."""
+    """An error of a piece of work, with the bytes that it gives back nevertheless."""
 
     def __init__(self, line: str, blobs: list[bytes]) -> None:
         super().__init__(line)

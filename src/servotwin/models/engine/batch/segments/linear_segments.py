@@ -22,7 +22,7 @@ MOST_ARCS = 100  # in one phase; a servo that needs more is left to the general 
 
 
 class ArcNumbers(NamedTuple):
-    """What the arcs of one servo read."""
+    """Numbers of one servo that its arcs read."""
 
     rate_drive: float  # λ = (b + K K_b/R)/J while driving with current [1/s]
     rate_off: float  # while off with current
@@ -51,7 +51,7 @@ class ArcNumbers(NamedTuple):
 
 
 class Loading(NamedTuple):
-    """What a constant external torque is to the arcs of a servo."""
+    """A constant external torque for the arcs of a servo."""
 
     against: float  # τ_ext/J [rad/s²]
     start_forward: float  # which way a shaft at rest starts while driven forward: −1, 0, +1
