@@ -247,7 +247,7 @@ _DELAYS = (0.0, 0.02, 0.04, 0.06, 0.09, 0.13, 0.2, 0.3)  # s, of the starts
 _LAGS = (0.01, 0.04, 0.15)  # s
 _SLEWS = (0.7, 1.0, 1.4)  # of what the logs show
 _STARTS, _MOST = 4, 60  # searches, steps of each
-_ROUGHLY, _CLOSELY = 1e-2, 3e-6  # of the cost: less is an end, of several starts and of the best
+_ROUGHLY, _CLOSELY = 1e-3, 3e-6  # of the cost: less is an end, of several starts and of the best
 
 
 def fit_slew_lag(logs: Sequence[Log], *, loss: Loss = "linear", loss_scale: float | None = None) -> SlewLag:
@@ -369,8 +369,8 @@ class _Fitted:
         from scipy.optimize import least_squares
 
         inside = [np.clip(start, self.lower + 1e-9, self.upper - 1e-9) for start in starts]
-        ends = [least_squares(self.residual, start, self.slopes, (self.lower, self.upper), x_scale="jac", loss=loss,
-                              f_scale=scale, ftol=gain, max_nfev=_MOST) for start in inside]
+        ends = [least_squares(self.residual, start, self.slopes, (self.lower, self.upper), loss=loss, f_scale=scale,
+                              ftol=gain, max_nfev=_MOST) for start in inside]
         best: Array = min(ends, key=lambda end: float(end.cost)).x
         return best
 
