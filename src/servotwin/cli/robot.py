@@ -143,7 +143,7 @@ def fit(
     names = [*(f"{stem}.toml" for stem in stems.values()), SUMMARY, ERRORS,
              *files.joint_pages(WINDOWS, len(stems)), PAGE]
     result = files.carried_out(fitted, out, names, force=ending.force, as_json=ending.as_json, inputs=[logs])
-    end_if_stopped(result.source, timed=within is not None)
+    end_if_stopped(result.fit, timed=within is not None)
 
 
 def _fit_result(found: ArmFit, told: dict[str, Any], stems: dict[str, str]) -> RobotResult:
@@ -165,7 +165,7 @@ def _fit_result(found: ArmFit, told: dict[str, Any], stems: dict[str, str]) -> R
                 PAGE: text_of(lambda: arm_page(found, pictures))}
 
     return RobotResult(
-        facts=told, title=f"{told['robot']}: {told['sentence']}", writers=writers, source=found, lines=lambda more: [
+        facts=told, title=f"{told['robot']}: {told['sentence']}", writers=writers, fit=found, lines=lambda more: [
             *(f"! {cause.sentence}" for cause in found.causes), "", "simulated less measured, rms (deg)",
             table(*error_rows(found)), "",
             table(("number", "value", f"{100 * found.level:g} % interval", "known"), estimate_rows(found)), "",
@@ -263,7 +263,7 @@ def run(
         found = facts(done, sized, model_file)
         return files.RobotResult(
             facts=found, title=f"{found['robot']} follows {done.motion.source}, {done.motion.duration:.4g} s",
-            lines=lambda more: _lines(done, sized, found, more), source=done,
+            lines=lambda more: _lines(done, sized, found, more),
             writers=lambda: files.run_writers(done, sized, names, found, output_step),
             draw=lambda places: files.draw_run(places, done, camera, rate))
 
@@ -290,13 +290,13 @@ def _lines(done: RobotRun, sized: dict[str, Sizing], found: dict[str, Any],
             table(HEAD, [row(done, each) for each in sized.values()]), "", "are the servos big enough?",
             pairs([(joint, each.verdict) for joint, each in sized.items()]), "",
             pairs([*([("assumed", f"thermal numbers by mass: {', '.join(assumed)}")] if assumed else []),
-                *([("not known", f"temperatures, for neither thermal numbers nor a mass are given: "
-                    f"{', '.join(unknown)}")] if unknown else []),
-                *([("off the measured joints", ", ".join(
-                    f"{joint} {place(done.measured_error(joint), done.slides(joint))}" for joint in done.mounts
-                    if joint in done.motion.measured) + ", rms")] if done.motion.measured else []),
-                *(("note", text) for text in found["notes"][:_MOST_NOTES]),
-                *more])]
+                   *([("not known", f"temperatures, for neither thermal numbers nor a mass are given: "
+                       f"{', '.join(unknown)}")] if unknown else []),
+                   *([("off the measured joints", ", ".join(
+                       f"{joint} {place(done.measured_error(joint), done.slides(joint))}" for joint in done.mounts
+                       if joint in done.motion.measured) + ", rms")] if done.motion.measured else []),
+                   *(("note", text) for text in found["notes"][:_MOST_NOTES]),
+                   *more])]
 
 
 add_to(robot)

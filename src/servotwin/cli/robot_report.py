@@ -180,8 +180,8 @@ class RobotResult:
         Returns what writes the files, by their names.
     draw : callable, optional
         Writes what takes longest, as of `write_files`.
-    source : object
-        What was simulated, compared or fitted.
+    fit : ArmFit, optional
+        Of a command that fits.
     """
 
     facts: dict[str, Any]
@@ -189,7 +189,7 @@ class RobotResult:
     lines: Callable[[Sequence[tuple[str, str]]], Iterable[RenderableType]]
     writers: Callable[[], Writers]
     draw: Callable[[Mapping[str, Path]], object] | None = None
-    source: Any = None
+    fit: Any = None
 
 
 def carried_out(work: Callable[[], RobotResult], out: Path | None, names: Sequence[str], *, force: bool,
@@ -277,7 +277,7 @@ def run_writers(run: RobotRun, sized: Mapping[str, Sizing], names: Sequence[str]
 
 
 def every(time: NDArray[np.float64], step: float) -> int:
-    """Return which rows of evenly spaced times [s] a table with a step [s] has: each so many-th."""
+    """Return every how many-th of evenly spaced times, shape (n,) [s], is a row of a table with a step [s]."""
     return max(round(step / float(time[1] - time[0])), 1)
 
 

@@ -180,7 +180,7 @@ def mobile_result(run: WaypointRun, found: dict[str, Any], names: Sequence[str],
 
     return files.RobotResult(facts=found, title=f"mobile: {len(run.waypoints)} waypoints", writers=writers,
                              lines=lambda more: [pairs([*mobile_pairs(found), *more])],
-                             draw=lambda places: _draw(places, run), source=run)
+                             draw=lambda places: _draw(places, run))
 
 
 def _path_table(run: WaypointRun, step: float) -> str:

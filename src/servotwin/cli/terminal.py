@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType
 
     from servotwin.datasheet.holding import Span
-    from servotwin.look.reports import Part, Report
+    from servotwin.look.reports import Report, Table
 
 
 # --- Tables and texts as lines of a terminal of any width -------------------------------------------------------------
@@ -340,11 +340,9 @@ def show_report(head: str, report: Report, *more: RenderableType) -> None:
     show(*parts, *more)
 
 
-def renderable(part: Part) -> RenderableType:
-    """Return a table or a text of a report as the terminal shows it; nothing of what only a page shows."""
-    from servotwin.look.reports import Table
-
-    return table(part.head, part.rows) if isinstance(part, Table) else part if isinstance(part, str) else ""
+def renderable(part: Table | str) -> RenderableType:
+    """Return a table or a text of a report as the terminal shows it."""
+    return part if isinstance(part, str) else table(part.head, part.rows)
 
 
 @contextlib.contextmanager

@@ -151,7 +151,7 @@ class PredictiveControl:
         angle = smoothed(state.angle, float(measured["output_angle"]), g, T)
         voltage = held(state.voltage, state.last, g, T)
         d = disturbance(self.inverse, angle, voltage, g)
-        servo = self.inverse
+        servo = self.inverse  # q̈ of the model [rad/s²] brings the filtered speed up to now
         acceleration = float(((voltage.value - d) / servo.volts_per_torque - servo.damping * angle.rate)
                              / servo.total_inertia)
         now = np.array([angle.last, angle.rate + 2.0 / g * acceleration])

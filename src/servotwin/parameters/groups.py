@@ -61,7 +61,7 @@ class Relation(NamedTuple):
         lane = None
         if any(isinstance(x, np.ndarray) for x in (self.holds, self.got)):
             lane = int(np.argmin(self.holds))  # 0 where what does not hold is the same in all lanes
-        got, bound = ((x[lane].item() if isinstance(x, np.ndarray) else x) for x in (self.got, self.bound))
+        got, bound = (x[lane].item() if isinstance(x, np.ndarray) else x for x in (self.got, self.bound))
         raise ParameterError(self.what if lane is None else f"{self.what} of lane {lane}", got=got,
                              allowed=self.allowed if bound is None else f"{self.allowed} = {bound!r}")
 

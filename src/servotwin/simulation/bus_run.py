@@ -273,9 +273,10 @@ def _lanes_of(plans: Sequence[Plan]) -> Lanes:
     regular = np.array([plan.edges is None for plan in plans])
     first, count = _places(pieces)
     edge_first, edge_count = _places(edges)
+    seeds = [(plan.seed + 2**63) % 2**64 - 2**63 for plan in plans]  # the noise takes the lowest 64 bits alone
     return Lanes(_tiles_of(Numbers, [plan.numbers for plan in plans]), _tiles_of(Chip, [plan.chip for plan in plans]),
                  np.zeros((7, len(plans))), np.array([plan.external_torque for plan in plans]),
-                 np.array([((plan.seed + 2**63) % 2**64 - 2**63) for plan in plans]), np.concatenate(pieces), first,
+                 np.array(seeds), np.concatenate(pieces), first,
                  count, np.concatenate(edges), edge_first, np.where(regular, -1, edge_count), plans[0].accuracy,
                  _programs_of(plans))
 

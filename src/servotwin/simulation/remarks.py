@@ -188,7 +188,7 @@ def drive_words(rate: float, duty: float, current: float) -> str:
     ('drives 50 times a second, duty 2.1 %, 0.031 A in the mean', 'drives all the time, duty 25 %, 0.310 A in the mean')
     """
     often = f"{rate:.3g} times a second" if rate > 0.0 else "all the time"
-    percent = f"{100.0 * duty:.2g}" if duty < 0.995 else f"{100.0 * duty:.0f}"
+    percent = f"{100.0 * duty:.2g}" if duty < 0.995 else f"{100.0 * duty:.0f}"  # not 1e+02
     return f"drives {often}, duty {percent} %, {current:.3f} A in the mean"
 
 

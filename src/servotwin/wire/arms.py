@@ -197,7 +197,6 @@ def _read(path: Path) -> _Arm:
         servos[id] = one["servo"]
         joints[id] = checked_name(f"{path}: joint of servo {id}", str(one.get("joint", "")))
         value = one.get("angle_deg", 0.0)
-        import math
         if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= 36000.0:
             raise InputError(f"{path}: angle_deg", got=value, allowed="a number of degrees")
         angles[id] = math.radians(value)

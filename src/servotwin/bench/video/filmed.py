@@ -430,8 +430,9 @@ def fit_plane(corners: NDArray[np.float64]) -> Plane:
         small = cost - new < _PLANE_SMALL * cost
         size = np.sqrt(np.mean(error**2, axis=1))
         usual = float(np.median(size))
-        weight = np.asarray(np.minimum(1.0, _HUBER * usual / np.maximum(size, 1e-300))) if usual > 0.0 else np.ones(
-            len(size))
+        weight = np.ones(len(size))
+        if usual > 0.0:
+            weight = np.asarray(np.minimum(1.0, _HUBER * usual / np.maximum(size, 1e-300)))
         cost = _cost(error, weight)
         if small:
             break

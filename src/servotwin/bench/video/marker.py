@@ -108,6 +108,8 @@ class Lights:
         """
         seen = np.array(self._seen)
         stay = max(2, min(round(_STAY / float(np.median(np.diff(time)))), (len(time) - 2) // 2))
+        # By how much blocks are brighter after a picture than before it, shape (n - 2 stay, rows, columns): picture
+        # k + stay itself is in neither, for the light may go on while it is taken
         sums = np.concatenate([np.zeros((1, *seen.shape[1:]), np.float32), np.cumsum(seen, axis=0, dtype=np.float32)])
         mean = (sums[stay:] - sums[:-stay]) / stay  # of pictures k to k + stay - 1
         steps = np.asarray(mean[stay + 1:] - mean[:-stay - 1])

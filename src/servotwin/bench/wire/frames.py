@@ -338,7 +338,7 @@ class Splitter:
                     self._last = frame.sequence
                     found.append(frame)
         whole = _HEAD.size + int(protocol().numbers["longest_payload"]) + _CRC.size
-        if len(self._rest) > (whole + whole // _BLOCK + 1):
+        if len(self._rest) > whole + whole // _BLOCK + 1:  # the most bytes of a stuffed frame
             self.bad += not self._overlong
             self._rest, self._overlong = b"", True
         return found

@@ -152,8 +152,8 @@ def with_criterion(rungs: Sequence[Rung]) -> list[Rung]:
     """
     least = min(rungs, key=lambda rung: rung.training)
     fitted = [trace for trace in least.fit.traces if not trace.held_out]
-    memory = widening([LogPart(residual, residual, residual) for residual in [trace.residual for trace in fitted]],
-                      Loss())
+    # So many residuals stand for one that is independent, if each follows the one before it
+    memory = widening([LogPart(trace.residual, trace.residual, trace.residual) for trace in fitted], Loss())
     samples = sum(len(trace.time) for trace in fitted) / memory
     return [replace(rung, criterion=samples * math.log(max(rung.training, 1e-300) ** 2)
                     + len(rung.fit.names) * math.log(max(samples, 1.0))) for rung in rungs]

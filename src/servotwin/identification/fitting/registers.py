@@ -27,7 +27,7 @@ from servotwin.identification.fitting.search.case import (
     with_loop_gain,
 )
 from servotwin.identification.fitting.search.forecast import Forecast
-from servotwin.identification.fitting.search.free import Space
+from servotwin.identification.fitting.search.free import ANY_PARAMETER, Space
 from servotwin.identification.fitting.search.stopping import Within
 from servotwin.logs.bam_logs import writes_gain
 from servotwin.logs.log import Log
@@ -409,8 +409,7 @@ class _LogBench(Bench):
                 copies.append(replace(log, name=f"{log.name} {k}", parameters={**log.parameters, **own, **said}))
         model = self.kind(base)
         taken = {name for log in copies for name in log.parameters}
-        unused = next(name for name in ("motor.armature_resistance", "motor.rotor_inertia", "motor.torque_constant",
-                                        "gear.gear_reduction") if name not in taken)
+        unused = next(name for name in ANY_PARAMETER if name not in taken)
         forecast = Forecast(copies, model, Space(model, [unused]), ("initial_state", "log_delay"), ("output_angle",))
         forecast.strict, forecast.nearly = False, forecast.bent
         n = len(self.logs)

@@ -38,7 +38,7 @@ from servotwin.identification.fitting.search.case import (
 )
 from servotwin.identification.fitting.search.clocks import first_offset
 from servotwin.identification.fitting.search.forecast import Forecast, Running
-from servotwin.identification.fitting.search.free import Space
+from servotwin.identification.fitting.search.free import ANY_PARAMETER, Space
 from servotwin.identification.fitting.search.least_squares import Begin, Loss, Prior, scatter_of
 from servotwin.identification.fitting.search.task import Task
 from servotwin.identification.fitting.traces import ErrorTable, Trace
@@ -192,7 +192,6 @@ Array = NDArray[np.float64]
 Progress = bool | Callable[[float, str], object]
 _FINE = 1e-3  # rad, of an error: of less nobody asks
 _FAR_LESS = 0.5  # of an error: what is said
-_ANY = ("motor.armature_resistance", "motor.rotor_inertia", "motor.torque_constant", "gear.gear_reduction")
 
 
 def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] | None = None, *,
@@ -360,7 +359,7 @@ def _space(model: Model, logs: Sequence[Log]) -> Space:
     """Return searched numbers that all stay: those of the load that the fit found, or any one."""
     load = {name: value for name, value in _recorded(model.servo, "load").items() if name in LOAD_NAMES}
     taken = {name for log in logs for name in log.parameters}
-    free = list(load) or [next(name for name in _ANY if name not in taken)]
+    free = list(load) or [next(name for name in ANY_PARAMETER if name not in taken)]
     return Space(model, free, load=load)
 
 

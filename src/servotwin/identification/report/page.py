@@ -75,7 +75,7 @@ def _yielded(fit: Fit) -> list[Part]:
     return [Table(head, rows, words, kind="names")] if rows else []
 
 
-def causes(fit: Fit) -> list[Part]:
+def causes(fit: Fit) -> list[Table]:
     """Return the candidates that explain a bad verdict, the best first; nothing without any."""
     if fit.verdict is None or not fit.verdict.causes:
         return []

@@ -476,7 +476,7 @@ def _notes(made: _Made, found: tuple[Contradiction, ...]) -> str:
     if not m.current_from_sheet:
         said.append("The sheet gives no running current: resistance, torque constant and friction are uncertain.")
     if found:
-        said.append("The sheet contradicts itself: " + " ".join((one.text[:1].upper() + one.text[1:]) for one in found))
+        said.append("The sheet contradicts itself: " + " ".join(one.text[:1].upper() + one.text[1:] for one in found))
         said.append("This servo was made of it all the same; it cannot have all that the sheet says.")
     if not made.load_friction:
         said.append("Gear losses that grow with the load are left out: it stalls at more than the sheet's torque.")

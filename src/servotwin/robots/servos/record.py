@@ -288,8 +288,7 @@ class Record(Mapping[str, ServoRecord]):
         self.cause = ""
         width, first = len(_COLUMNS), len(ROW)
         parts = [rows[:, first + width * k:first + width * (k + 1)] for k in range(len(joints))]
-        changes = [np.flatnonzero(np.diff(command)) for command in [part[:, _COLUMNS.index("command_angle")]
-                                                                    for part in parts]]
+        changes = [np.flatnonzero(np.diff(part[:, _COLUMNS.index("command_angle")])) for part in parts]
         last = max((int(one[-1]) + 1 for one in changes if one.size), default=0)
         still = float(self.time[last]) if len(self.time) else 0.0
         self._servos = {name: ServoRecord(self.time, mounts[name], part, still)

@@ -50,7 +50,10 @@ LATER = 1e-5  # s, for the time derivative of signals that are no angles
 
 
 def robust_deviation(values: NDArray[np.float64]) -> float:
-    """Return the standard deviation of the normal law whose magnitudes have the median of these (Hampel 1974)."""
+    """Return the standard deviation of the normal law whose magnitudes have the median of these, in their unit.
+
+    That is 1.4826 times it (Hampel, JASA 69, 1974); `values` have any shape.
+    """
     return NORMAL * float(np.median(np.abs(values)))
 
 

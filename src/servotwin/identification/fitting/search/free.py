@@ -51,6 +51,8 @@ JUMPS = (  # what acts by jumps, where no search finds its way
 Array = NDArray[np.float64]
 Bounds = Mapping[str, tuple[float, float]]
 Priors = Mapping[str, tuple[float, float]]
+ANY_PARAMETER = ("motor.armature_resistance", "motor.rotor_inertia", "motor.torque_constant", "gear.gear_reduction")
+"""One of these is in the space, and stays, where nothing is searched: no log sets all of them."""
 LUMPED: dict[str, tuple[tuple[str, ...], int, str]] = {  # name -> members, power of N that leads to the motor, unit
     name: (OUTPUT_SIDE[name].members, OUTPUT_SIDE[name].power, si_unit(OUTPUT_SIDE[name].dimension))
     for name in ("output_torque_constant", "output_inertia", "output_coulomb_torque")

@@ -267,14 +267,25 @@ def together(forecast: Forecast, cases: Sequence[int], searches: Sequence[Genera
 
 
 def staying(x: Array, g: Array, lower: Array, upper: Array, held: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which numbers are held, or at a bound over which the cost falls."""
+    """Return which numbers x, shape (p,), are held, or at a bound over which the cost with the gradient g falls."""
     return np.asarray(held | ((x <= lower) & (g > 0.0)) | ((x >= upper) & (g < 0.0)))
 
 
 def bounded_step(x: Array, g: Array, H: Array, lower: Array, upper: Array, held: NDArray[np.bool_]) -> Array:
-    """Return the change of numbers x that solves H·change = −g; a number that would cross its bound goes to it.
+    """Return the change of numbers that solves H·change = −g; a number that would cross its bound goes to it.
 
-    The others are solved for again then. H may be singular.
+    The others are solved for again then. All are on the scale of the search, which has no unit.
+
+    Parameters
+    ----------
+    x, lower, upper : ndarray, shape (p,)
+        The numbers, and their bounds.
+    g : ndarray, shape (p,)
+        Gradient of the cost.
+    H : ndarray, shape (p, p)
+        Damped matrix of the normal equations; it may be singular.
+    held : ndarray of bool, shape (p,)
+        Numbers that stay.
     """
     stays, change = staying(x, g, lower, upper, held), np.zeros(len(x))
     for _ in range(len(x) + 1):

@@ -252,6 +252,7 @@ def beat_of(time: Array) -> Beat | None:
         on = ~off
     if scale > _STEADY or off.mean() > _MOST_OFF or not on[[0, -1]].any():
         return None
+    # The local beat drifts, so whole numbers of beats come from step to step
     rough = np.concatenate([[0], np.cumsum(np.round(np.diff(time / period - slip)))]).astype(np.int64)
     off[[k + int(abs(slip[k + 1]) > abs(slip[k])) for k in np.flatnonzero(np.diff(rough) < 1)]] = True
     number = _numbered(rough, off)
