@@ -1,11 +1,13 @@
 """Outputs are checked before anything is computed, and are written whole or not at all."""
 
+import json
 from pathlib import Path
 
 import pytest
 
 from servotwin import plotting, simulation
 from servotwin.cli.output_files import Target, check_targets, staged, text_of, write_files
+from servotwin.cli.robot_report import RobotResult, carried_out
 from servotwin.errors import OutputError, OutputExistsError
 
 STEP = ["--step", "0:90"]
@@ -152,3 +154,36 @@ def test_a_file_that_came_after_the_check_is_not_replaced(tmp_path):
     assert [path.read_text() for path in sorted(tmp_path.iterdir())] == ["old"]
     write_files(targets, writers, force=True)
     assert [path.read_text() for path in sorted(tmp_path.iterdir())] == ["new", "new"]
+
+
+def test_commands_of_robots_check_their_files_before_the_work(tmp_path, capsys):
+    out, motion, done = tmp_path / "out", tmp_path / "out" / "motion.csv", []
+
+    def work():
+        done.append(1)
+        return RobotResult(facts={"robot": "arm"}, title="an arm", lines=lambda more: [f"{name} {text}" for name, text
+                                                                                        in more],
+                           writers=lambda: {name: text_of(name) for name in ("motion.csv", "page.html")})
+
+    def carry(**how):
+        return carried_out(work, out, ["motion.csv", "page.html"], **{"force": False, "as_json": False, **how})
+
+    assert carry().facts["files"] == [str(motion), str(out / "page.html")]
+    assert capsys.readouterr().out.splitlines() == ["an arm", f"written {out / 'page.html'}"]
+    with pytest.raises(OutputExistsError):
+        carry()
+    with pytest.raises(OutputError, match="is the same file as the input"):
+        carry(force=True, inputs=[motion])
+    assert done == [1]
+    carry(force=True, as_json=True)
+    assert json.loads(capsys.readouterr().out)["files"][-1] == str(out / "page.html")
+    assert carried_out(work, None, ["motion.csv"], force=False, as_json=False).facts["files"] == []
+
+
+def test_a_robot_that_fails_leaves_no_folder(tmp_path):
+    def fail():
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        carried_out(fail, tmp_path / "out", ["page.html"], force=False, as_json=False)
+    assert list(tmp_path.iterdir()) == []

@@ -242,3 +242,19 @@ def test_other_bad_input_is_refused(more, words):
 def test_bounds_below_the_least_reduction_are_refused():
     with pytest.raises(InputError, match=r"gear\.gear_reduction"):
         space(["gear.gear_reduction"], bounds={"gear.gear_reduction": (0.1, 0.5)})
+
+
+# ------------------------------------------------------------------------------------------ of another model
+
+def test_a_changed_space_keeps_bounds_priors_and_load():
+    bounds, priors = {BOTH[0]: (1.0, 9.0)}, {BOTH[0]: (3.0, 0.3), BOTH[1]: (0.1, 0.02)}
+    old = space([*BOTH, "load.inertia"], bounds=bounds, priors=priors, load={"load.inertia": 2e-3})
+    new = old.changed(MODEL, [*BOTH, "load.inertia", "motor.rotor_inertia"])
+    for name in (*BOTH, "load.inertia"):
+        assert new.parameters[new.names.index(name)] == old.parameters[old.names.index(name)]
+    assert new.parameters[-1].prior is None
+    fewer = old.changed(MODEL, [*BOTH, "load.inertia"], believed=[BOTH[1]])
+    assert [p.prior for p in fewer.parameters] == [None, priors[BOTH[1]], None]
+    assert (fewer.parameters[0].lower, fewer.parameters[0].upper) == bounds[BOTH[0]]
+    moved = old.changed(MODEL, ["load.inertia"], at=np.array([p.scaled(2.0 * p.start) for p in old.parameters]))
+    assert moved.parameters[0].start == pytest.approx(4e-3, rel=1e-12)

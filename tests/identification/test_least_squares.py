@@ -16,6 +16,7 @@ from servotwin.identification.fitting.search.least_squares import (
     Prior,
     Search,
     block,
+    bounded_step,
     together,
 )
 
@@ -300,3 +301,31 @@ def test_among_kinks_no_step_is_tried_that_promises_less_than_one_of_them():
         assert found.point.shared == pytest.approx(here)
         calls[step] = toy.calls
     assert calls[300.0 * STEP] < calls[STEP] - 3
+
+
+@pytest.mark.parametrize("limit", [math.inf, 1.0])
+def test_a_linear_step_ends_where_the_cost_with_its_ridge_is_flat(limit):
+    """The gradient of the loss and of the ridge together is 0 there, whatever counts how much."""
+    rng = np.random.default_rng(3)
+    slopes, ridge = rng.normal(size=(40, 3)), np.array([0.0, 4.0, 50.0])
+    residual = rng.normal(size=40) + 30.0 * (rng.random(40) < 0.2)
+    loss = Loss(limit)
+    step, cost = loss.linear_step(residual, slopes, ridge, rounds=200)
+    left = residual + slopes @ step
+    np.testing.assert_allclose(slopes.T @ np.clip(left, -limit, limit) + ridge * step, 0.0, atol=1e-8)
+    assert cost == loss.cost(left)
+
+
+def test_a_bounded_step_solves_for_the_others():
+    """A held number stays, one that would cross goes to its bound; for the others H·change is -g."""
+    rng = np.random.default_rng(5)
+    for _ in range(50):
+        A, g, x = rng.normal(size=(7, 5)), rng.normal(size=5), rng.uniform(-1.0, 1.0, 5)
+        H, held = A.T @ A, rng.random(5) < 0.2
+        lower, upper = np.full(5, -1.0), np.full(5, 1.0)
+        change = bounded_step(x, g, H, lower, upper, held)
+        there = x + change
+        at_bound = (np.abs(there - lower) < 1e-12) | (np.abs(there - upper) < 1e-12)
+        assert not change[held].any()
+        assert np.all((there >= lower - 1e-12) & (there <= upper + 1e-12))
+        np.testing.assert_allclose((H @ change + g)[~held & ~at_bound], 0.0, atol=1e-9)

@@ -217,6 +217,21 @@ def test_error_rows_are_those_of_the_tables(fit):
     assert rows[0].errors == fit.holdout.by()["step"]
 
 
+def test_tables_of_errors_say_all_and_begin_with_the_worst_log(fit):
+    tables = tables_of(fit)
+    drawn = report.errors(tables, fit.traces, "motion").rows
+    assert [row[:2] for row in drawn[-2:]] == [("all", "held out"), ("all", "fitted")]
+    assert [float(row[2]) for row in drawn[-2:]] == pytest.approx(
+        [np.degrees(tables[row[1]].total()["BoundedServo"]) for row in drawn[-2:]], rel=5e-3)
+    logs = report.logs(tables, fit.traces)
+    errors = [float(row[logs.head.index("rms error")].split()[0]) for row in logs.rows]
+    assert errors == sorted(errors, reverse=True)
+    assert len(errors) == len(fit.traces)
+    alone = report.logs({"": tables["fitted"]}, fit.traces, 2)
+    assert (alone.head[0], len(alone.rows)) == ("log (2 worst of 3)", 2)
+    assert "part" not in alone.head
+
+
 def test_a_gap_in_time_breaks_the_line(fit):
     trace = fit.traces[0]
     keep = (trace.time < 0.2) | (trace.time > 0.4)
