@@ -49,7 +49,7 @@ class InputError(ServotwinError, ValueError):
     got : object, optional
         The value that was given.
     allowed : str, optional
-        What would have been accepted.
+        Values that would have been accepted.
 
     Examples
     --------
@@ -112,11 +112,11 @@ class UnknownNameError(InputError, KeyError):
     Parameters
     ----------
     kind, name : str
-        What it should be, and what it is.
+        Kind of name that it should be, and the name that it is.
     known : iterable of str
         All that it may be.
     allowed : str, optional
-        What to say instead of listing them all.
+        Text in place of a list of them all.
     meant : str, optional
         The one of them that people call so.
 

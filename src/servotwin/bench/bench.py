@@ -152,7 +152,7 @@ class TableRow:
     reading : Reading
         The mean of both; ADC_o is that of the mean V_o.
     from_below, from_above : Reading
-        What the display shows after either approach.
+        Displayed values after either approach.
     target_angle, target_voltage : float
         Angle [rad] and feedback voltage [V] without error, the middle of the deadband.
     standing_band : float
@@ -196,7 +196,7 @@ class BenchRun:
     command : Signal
         The command voltage that was given.
     counts : tuple of int
-        What the converter at the command read, once a frame.
+        Readings of the converter at the command, one a frame.
     pulses : Signal
         The pulses that the generator made of it.
     result : Result
@@ -228,7 +228,7 @@ class Bench:
         A servo that takes pulses. Its parameters are used as they are: `bench_servo` gives a servo file the frame
         of the bench.
     load : Load, optional
-        What hangs on the shaft; nothing unless given.
+        Load on the shaft; none unless given.
     input_converter, feedback_converter : Converter
         At the command and at the potentiometer.
     generator : PulseGenerator, optional

@@ -111,7 +111,7 @@ def run_on_one_supply(bench: Bench, command: Signal, duration: float, control: C
     bench : Bench
         Its model needs a supply (`PulseServo`); how soft that is, is `supply.internal_resistance`.
     command : Signal
-        What the command voltage is while the supply has lost nothing; the first pulse, from t = 0 on, is made of
+        Command voltage while the supply has lost nothing; the first pulse, from t = 0 on, is made of
         `command.initial`, with a servo that draws nothing yet.
     duration : float
         Positive [s].

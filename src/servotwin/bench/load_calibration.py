@@ -592,9 +592,9 @@ class LoadCalibration:
     figures : tuple of LoadFigure
         No-load current and speed, torque per current, stall torque, sag per torque and so on, with intervals.
     shares : tuple of SheetShare
-        What is measured over what the servo's sheet prints.
+        Measured figures over those that the servo's sheet prints.
     parameters : mapping of str to Quantity
-        What follows for the servo, by dotted name, in SI; `std` is one standard error.
+        Numbers of the servo that follow, by dotted name, in SI; `std` is one standard error.
     servo : Servo
         The given one with `parameters` in place; an empty one where none was given.
     words : tuple of str

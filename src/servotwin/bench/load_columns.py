@@ -509,7 +509,7 @@ def lifts(pattern: str | Path, *, columns: str | Mapping[str, str] | None = None
     pattern : str or Path
         With the weight in the file's name: `lift{mass:g}.txt`, or `{load:N}`, `{torque:N m}`.
     columns : str or mapping, optional
-        What the columns are, as of `read_logs`: ``"time=1:ms angle=2:deg current=3:A"``; names in a header are known.
+        Meaning of columns, as of `read_logs`: ``"time=1:ms angle=2:deg current=3:A"``; names in a header are known.
     arm : float, optional
         On which the weights hung, or the radius of the drum [m].
 

@@ -58,7 +58,7 @@ def standing(result: Result, start: float, end: float | None = None, *, least: f
     start, end : float
         [s]; to the end of the run unless given.
     least : float, optional
-        What counts as a swing, positive; a quarter of the largest way there and back, but not less than 0.05°,
+        Least swing that counts, positive; a quarter of the largest way there and back, but not less than 0.05°,
         unless given [rad].
 
     Raises

@@ -188,7 +188,7 @@ class BenchTable:
     source : str
         Where it was read.
     columns : tuple of TableColumn
-        What each one says is known, by its name.
+        Columns whose names are known.
     others : tuple of TableColumn
         Numbers under an unknown name.
     ignored : tuple of str
@@ -688,8 +688,8 @@ def table_fits(table: BenchTable | Mapping[str, ArrayLike]) -> dict[str, TableFi
     Parameters
     ----------
     table : BenchTable or mapping
-        What `bench_table` gives, or takes. The paper's Table II has q(V_i), q(t_a), V_o(q), V_o(V_i), V_o(t_a),
-        t_a(V_i), ADC_i(V_i) and ADC_o(V_o).
+        Table of `bench_table`, or the mapping that it takes. The paper's Table II has q(V_i), q(t_a), V_o(q), V_o(V_i),
+        V_o(t_a), t_a(V_i), ADC_i(V_i) and ADC_o(V_o).
 
     Raises
     ------

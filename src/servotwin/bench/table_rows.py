@@ -74,7 +74,7 @@ class InstrumentPair:
     without : int or None
         The row, from 0, that is left out here, where only without it the two read one thing.
     restored : tuple of float
-        What the first column would be by the counts of the second, where they disagree.
+        Values of the first column by the counts of the second, where they disagree.
     """
 
     first: str
@@ -348,7 +348,7 @@ class RowFinding:
     row : int
         From 0.
     label : str
-        What to call it.
+        Name of the row in messages.
     line : str
         Name of the line on which it is farthest off.
     residual : float
@@ -634,13 +634,13 @@ class TableCalibration:
     lines : mapping of str to TableFit
         Every straight line that the columns allow, in °, µs, V and counts, by name such as ``"V_o(q)"``.
     parameters : mapping of str to Quantity
-        What follows for the servo, by dotted name, in SI; `std` is one standard error.
+        Numbers of the servo that follow, by dotted name, in SI; `std` is one standard error.
     instruments : tuple of InstrumentPair
         Columns that read one thing, and whether they agree.
     rows : tuple of RowFinding
         Rows that fit badly, or would fit with a step more of the generator.
     remarks : tuple of str
-        What else is to be known.
+        Further remarks on the table.
     servo : Servo
         The given one with `parameters` in place; one that holds nothing else where none was given.
     """

@@ -186,7 +186,7 @@ def rows(part: VoltageSheet, others: Sequence[PrintedPoint], torque: float | Non
     ----------
     part : VoltageSheet
     others : sequence of PrintedPoint
-        What the sheet prints at any voltage: shown, without a difference, where it prints nothing at this one.
+        Printed points at any voltage: shown, without a difference, where the sheet prints nothing at this one.
     torque : float, optional
         A load whose point on the curves is shown as well [N m].
     """

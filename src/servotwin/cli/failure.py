@@ -27,7 +27,7 @@ class Failure:
     kind : str
         Name of the error.
     data : dict
-        What the error carries: what, got, allowed.
+        Fields of the error: what, got, allowed.
     """
 
     message: str

@@ -201,7 +201,7 @@ def calibrate_from(path: Path, servo: str | None, out: Path | None, *, change: S
     arm : str or None
         On which weights hung, or the radius of the drum, such as "1cm".
     columns : sequence of str
-        What the columns of records are.
+        Meaning of the columns of records.
     force : bool
         Replace it where it exists.
     as_json : bool

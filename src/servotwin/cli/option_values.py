@@ -27,15 +27,15 @@ def numbers(what: str, text: str, names: tuple[str, ...], *, required: int | Non
     Parameters
     ----------
     what : str
-        What to call it in an error.
+        Name of the quantity in an error.
     text : str
         Numbers, with colons between them.
     names : tuple of str
-        What each number is.
+        Name of each number.
     required : int, optional
         How many must be there; all unless given.
     alone : str
-        What is allowed where several numbers are asked for, such as where their unit is said.
+        Text that is allowed where several numbers are asked for, such as where their unit is said.
 
     Raises
     ------
@@ -252,7 +252,7 @@ def load_from(words: Sequence[str], model: Model | None = None) -> Load:
     words : sequence of str
         Such as ``"inertia=1e-3,torque=0.5kgf.cm"``; numbers without unit in SI, angles in degrees.
     model : Model, optional
-        What carries it: where the arm of ``"arm=0.5kg:10cm"`` is horizontal is the middle of its travel.
+        Servo under the load: where the arm of ``"arm=0.5kg:10cm"`` is horizontal is the middle of its travel.
 
     Raises
     ------

@@ -28,7 +28,7 @@ class Target:
     path : Path
         As the user gave it.
     endings : tuple of str
-        What its name may end in, such as ``(".csv",)``.
+        Endings that its name may have, such as ``(".csv",)``.
     page : int
         Of the picture, whose first page is 1.
     """

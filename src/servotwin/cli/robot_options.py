@@ -377,7 +377,7 @@ class Asked:
     motions : list of Motion
         One an episode.
     said : tuple of str
-        What was assumed of the servos.
+        Assumptions about the servos.
     """
 
     plant: Any

@@ -262,7 +262,7 @@ def run_writers(run: RobotRun, sized: Mapping[str, Sizing], names: Sequence[str]
     names : sequence of str
         Of all files.
     found : mapping
-        What `run_facts` says of the run.
+        Facts that `run_facts` gives of the run.
     output_step : float
         Between the rows of tables [s]
     sections : sequence of Section

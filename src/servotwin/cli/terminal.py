@@ -214,7 +214,7 @@ def with_span(value: float, span: Span | None, form: str, unit: str, *, scale: f
     unit : str
     scale : float
     note : str
-        What stands in brackets behind the value; the range then follows a comma.
+        Text in brackets behind the value; the range then follows a comma.
 
     Examples
     --------

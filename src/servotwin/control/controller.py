@@ -168,7 +168,7 @@ class Encoder:
     count : float
         A step; 0: none (SI).
     signal : str
-        What it looks at.
+        Measured signal.
     shows : str, optional
         As what the controller sees it; the signal itself unless given.
     ratio : float or ndarray

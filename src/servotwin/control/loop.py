@@ -174,13 +174,13 @@ class ControlRun:
     Parameters
     ----------
     path : Path
-        What it was told to follow.
+        Path that it was told to follow.
     time : ndarray, shape (n,)
         Of its ticks [s].
     command : ndarray, shape (n,) or (n, joints)
         [V] or [rad].
     measured : mapping of str to ndarray
-        What it saw, a row for each tick (SI).
+        Measured signals, a row for each tick (SI).
     true_time : ndarray, shape (m,)
         At which the true signals are known [s].
     true : mapping of str to ndarray

@@ -48,9 +48,9 @@ class Wire:
     unit : str
         Of what is sent, as signals have it.
     carried : callable
-        What is sent for a command, the nearest that the wire can carry (SI).
+        Value that is sent for a command, the nearest that the wire can carry (SI).
     at_rest : callable
-        What is sent to a servo that rests at an angle (SI).
+        Value that is sent to a servo that rests at an angle (SI).
     frame, lag : float
         How often a new command can matter, and how long it needs besides until it acts [s].
     """

@@ -100,7 +100,7 @@ class Candidate:
     reasons : tuple of Reason
         Why it does not suit; empty where it does.
     notes : tuple of str
-        What to know of it before buying.
+        Remarks to know before buying it.
     """
 
     servo: Servo
@@ -300,7 +300,7 @@ class Lifter:
     time : float
         From 30° below the horizontal to 30° above, from rest [s].
     notes : tuple of str
-        What to know of it before buying.
+        Remarks to know before buying it.
     """
 
     servo: Servo

@@ -266,7 +266,7 @@ class SpeedCurve:
     Parameters
     ----------
     drive : FullDrive
-        What all follows from: any other point, and torques and currents at both ends.
+        Drive that all follows from: any other point, and torques and currents at both ends.
     temperatures : Temperatures
         Of winding and housing [K].
     speed : ndarray, shape (n,)

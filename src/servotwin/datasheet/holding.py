@@ -486,7 +486,7 @@ class Held(NamedTuple):
     heat : float
         Mean of i² R in the winding [W].
     trip : str
-        What a digital servo trips by under it, "overload" or "current"; empty where it does not.
+        Protection by which a digital servo trips under it, "overload" or "current"; empty where it does not.
     span : Span, optional
         Range of `error`, where it rests on guesses; computed by `with_spans`.
     """

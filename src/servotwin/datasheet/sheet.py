@@ -324,7 +324,7 @@ class VoltageSheet:
     bandwidth : tuple of Bandwidth
         Empty where it was not asked for.
     printed : tuple of PrintedPoint
-        What the sheet prints for this voltage, one a source; empty where it does not.
+        Printed values for this voltage, one a source; empty where the sheet prints none.
     lift : Lift, optional
         Where a mass was given.
     loop : Loop, optional

@@ -43,11 +43,11 @@ def c(model: Model, load: Load | Part | None = None, *, name: str | None = None,
     model : Model
         Any but the two motors.
     load : Load, optional
-        What hangs on the shaft; nothing unless given. A recorded torque is told at each call instead.
+        Load on the shaft; none unless given. A recorded torque is told at each call instead.
     name : str, optional
         Of the files, and the beginning of all names in them; that of the servo unless given.
     accuracy : float, optional
-        What angles may be off by where motions are integrated [rad]: 1e-9 unless given, in floats 1e-5.
+        Error that angles may have where motions are integrated [rad]: 1e-9 unless given, in floats 1e-5.
     parameters : bool
         Whether there is a function too that makes the numbers of the parameters of a servo file.
     dtype : str

@@ -431,7 +431,7 @@ class CCode:
     header, source : str
         The two texts.
     left_out : str
-        What the numbers of the servo have no use for, and the code does not follow.
+        Laws that the numbers of the servo do not use, and that the code does not follow.
     table : tuple of float
         All numbers of the servo in the order in which the struct of its table has them, the table of a potentiometer
         apart: what another servo with the same things left out may have in its place.

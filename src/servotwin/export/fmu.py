@@ -459,7 +459,7 @@ def fmu(model: Model, load: Load | Part | None = None, *, fmi: str = "2.0", name
     name : str, optional
         The model identifier; that of the servo unless given.
     accuracy : float
-        What angles may be off by where motions are integrated [rad].
+        Error that angles may have where motions are integrated [rad].
     sources : bool
         Whether it has sources alone, which a tool compiles.
 

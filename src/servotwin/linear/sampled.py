@@ -340,11 +340,11 @@ class Margins(NamedTuple):
     gain : float
         By what its gain may grow; inf where by anything [1].
     phase : float
-        What it may lose at its crossover; nan where there is none [rad].
+        Phase that it may lose at its crossover; nan where there is none [rad].
     crossover : float
         Frequency at which its gain is 1 [rad/s].
     delay : float
-        What may come later: phase over crossover [s].
+        Further delay that it may have: phase over crossover [s].
     """
 
     gain: float
@@ -361,7 +361,7 @@ class SampledServo:
     ----------
     model : PulseServo, PulseServoInductive or DigitalServo
     law : Law
-        What decides, and what that does to the plant.
+        Law of the decisions, and of their effect on the plant.
 
     Examples
     --------

@@ -40,7 +40,7 @@ class BamActuator:
     speed : float or None
         At which the goal moves at most, where a file gives no max_velocity [rad/s].
     sets : {"duty", "current", "torque"}
-        What its loop sets.
+        Quantity that its loop sets.
     servos : tuple of str
         How the ids of the catalog begin of which it is the model.
     source : str
@@ -198,7 +198,7 @@ class BamConvention:
         Parameters
         ----------
         actuator : str
-            What BAM calls it.
+            BAM's name of it.
 
         Raises
         ------
@@ -444,7 +444,7 @@ def write_bam_parameters(servo: Servo, path: str | Path, *, model: str = "auto",
     model : {"auto", "m1", …, "m6"}
         The smallest that holds all friction of the servo unless given.
     actuator : str, optional
-        What BAM calls the servo; from `servo.sheet`, by its name in the catalog, or its name unless given.
+        BAM's name of the servo; from `servo.sheet`, by its name in the catalog, or its name unless given.
     overwrite : bool
         Replace a file that is there.
 

@@ -524,7 +524,7 @@ def columns_of(header: Sequence[str], where: object, *, taken: Container[str] = 
     ----------
     header : sequence of str
     where : object
-        What errors name.
+        Place that errors name.
     taken : container of str
         Signals that are known already.
     says_more : callable

@@ -170,7 +170,7 @@ def layout_of(table: TextTable, sidecar: Mapping[str, Column] | None, wanted: Ma
     sidecar : mapping, optional
     wanted : mapping
     needs : sequence of str
-        What there has to be, of `NEEDS`.
+        Columns that there have to be, of `NEEDS`.
     unknown_step : bool
         Whether a command that lacks may be the one step that the angle shows.
     raw : RawRegisters, optional
@@ -568,7 +568,7 @@ def read_csv_log(path: str | Path, *, sidecar: str | Path | None = None,
         ``{"angle": "pos:deg-90"}``; counts before the sidecar. A rate of rows stands for a time (``"time=50Hz"``), and
         a value or jumps for a command (``"command=0deg@0s,90deg@0.5s"``).
     mend : sequence of str
-        What to put right of what is not certain: names of `servotwin.logs.mends.MENDS`, such as "torn".
+        Mends of what is not certain: names of `servotwin.logs.mends.MENDS`, such as "torn".
 
     Raises
     ------
@@ -621,13 +621,13 @@ def read_log_table(path: Path, mends: Sequence[str], wanted: Mapping[str, Wanted
     ----------
     path : Path
     mends : sequence of str
-        What is mended of what is not certain.
+        Mends of what is not certain.
     wanted : mapping
-        What the user says of columns.
+        Columns as the user says them.
     sidecar : str or Path, optional
         A file in place of the folder's `logs.json`.
     needs : sequence of str
-        What there has to be: "time", "command", "angle".
+        Columns that there have to be: "time", "command", "angle".
     unknown_step : bool
         Whether a command that lacks may be the one step that the angle shows.
     registers : str or Servo, optional

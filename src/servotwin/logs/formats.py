@@ -67,7 +67,7 @@ class Reading:
     file : str
     columns : tuple of ReadColumn
     remarks : tuple of str
-        What was passed over, each in one line.
+        Parts that were passed over, each in one line.
     unread : tuple of str
         Columns that are none of these.
     layout : mapping of str to Column
@@ -111,7 +111,7 @@ class LogFormat(NamedTuple):
     what : str
         Its files, in words.
     holds : {"table", "json", "dataset"}
-        What the functions of its module are given: the path of a table, path and content of a JSON file, or the path
+        Arguments of the functions of its module: the path of a table, path and content of a JSON file, or the path
         of a dataset of several files.
     module : str
         Of `servotwin.logs`, or with dots of any package. It has `logs_of`, which gives the logs, and unless it is for

@@ -43,11 +43,11 @@ class Log:
     measured : mapping of str to ndarray, shape (n,)
         Signal name to values in SI, nan where nothing was measured; has `output_angle` or `feedback_voltage`.
     command_hold : {"previous", "linear"}
-        What the command is between samples.
+        Course of the command between samples.
     torque_on : ndarray of bool, shape (n,), optional
         False: from this sample to the next the servo gets no pulses, whatever `command` says. None: it is always on.
     load : Load or Part
-        What hangs on the shaft; recorded torques count their time from the first sample.
+        Load on the shaft; recorded torques count their time from the first sample.
     parameters : mapping of str to float
         Servo parameters that hold during this log, such as ``{"supply.open_circuit_voltage": 6.0}``.
     motion : str

@@ -142,19 +142,19 @@ def read_logs(path: str | Path, format: str = "auto", *, sidecar: str | Path | N
         A name of `LOG_FORMATS` or of a plug-in, or "auto", which tells by the content; JSON files of a folder that are
         no logs are then passed over.
     sidecar : str or Path, optional
-        What holds for all CSV files, in place of a `logs.json` in their folder.
+        Sidecar of all CSV files, in place of a `logs.json` in their folder.
     columns : str or mapping, optional
         Which column of the CSV files is which signal, in which unit: ``"time=t:ms angle=pos:deg-90"``. Columns that it
         leaves out are known by name or guessed; `Log.reading` shows it.
     joints : str or mapping, optional
         Which joints of a LeRobot dataset, and their unit: ``"shoulder_pan:deg"``.
     mend : sequence of str
-        What to put right in tables, of what is not certain: "torn", "reset", "drop-repeated", "spread-repeated",
-        "clock16", "thousands".
+        Mends of tables, of what is not certain: "torn", "reset", "drop-repeated", "spread-repeated", "clock16",
+        "thousands".
     unknown_step : bool
         Whether the command of a table without one may be the one step that its angle shows.
     registers : str or Servo, optional
-        Whose registers the columns of tables are named after where they hold raw numbers: a family such as
+        Servo of which the registers name the columns of tables where they hold raw numbers: a family such as
         ``"feetech-sts"``, a model such as ``"XM430-W350"``, or the servo itself, of which only what cannot be degrees
         is taken for counts.
 

@@ -24,8 +24,8 @@ def plain(found: Any, shown: Shown | None = None) -> Any:
         Numbers, words, arrays, dataclasses, named tuples, and mappings and sequences of them; complex numbers become
         pairs, paths their text. Of a subclass what is shown of its base is shown.
     shown : mapping of type to str
-        What is shown of objects of a class; all fields of others. ``str`` in the place of an attribute is the object in
-        words.
+        Attributes that are shown of objects of a class; all fields of others. ``str`` in the place of an attribute is
+        the object in words.
 
     Raises
     ------

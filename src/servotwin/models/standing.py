@@ -31,7 +31,7 @@ def standing_current(numbers: Numbers, firmware: Firmware, d: float) -> float:
     numbers : Numbers
         Of the plant, as at full duty.
     firmware : Firmware
-        Whose limit of current holds, if it has one.
+        Firmware of which the limit of current holds, if it has one.
     d : float
         [1]
     """

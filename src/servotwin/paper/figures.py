@@ -33,7 +33,7 @@ class Picture:
         The caption is HTML.
     figure : Figure
     columns : mapping
-        What is drawn, by column name with unit; empty for block diagrams.
+        Drawn data, by column name with unit; empty for block diagrams.
     """
 
     name: str

@@ -45,7 +45,7 @@ class PaperReport:
     numbers : mapping
         Headline numbers, the unit in each name.
     left_out : str
-        What is missing for a part of the report, and that part; empty where nothing is.
+        Extra that is missing for a part of the report, and that part; empty where none is.
     """
 
     folder: Path

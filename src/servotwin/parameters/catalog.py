@@ -35,7 +35,7 @@ class Dataset:
     units : dict of str to str
         "1" for counts.
     source : str
-        What it is and where it was published.
+        Content of the table, and where it was published.
     """
 
     name: str

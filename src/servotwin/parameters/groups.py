@@ -500,7 +500,7 @@ class Supply(Group):
             "usb" (5 V, 0.5 A), or a voltage and, each after a colon, resistance and limit of current; numbers without
             a unit are volts and ohms.
         what : str
-            What to call it in an error.
+            Name of the supply in an error.
 
         Raises
         ------

@@ -321,7 +321,7 @@ class Servo:
     title : str
         For people.
     kind : {"analog", "digital", "bus"}
-        What decides the bridge: an analog chip, or a microcontroller that listens to pulses or to packets on a bus.
+        Controller of the bridge: an analog chip, or a microcontroller that listens to pulses or to packets on a bus.
     motor, gear, friction, electronics, potentiometer, firmware, supply, stops, thermal : Group
         Always there; a field that is None is absent. Plain numbers in SI.
     quantities : mapping of str to Quantity

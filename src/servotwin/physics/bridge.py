@@ -69,7 +69,7 @@ def bridge_current(source_voltage: float, back_emf: float, voltage_drop: float, 
     back_emf : float or array
         v_b = k_b q̇_m [V].
     voltage_drop : float or array
-        What has to be overcome before a current flows: V_ce0 + V_br while driving, V_br while braking,
+        Voltage that has to be overcome before a current flows: V_ce0 + V_br while driving, V_br while braking,
         V_oc + V_ce0 + V_br through the diodes while coasting [V].
     resistance : float or array
         Of the whole circuit: R_a + r_c + R_b while driving, R_a while braking, R_a + R_b while coasting [Ω].
@@ -141,7 +141,7 @@ def motor_voltage(armature_current: float, back_emf: float, armature_resistance:
     brush_drop_voltage : float or array
         V_br [V].
     open_circuit_voltage : float or array
-        What stands there without current: v_b of an open bridge, 0 of a braked one [V].
+        Voltage that stands there without current: v_b of an open bridge, 0 of a braked one [V].
 
     Returns
     -------

@@ -146,7 +146,7 @@ def circuit_current(voltage: float, back_emf: float, resistance: float) -> float
     Parameters
     ----------
     voltage : float or array
-        What drives the current, drops taken off [V].
+        Voltage that drives the current, drops taken off [V].
     back_emf : float or array
         v_b = k_b q̇_m [V].
     resistance : float or array

@@ -12,7 +12,7 @@ def one_shot_width(feedback_voltage: float, one_shot_slope: float, one_shot_offs
     Parameters
     ----------
     feedback_voltage : float or array
-        What the one-shot sees of the potentiometer, at the rising edge of the pulse [V].
+        Voltage of the potentiometer at the one-shot, at the rising edge of the pulse [V].
     one_shot_slope : float or array
         1/s_r [s/V].
     one_shot_offset : float or array

@@ -86,7 +86,7 @@ def curves(drawn: Sequence[Curve], *, x_label: str, y_label: str, limits: Sequen
     limits : sequence of Limit
         Bounds to mark.
     below, below_label : sequence of Curve, str
-        What the second panel shows, about zero, and its label with the unit.
+        Curves of the second panel, about zero, and its label with the unit.
     height : float
         [inch]
     page : int

@@ -122,7 +122,7 @@ class JointTrace(NamedTuple):
     ----------
     label : str
     time, goal, real, ideal : ndarray, shape (n,)
-        What was asked for, what the servo made of it, and what an ideal actuator makes of it.
+        Places or angles that were asked for, those of the servo, and those of an ideal actuator.
     slides : bool
     measured : ndarray, shape (n,), optional
         Where the real joint was; nan where it was not measured.

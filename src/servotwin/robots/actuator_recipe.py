@@ -271,7 +271,7 @@ class Recipe:
     load : float
         Torque under which it stands as the servo does [N m].
     lift : float
-        What the servo lifts, from rest [N m].
+        Torque that the servo lifts, from rest [N m].
     droops : Droops
         Of the servo under that load [rad].
     torque_constant, back_emf_constant : float

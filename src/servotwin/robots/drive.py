@@ -48,7 +48,7 @@ class DriveState:
     constraint : ndarray, shape (nv,)
         Forces of contacts and limits at the last step, which the servos meet in the next one.
     servos : ndarray
-        What the servos remember, and what they were told.
+        Memory of the servos, and their commands.
     """
 
     engine: NDArray[np.float64]
@@ -88,7 +88,7 @@ class ServoDrive:
         By joint: what the control of its actuator asks for. Unless given, that of a position actuator keeps its
         meaning; of any other it is the angle [rad] or place [m] itself, and a control range is refused.
     joint_friction : str
-        What to do with damping and friction loss that these joints have themselves: "refuse", "clear" or "keep".
+        Treatment of damping and friction loss that these joints have themselves: "refuse", "clear" or "keep".
     solver : str
         "raised": where a servo has play or an elastic gear, MuJoCo's solver iterates at least 10 times, and 20 in its
         line search, which costs nothing where it converges earlier. "given": as the model says.
@@ -107,7 +107,7 @@ class ServoDrive:
     watches : bool
         Whether least voltages of supplies are kept.
     maps : dict of str to CommandMap
-        What controls of actuators ask of the servos, by joint; `print` shows one.
+        Maps from controls of actuators to commands of the servos, by joint; `print` shows one.
 
     Raises
     ------

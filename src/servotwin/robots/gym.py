@@ -55,7 +55,7 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
     bus : Supply or sequence of tuple (Supply, names), optional
         Supplies that servos share.
     joint_friction : str
-        What to do with damping and friction loss of these joints: "clear" (they stand for the actuator's, and a servo
+        Treatment of damping and friction loss of these joints: "clear" (they stand for the actuator's, and a servo
         has its own), "keep", where they are those of a bearing, or "refuse".
     assume_heat : bool
         As of `ServoDrive`.

@@ -167,7 +167,7 @@ class Replay:
     simulated : mapping of str to mapping
         The same of servos and of each rival, by its name, as late as fits it best [rad]
     kinds : mapping of str to mapping
-        What each joint does at these times, by joint and kind.
+        Masks of the samples of each kind, such as those in which a joint moves, by joint and kind.
     """
 
     run: RobotRun
@@ -192,7 +192,7 @@ class RobotValidation:
     windows : tuple of Window
         The worst second of each joint, the worst first.
     said : tuple of str
-        What was assumed, and what the robot's model runs into.
+        Assumptions, and shapes that the robot's model runs into.
     """
 
     replays: tuple[Replay, ...]

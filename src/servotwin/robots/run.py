@@ -145,7 +145,7 @@ class RobotRun:
     bus : Supply or sequence of tuple (Supply, joints), optional
         That they share.
     record : Record
-        What the servos have done, from the settling before the motion to the rest after it.
+        Record of the servos, from the settling before the motion to the rest after it.
     poses : ndarray, shape (n, nq)
         Of the robot at the times of the record, MuJoCo's `qpos`.
     ideal : IdealRun
@@ -153,7 +153,7 @@ class RobotRun:
     tracking : mapping of str to Tracking
         How well each joint has followed.
     said : tuple of str
-        What was assumed of its servos, and done about the motion and the model, that nobody has asked for; one sentence
+        Assumptions about its servos, and changes of the motion and the model, that nobody has asked for; one sentence
         each.
     unjudged : str
         Why nothing can be said about its servos, such as links that lie in each other where the motion begins, or a
@@ -270,13 +270,13 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
     settle : float
         [s]
     hold : str
-        What a servo is told between samples of the motion: "linear", or "previous", as LeRobot sends goals.
+        Command of a servo between samples of the motion: "linear", or "previous", as LeRobot sends goals.
     window : float, optional
         Over which the motion of the ideal actuators is blended; `blend_window` of it unless given [s]
     assume_heat : bool
         Whether servos whose files have no thermal numbers get warm by ones that their mass lets assume.
     overlap : str
-        What to do with other shapes that lie over 1 mm in each other in the first pose or where the motion begins:
+        Treatment of other shapes that lie over 1 mm in each other in the first pose or where the motion begins:
         "keep", their contact counts, and the servos are not judged; "ignore", it is left out. The ground is never.
     progress : bool or callable
         Whether to show how far it is; a callable is told the steps done, and all.

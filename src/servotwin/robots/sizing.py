@@ -236,7 +236,7 @@ class Sizing:
     unjudged : str
         Why nothing can be said about this, as of the run; empty if it can.
     held : str
-        What first presses on the joint while it moves, in words.
+        First contact that presses on the joint while it moves, in words.
     """
 
     joint: str

@@ -87,7 +87,7 @@ class IdealRun:
     poses : ndarray, shape (n, nq)
         Of the whole robot, MuJoCo's `qpos`.
     touches : tuple of Touch
-        What it runs into, that does not yield.
+        Contacts with shapes that do not yield.
     """
 
     time: Array

@@ -66,7 +66,7 @@ def worn(model: PulseServo, *, neutral: float = 0.0, torque: float = 1.0) -> Pul
     neutral : float
         By how much its neutral pulse is longer [s].
     torque : float
-        What its motor has left of its torque per current and back-EMF per speed: a motor whose magnets are weaker
+        Share that its motor has left of its torque per current and back-EMF per speed: a motor whose magnets are weaker
         stalls with less torque and runs faster, until friction tells.
 
     Raises
@@ -418,7 +418,7 @@ class WaypointRun:
     wheel_speeds : ndarray, shape (n, 2)
         Of left and right wheel, forward [rad/s].
     asked_speeds : ndarray, shape (n, 2)
-        What the controller asks of them in this frame [rad/s].
+        Speeds that the controller asks of them in this frame [rad/s].
     pulses : ndarray, shape (n, 2)
         Widths that the servos are told in this frame [s]; nan where wheels are ideal.
     arrived : float
@@ -487,7 +487,7 @@ def run_waypoints(servos: Sequence[Model] | None = None, waypoints: ArrayLike = 
     encoders : int, optional
         Counts of a turn of a wheel; without encoders the robot believes in its pulses.
     nominal : Model, optional
-        What the robot takes both servos for; `wheel_servo()` unless given.
+        Model that the robot assumes for both servos; `wheel_servo()` unless given.
     speed, lookahead, tolerance : float
         Of `PurePursuit` [m/s, m, m].
     duration : float

@@ -74,7 +74,7 @@ def warn_of_time_base(time: NDArray[np.float64], value: NDArray[np.float64], kin
         In SI, times increasing.
     kind : {"angle", "pulse_width", "voltage"}
     what : str
-        What the samples are of, for errors.
+        Name of the sampled signal, for errors.
     stacklevel : int
         As in `warnings.warn`, counted from here; 3 is the caller of the caller.
     """

@@ -348,7 +348,7 @@ class BusSteps:
     Parameters
     ----------
     posts : sequence
-        What shows of each servo, as `models.engine.live.posts.Post` has it.
+        Post of each servo, `models.engine.live.posts.Post`: the values that are shown of it.
 
     Examples
     --------

@@ -62,7 +62,7 @@ class Plan:
     numbers : Numbers
         The numbers of servo and load.
     command : Pieces
-        What the plant follows [V]; of a pulse servo the width of the pulses [s].
+        Signal that the plant follows [V]; of a pulse servo the width of the pulses [s].
     torque : Pieces
         The external torque that depends on time alone [N m].
     chip : Chip, optional

@@ -381,7 +381,7 @@ class Energy:
     stored : float
         Increase of kinetic and magnetic energy, and of that in a spring between two bodies.
     residual : float
-        What does not balance; rounding and quadrature.
+        Remainder of the balance; rounding and quadrature.
     """
 
     supply: float

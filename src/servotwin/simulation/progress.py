@@ -244,7 +244,7 @@ class Crew:
             Of the items of a piece; picklable where the executor asks for that.
         pieces : iterable of tuple
         finishing : str
-            What an executor has to finish every one of, in words.
+            Name of the pieces that an executor has to finish, in words.
 
         Raises
         ------

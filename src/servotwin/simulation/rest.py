@@ -132,7 +132,7 @@ def swing_of(time: Array, angle: Array, least: float = AT_REST) -> Swing:
     time, angle : ndarray, shape (n,)
         [s], [rad].
     least : float
-        What swings by less is at rest; of measured angles no less than their noise reaches from end to end [rad].
+        Limit below which a swing is rest; of measured angles no less than their noise reaches from end to end [rad].
 
     Examples
     --------

@@ -124,7 +124,7 @@ def save_lanes(path: str | Path, time: NDArray[np.float64], signals: Mapping[str
     of_lanes : mapping of str to ndarray, shape (B,)
         Number or name of each lane, and what else differs from lane to lane.
     what : str
-        What the file is of, for errors.
+        Content of the file, for errors.
     overwrite : bool
 
     Raises

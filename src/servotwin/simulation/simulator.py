@@ -58,11 +58,11 @@ class Simulator:
     ----------
     model : Model
     load : Load, optional
-        What hangs on the shaft; nothing unless given.
+        Load on the shaft; none unless given.
     seed : int
         Seed of all noise (the models without pulses have none).
     accuracy : float
-        What angles may be off by where motions are integrated, not solved in closed form [rad], from 1e-13 to 1e-4. A
+        Error that angles may have where motions are integrated, not solved in closed form [rad], from 1e-13 to 1e-4. A
         decision or a stop at the very edge may fall otherwise.
 
     Examples

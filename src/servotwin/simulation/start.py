@@ -36,7 +36,7 @@ def start_vector(places: Sequence[Place], plant: Numbers, angle: Any, initial: M
     Parameters
     ----------
     places : sequence of Place
-        What the model has as states.
+        Places of the model's states.
     plant : Numbers
     angle : float or ndarray
         Where the command of just before asks for [rad].

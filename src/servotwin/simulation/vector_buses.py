@@ -40,9 +40,9 @@ class BusSet:
     which : ndarray of int64
         The lanes.
     memories : Memories
-        What each remembers.
+        Memory of each lane.
     buses : Buses
-        What those on a bus remember together; `tables` and `rooms` are what its kernels need besides.
+        Common memory of those on a bus; `tables` and `rooms` are what its kernels need besides.
     """
 
     kernel = BUSES.name

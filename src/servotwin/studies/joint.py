@@ -57,7 +57,7 @@ class Coordinate:
     nominal : float
         Of the servo as its file has it (SI).
     spread : Distribution, optional
-        What the servo's file states, or what is assumed; None where it is not drawn.
+        Spread that the servo's file states, or that is assumed; None where it is not drawn.
     """
 
     dimension: str
@@ -127,7 +127,7 @@ def scaled_spread(quantity: Quantity, partner: Quantity, nominal: float) -> Dist
     quantity, partner : Quantity
         Positive numbers.
     nominal : float
-        What the product counts as, in place of the product of the values.
+        Value that the product counts as, in place of the product of the values.
 
     Returns
     -------

@@ -60,7 +60,7 @@ class Parameter(NamedTuple):
     allowed : str
         The range in words.
     nominal : float, str or None
-        What the servo or the load says (SI); None where it says nothing.
+        Value of the servo or the load (SI); None where it says nothing.
     """
 
     name: str
@@ -277,9 +277,9 @@ class Plan:
     Parameters
     ----------
     job : Job
-        What all chunks share.
+        Job that all chunks share.
     columns : mapping of str to ndarray, shape (lanes,)
-        What is drawn, of all lanes, by dotted name (SI).
+        Drawn values, of all lanes, by dotted name (SI).
     followed : mapping of str to ndarray, shape (lanes,)
         Parameters that follow from it, by dotted name (SI).
     together : Together
@@ -289,7 +289,7 @@ class Plan:
     ends : mapping of str to tuple
         Of each parameter, its 5 % and 95 % value, or all options.
     nominal : mapping of str to float or str
-        What each parameter is while another one is moved.
+        Value of each parameter while another one is moved.
     chunk : int
         Lanes that are worked on, and written, together.
     definition : mapping

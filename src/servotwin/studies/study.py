@@ -361,7 +361,7 @@ class Study:
     Parameters
     ----------
     plan : Plan
-        What was run.
+        Plan that was run.
     table : mapping of str to ndarray, shape (lanes,)
         "lane", all that is drawn and every parameter that follows from it by dotted name (SI), every metric (SI; nan
         where a lane has none), "status" (name of a `Status`), "ended" [s], and for each kind of remark its time [s],

@@ -151,7 +151,7 @@ class Text(NamedTuple):
     lines : list of str
         Those that end in a line end.
     rest : str
-        What stands behind the last line end.
+        Text behind the last line end.
     encoding : str
     unwritten : int
         Zeros behind the text, which a card holds where its last block was not written.
@@ -424,14 +424,14 @@ class TextTable:
         Names of the columns; their numbers from 1 on where the file has none.
     has_header : bool
     units : tuple of str
-        What a line of units below the header says of each column; empty where there is none.
+        Entry of each column in a line of units below the header; empty where there is none.
     rows : list of Row
         Cells of each row, with the number of its line.
     separator : str
     decimal : {".", ","}
     encoding : str
     remarks : tuple of str
-        What was passed over, each in one line.
+        Parts that were passed over, each in one line.
     also : mapping of str to str
         Other names of columns: `%time`, where a header that begins with `%` is that of `time`.
     breaks : tuple of int
@@ -490,7 +490,7 @@ class TextTable:
         ----------
         name : str
         missing : float, optional
-            What an empty cell, `NaN`, `NA`, `-` or `null` counts as; unless given it is an error.
+            Value that an empty cell, `NaN`, `NA`, `-` or `null` counts as; unless given it is an error.
 
         Raises
         ------

@@ -85,7 +85,7 @@ def quantity(what: str, text: str, dimension: str, *, bare: bool = False, positi
     Parameters
     ----------
     what : str
-        What to call it in an error.
+        Name of the quantity in an error.
     text : str
     dimension : str
         Of `servotwin.units`.

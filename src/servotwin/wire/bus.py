@@ -264,14 +264,14 @@ class Bus:
     angles : mapping of int to float, optional
         Where shafts rest at first [rad]; count 2048 is 0.
     loads : mapping of int to Load, optional
-        What hangs on shafts.
+        Loads on the shafts.
     lock : {"keep", "drop"}
         Sources disagree on a register of the EEPROM that is written while Lock is 1: "keep" takes the value until
         power-off, "drop" passes it over. Feetech only.
     firmware : tuple of int, optional
         Version that the servos tell, 3.10 unless given; of Dynamixel's one number, 45.
     faults : Faults, optional
-        What is wrong with the wire and its servos.
+        Faults of the wire and its servos.
     seed : int
         Of all noise, of the twins and of the faults.
 

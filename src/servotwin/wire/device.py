@@ -25,7 +25,7 @@ class ControlTable:
     size : int
         Bytes.
     values : mapping of str to int
-        What the registers hold at power-up; the others 0.
+        Values of the registers at power-up; the others 0.
     """
 
     def __init__(self, family: Family, size: int, values: Mapping[str, int]) -> None:

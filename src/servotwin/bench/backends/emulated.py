@@ -70,7 +70,7 @@ class MockBackend:
     Parameters
     ----------
     plant : Plant, optional
-        What hangs on its pins; 1.25 V at each unless given.
+        Plant at its pins; 1.25 V at each unless given.
     start : int
         Its clock when it is opened [ticks].
     references : mapping of str to float, optional
@@ -348,7 +348,7 @@ class EmulatedBackend:
     Parameters
     ----------
     plant : Plant, optional
-        What hangs on its pins; 1.25 V at each unless given.
+        Plant at its pins; 1.25 V at each unless given.
     paper : bool
         Whether the jumper of mode "paper" is closed when it starts.
     references : mapping of str to float, optional

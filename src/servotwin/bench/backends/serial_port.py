@@ -32,7 +32,7 @@ class PortFound(NamedTuple):
     Parameters
     ----------
     device, description : str
-        What to open, and what hangs on it.
+        Name to open the port by, and the name of the device at it.
     identity : str
         USB vendor and product, empty where it is none.
     """

@@ -121,7 +121,7 @@ class BusFamily:
         Columns beside angle and speed.
     speed : Channel
     errors : mapping of int to str
-        What the bits of the status byte say.
+        Errors by their bits in the status byte.
     source : str
         Of all this.
     """

@@ -233,7 +233,7 @@ class Calibration:
     line : LineFit
         Through meter and counts.
     remarks : tuple of str
-        What is worth a look.
+        Findings that are worth a look.
     """
 
     wiring: Wiring
@@ -250,7 +250,7 @@ def calibrated(wiring: Wiring, what: str, meter: Sequence[float], counts: Sequen
     wiring : Wiring
     what : {"reference", "supply", "shunt"}
     meter : sequence of float
-        What the meter showed, at least three values, not all alike [V or A].
+        Values that the meter showed, at least three, not all alike [V or A].
     counts : sequence of float
         Mean counts of the converter.
 

@@ -307,7 +307,7 @@ class Limits:
     Parameters
     ----------
     kind : {"pulse_width", "angle"}
-        What is commanded.
+        Commanded quantity.
     low, high : float
         Commands that are allowed (SI), low below high.
     voltage : float

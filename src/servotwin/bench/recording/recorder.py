@@ -133,7 +133,7 @@ class About:
     author : str
     note : str
     load : mapping, optional
-        What hangs on the shaft, in the words of a sidecar: ``{"inertia": 1e-3}``.
+        Load on the shaft, in the words of a sidecar: ``{"inertia": 1e-3}``.
     """
 
     servo: str

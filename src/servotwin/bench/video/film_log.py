@@ -38,7 +38,7 @@ class FilmLog:
         Of the CSV file, cell by cell; "" where there is nothing.
     sidecar : mapping
     remarks : tuple of str
-        What the user should know.
+        Remarks for the user.
     """
 
     columns: Mapping[str, list[Any]]
@@ -60,7 +60,7 @@ def film_log(filmed: Filmed, log: str | Path | None = None, *, mend: Sequence[st
     log : str or Path, optional
         CSV file of the recorder, with time and command; its sidecar is taken over. Without it the log has no command.
     mend : sequence of str
-        What to put right in it, see `read_logs`.
+        Mends of the log, see `read_logs`.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def write_film_log(filmed: Filmed, path: str | Path, *, log: str | Path | None =
     log : str or Path, optional
         The recorder's.
     mend : sequence of str
-        What to put right in it, see `read_logs`.
+        Mends of the log, see `read_logs`.
     overwrite : bool
         Replace files that are there.
 

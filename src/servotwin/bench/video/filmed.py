@@ -605,7 +605,7 @@ class Filmed:
     facts : mapping
         Of clip, mark and instant, in plain JSON, as a log's sidecar has them.
     remarks : tuple of str
-        What the user should know.
+        Remarks for the user.
     """
 
     time: NDArray[np.float64] = field(repr=False)

@@ -47,7 +47,7 @@ class Kind:
         On the wire.
     sender : {"computer", "board"}
     text : str
-        What it is for.
+        Purpose of the message.
     fields : tuple of Field
     answer : str
         Name of the message that answers it; empty where none does.

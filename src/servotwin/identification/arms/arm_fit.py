@@ -80,7 +80,7 @@ class ArmFit:
         Values of all names (SI); masses as factors.
     units : mapping of str to str
     unidentifiable : tuple of Unidentifiable
-        What the episodes cannot tell apart, in words.
+        Numbers that the episodes cannot tell apart, in words.
     at_bound : tuple of str
     training, before : RobotValidation
         Errors of the fitted robot and of that before the fit on the episodes that were fitted.
@@ -90,7 +90,7 @@ class ArmFit:
         Standard deviation of the positions of each joint [rad], and of the stamps, `clock` [s]
     left_out : tuple of LeftOut
     causes : tuple of ArmCause
-        What would explain more, the best first.
+        Causes that would explain more, the best first.
     warnings : tuple of str
     prior_share : mapping of str to float
         How much of what is known of each number is belief, from 0 to 1. Empty without intervals.
@@ -99,7 +99,7 @@ class ArmFit:
     interrupted : bool
         Whether it was stopped before its end.
     unknown : tuple of str
-        What is not known because of that.
+        Results that are not known because of that.
     registers : RegisterSearch, optional
         Of bus servos of one family: what stands in registers that nobody recorded.
     """
@@ -447,7 +447,7 @@ def shaken(rows: Sequence[Rows], shakes: Sequence[LogPart], curvature: Array) ->
     Parameters
     ----------
     rows : sequence of Rows
-        What each part says of the numbers.
+        Rows of each part on the numbers.
     shakes : sequence of LogPart
         Its draws in the place of derivatives, in units of noise; those of 0 are none.
     curvature : ndarray, shape (numbers, numbers)

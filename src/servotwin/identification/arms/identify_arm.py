@@ -271,11 +271,11 @@ class Way:
     causes : tuple of ArmCause
     doubts : Doubts, optional
     missing : list of str
-        What is not known yet.
+        Results that are not known yet.
     seconds : dict of str to float
         CPU time that each stage took.
     registers : RegisterSearch, optional
-        What stands in registers that nobody recorded.
+        Values of registers that nobody recorded.
     """
 
     what: Problem
@@ -461,7 +461,7 @@ def identify_arm(logs: Any, robot: Any, servos: Any = None, *, bus: Supply | Non
     zeros : bool
         Whether joints may have their zeros elsewhere than the robot's file.
     free : sequence of str, optional
-        What is searched of servos.
+        Parameters of servos that are searched.
     holdout : int, optional
         How many episodes, the last ones, are not fitted but predicted; a fourth of them unless given, at least one of
         two.

@@ -43,9 +43,9 @@ class Experiment:
     Parameters
     ----------
     motion : str
-        What is commanded, in words.
+        Commanded motion, in words.
     load : str
-        What hangs on the shaft, in words.
+        Load on the shaft, in words.
     voltage : float
         Of the supply [V].
     sensors : tuple of str

@@ -421,7 +421,7 @@ class Assumption:
     unit : str
         SI.
     assumed, lower, upper : float
-        What the file assumes, and the range (SI).
+        Value that the file assumes, and the range (SI).
     source : str
         Of the range.
     beside : mapping of str to float

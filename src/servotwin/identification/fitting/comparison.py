@@ -36,7 +36,7 @@ def trace_of(forecast: Forecast, point: Point, k: int, part: LogPart, *, held_ou
     k : int
         Which log.
     part : LogPart
-        What it says at that point.
+        Residuals and derivatives of the log at that point.
     held_out : bool
         Whether it was not fitted.
     whole : bool

@@ -116,7 +116,7 @@ class Fit:
     covariance : ndarray, shape (p, p)
         Of the estimates (SI); rows of what is undetermined or at a bound are nan.
     unidentifiable : tuple of Unidentifiable
-        What the logs cannot say, in words.
+        Numbers that the logs cannot tell, in words.
     at_bound : tuple of str
         Parameters that ended at a bound of the search.
     holdout, training : ErrorTable
@@ -128,7 +128,7 @@ class Fit:
     noise : mapping of str to float
         Standard deviation of the residuals of each sensor, robust (SI).
     warnings : tuple of str
-        What a reader has to know, a line each.
+        Warnings that a reader has to know, a line each.
     doubt : Uncertainty
     spans : mapping of str to tuple of float
         Ranges (SI) of what is told by pulses: the delay.
@@ -152,7 +152,7 @@ class Fit:
     interrupted : bool
         Whether it was stopped before its end: then this is the best so far.
     unknown : tuple of str
-        What is not known because it was stopped.
+        Results that are not known because it was stopped.
     verdict : Verdict, optional
         Whether what is left is noise; None of a fit that was stopped in its search.
     registers : RegisterSearch, optional
@@ -420,7 +420,7 @@ def with_what_logs_say(servo: Servo, logs: Sequence[Log], searched: Sequence[str
     logs : sequence of Log
         Those that were fitted.
     searched : sequence of str
-        What the fit found, which stays.
+        Parameters that the fit found, which stay.
     """
     first, *others = logs
     stays = {member for name in searched for member in (LUMPED[name][0] if name in LUMPED else (name,))}
@@ -613,7 +613,7 @@ class Validation:
     noise : mapping of str to float
         How far the residuals of each sensor scatter, robust (SI).
     warnings : tuple of str
-        What is probably wrong with the logs, a line each.
+        Probable errors of the logs, a line each.
     registers : RegisterSearch, optional
         Of a bus servo: what stands in registers that logs did not record.
     """

@@ -255,7 +255,7 @@ def with_verdict(task: Task, point: Point, fit: Fit, course: Course, slew: Mappi
     course : Course
         Told the share done, and what goes on.
     slew : mapping of int to ndarray
-        What delay, slew and lag leave where each log is judged (SI); none where there is no such model beside.
+        Residuals of delay, slew and lag where each log is judged (SI); none where there is no such model beside.
     trials : bool
         Whether causes are tried.
     """
@@ -475,7 +475,7 @@ def identify(
         `PulseServo`, `PulseServoInductive`, `BoundedServo` or `DigitalServo`; the one that stands for the servo
         (`models.default_class`) unless given.
     free : sequence of str, optional
-        What is searched: dotted names of servo and load, and the lumped names `output_torque_constant` (motor and
+        Searched parameters: dotted names of servo and load, and the lumped names `output_torque_constant` (motor and
         back-EMF constant times the gear reduction), `output_inertia`, `output_coulomb_torque`.
     nuisance : sequence of str, optional
         Of "delay" (the command acts so much later), "log_delay" (what each log adds to it), "frame_phase" (when the
@@ -487,9 +487,9 @@ def identify(
     priors : "servo", mapping or None
         Normal beliefs, mean and standard deviation by name (SI); "servo" takes the spread that the servo file states.
     mend : sequence of str
-        What of `findings(logs, model)` is put right in all logs before the fit: of "wrap", "stamps", "sign", "span",
-        "rows" and "not followed". All that is found is said first among the warnings, mended or not; "wrap" and "sign"
-        are mended unasked.
+        Findings of `findings(logs, model)` that are put right in all logs before the fit: of "wrap", "stamps",
+        "sign", "span", "rows" and "not followed". All that is found is said first among the warnings, mended or not;
+        "wrap" and "sign" are mended unasked.
     bounds : mapping, optional
         Lowest and highest value by name (SI); random starts fill them. Wide ones unless given.
     holdout : float or sequence of str, optional
@@ -522,7 +522,7 @@ def identify(
         Anything with the `submit` of `concurrent.futures`, such as a client of dask; threads on all cores unless
         given. It is not shut down. The fit does not depend on it, to the last bit.
     accuracy : float
-        What angles of simulations may be off by where motions are integrated, not solved in closed form [rad], from
+        Error that angles of simulations may have where motions are integrated, not solved in closed form [rad], from
         1e-13 to 1e-4.
     within : float, optional
         Time that the fit may take [s]; then it stops.

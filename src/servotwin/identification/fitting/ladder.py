@@ -267,7 +267,7 @@ def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] | None
         One that reads load friction: `PulseServo`, `PulseServoInductive` or `DigitalServo`; for `BoundedServo` only
         "M1" makes sense. The one that stands for the servo (`models.default_class`) unless given.
     free : sequence of str, optional
-        What else is searched; friction terms in it are left to the ladder.
+        Further parameters that are searched; friction terms among them are left to the ladder.
     rungs : sequence of str
         Of "M1" to "M6".
     select : {"holdout", "criterion"}
@@ -518,7 +518,7 @@ def compare_structures(logs: Sequence[Log], servo: Servo, model: type[Model] | N
     model : type of Model, optional
         The analog class: `PulseServo` unless given.
     free : sequence of str, optional
-        What is searched of every structure that reads it; the usual parameters of each unless given. Friction is left
+        Searched parameters of every structure that reads them; the usual ones of each unless given. Friction is left
         to the laws.
     kinds : sequence of str
         Of "analog" and "digital"; a servo on a bus takes no pulses and is digital alone.

@@ -109,7 +109,7 @@ class Tried:
     Parameters
     ----------
     said : str
-        What differs from the servo as it was given, in words.
+        Differences from the servo as it was given, in words.
     servos : tuple of Servo
         With them.
     registers : mapping of str to int or None
@@ -156,13 +156,13 @@ class RegisterSearch:
     given : Tried
         The servo as it was given.
     best : tuple of Tried
-        What leaves the least error, and what leaves hardly more, the best first.
+        Candidate with the least error, and those with hardly more, the best first.
     doubted : Tried, optional
-        What would leave less than half of that with other values in registers that were given.
+        Candidate that would leave less than half of that, by other values in registers that were given.
     moves : mapping of str to Varied
         Numbers of the program that follow from registers which nobody recorded and which the logs tell, with these.
     others : tuple of Tried
-        What leaves little more with values that differ: where a search may begin too.
+        Candidates with little more error and values that differ: where a search may begin too.
     joints : mapping of str to OddJoint
         Of a robot.
     """

@@ -343,7 +343,7 @@ class CrossCorrelation:
     value : ndarray, shape (k,)
         Correlation of filtered residuals and changes of the command.
     band : ndarray, shape (k,)
-        What 99 % of the magnitudes stay below, each lag for itself, if residuals are noise.
+        Bound that 99 % of the magnitudes stay below, each lag for itself, if residuals are noise.
     odds : float
         How often noise would follow the command as much, all lags together.
     clearest : float
@@ -377,7 +377,7 @@ def cross_correlation(series: Sequence[SensorSeries], rows: Sequence[Rows] = (),
     ----------
     series : sequence of SensorSeries
     rows : sequence of Rows, optional
-        What each log says of the numbers that were fitted; nothing is taken out without.
+        Rows of each log on the numbers that were fitted; nothing is taken out without.
     noise : Noise, optional
         That needs no model: its memory, and where it is larger because stamps are off. The memory of the residuals
         counts where it is not known.

@@ -49,7 +49,7 @@ class SlewLag:
     command_kind : {"angle", "pulse_width", "voltage"}
         Of the logs that it follows.
     signal : {"output_angle", "feedback_voltage"}
-        What y is. For the feedback voltage, V stands for rad in every unit above.
+        Signal y. For the feedback voltage, V stands for rad in every unit above.
 
     Raises
     ------

@@ -180,7 +180,7 @@ class Trace:
         The servo at a time t after the first sample is that which this command leads to at t − delay [s]; negative
         where the command begins before the first sample.
     parameters : mapping of str to float
-        What differs from the fitted servo in this log (SI): what the log says, and when its program's first tick comes.
+        Differences from the fitted servo in this log (SI): what the log says, and when its program's first tick comes.
     initial : mapping of str to float
         Where the shaft was at the command's t = 0 (SI); empty where the servo stands where its first command says.
     offset : float

@@ -518,9 +518,9 @@ class Unidentifiable:
     direction : tuple of float
         How far each of them goes; of logarithms where a number is searched by its logarithm.
     combinations : tuple of str
-        What is determined nevertheless, such as ``"motor.torque_constant · gear.gear_reduction"``.
+        Combinations that are determined nevertheless, such as ``"motor.torque_constant · gear.gear_reduction"``.
     remedies : tuple of str
-        What would tell them apart.
+        Measurements that would tell them apart.
     """
 
     parameters: tuple[str, ...]
@@ -552,7 +552,7 @@ def vague_directions(information: Array, inflation: float = 1.0,
     inflation : float
         Of standard errors, by correlated residuals.
     sizes : ndarray, shape (p,), optional
-        What counts as the whole of a number; 1 unless given.
+        Value that counts as the whole of each number; 1 unless given.
 
     Examples
     --------

@@ -115,7 +115,7 @@ def fitted_rig(forecast: Forecast, start: Point, asked: Sequence[str], show: Cal
     start : Point
         Where the search begins.
     asked : sequence of str
-        What is searched.
+        Searched parameters.
     show : callable
         Told the share that is done, and what goes on.
     """
@@ -215,9 +215,9 @@ def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] 
         `PulseServo`, `PulseServoInductive`, `BoundedServo` or `DigitalServo`; that of the servo file's [fit] unless
         given, else the one that stands for the servo (`models.default_class`).
     mend : sequence of str
-        What is put right in the logs first, as of `identify`.
+        Findings that are put right in the logs first, as of `identify`.
     nuisance : sequence of str
-        What belongs to the rig and is fitted to these logs: as of `identify`. Where that is no nearer than no rig at
+        Parameters of the rig that are fitted to these logs: as of `identify`. Where that is no nearer than no rig at
         all, there is none.
     sensors : sequence of str, optional
         Measured signals that are compared; the angle and all currents unless given. The errors are those of the angle.

@@ -57,7 +57,7 @@ class Cause:
     before, after : float
         Rms error on logs, or parts of logs, that took no part in the trial [rad; V where no angle was measured].
     remedy : str
-        What to do about it.
+        Remedy for it.
     """
 
     name: str
@@ -184,7 +184,7 @@ def judge(series: Sequence[SensorSeries], sensor: str, rows: Sequence[Rows] = ()
     sensor : str
         Its name, for the words.
     rows : sequence of Rows, optional
-        What each log says of the shared numbers.
+        Rows of each log on the shared numbers.
     numbers : int
         How many were fitted.
     accuracy : float

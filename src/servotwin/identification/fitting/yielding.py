@@ -63,7 +63,7 @@ class Doubts:
     spans : mapping of str to tuple of float
         Ranges (SI) of what pulses tell.
     systematic : Systematic, optional
-        What the servo file leaves out does to the numbers; `ends` hold it.
+        Effect on the numbers of what the servo file leaves out; `ends` hold it.
     deeper : Outcome, optional
         The best that was seen on the way, if that is clearly better than where the search ended.
     """
@@ -326,10 +326,10 @@ class Yielded:
     ----------
     name : str
     file, file_std : float
-        What the prior says (SI).
+        Mean and standard deviation of the prior (SI).
     logs, logs_std : float
-        What the fit finds without it, and its standard error (SI); the latter is nan where the logs do not determine
-        the number, or it has no interval.
+        Value that the fit finds without it, and its standard error (SI); the latter is nan where the logs do not
+        determine the number, or it has no interval.
     apart : float
         Standard errors between the two, by how much better the logs are fitted without the prior.
     logs_lower, logs_upper : float
@@ -378,9 +378,9 @@ class Widened:
     ----------
     name : str
     file, file_std : float
-        What the prior says (SI).
+        Mean and standard deviation of the prior (SI).
     logs : float
-        What the fit finds (SI).
+        Value that the fit finds (SI).
     apart : float
         Standard errors between the two, by how much better the logs are fitted without the prior.
     std : float

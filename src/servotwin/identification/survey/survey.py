@@ -53,7 +53,7 @@ class Clock(NamedTuple):
     jitter : float
         Standard deviation of the steps that are none of a gap [s].
     unit : float
-        What stamps are whole multiples of; 0 where that is small beside the period, or they are none [s].
+        Step that stamps are whole multiples of; 0 where that is small beside the period, or they are none [s].
     gaps : tuple of Gap
         The longest first.
     off_beat : int
@@ -431,7 +431,7 @@ class Values(NamedTuple):
     noise : float
         Standard deviation, from second differences.
     step : float
-        What values are whole multiples of; 0 where they are none.
+        Step that values are whole multiples of; 0 where they are none.
     counts : int
         Steps of a whole turn, where it is an angle and their number a power of two; else 0.
     flat_low, flat_high : int
@@ -523,7 +523,7 @@ class Survey:
         By measured signal.
     motion : Motion
     wrong : tuple of str
-        What cannot be right, each in one sentence that says what to do.
+        Errors of the log, each in one sentence that says what to do.
     missing : tuple of str
         Experiments that it lacks, and what they would tell.
     """

@@ -192,7 +192,7 @@ class WireRow(NamedTuple):
     source : str
         Document that prints the value, or "assumed".
     does : str
-        What a write does on a wire.
+        Effect of a write on a wire.
     """
 
     address: int

@@ -28,11 +28,11 @@ class Register:
     lower, upper : int
         Range of the raw value.
     factory : int
-        What it holds when the servo is new, or after power-up.
+        Value when the servo is new, or after power-up.
     only : tuple of int
         The values that are computed, where they are not all of the range; empty: all.
     why : str
-        What to say of the others.
+        Reason why the others are not computed.
     reading : bool
         Whether the servo writes it, as what it measured or was told last: a new one holds nothing to speak of.
     size : int
@@ -144,7 +144,7 @@ class RegisterModel:
     page : str
         Address of that page, for people.
     values : mapping of str to int
-        What its registers hold when it is new, where that is not what most of the family hold.
+        Values of its registers when it is new, where they are not those of most of the family.
     ranges : mapping of str to tuple of int
         Lowest and highest value of registers, where these are not the family's.
     units : mapping of str to str
@@ -385,7 +385,7 @@ class Family:
     Parameters
     ----------
     label : str
-        What people call servos of this family, such as ``"Feetech STS"``.
+        Usual name of servos of this family, such as ``"Feetech STS"``.
     model : str
         Of the family, such as ``"STS3250"``.
     registers : mapping of str to Register

@@ -96,9 +96,9 @@ class TaskRun:
     criterion : Criterion
         By which the joints' was chosen.
     run : RobotRun
-        What servos and joints have done, from the settling before the motion to the rest after it.
+        Record of servos and joints, from the settling before the motion to the rest after it.
     control : ControlRun
-        What the controller has done; its times count from the beginning of the settling.
+        Record of the controller; its times count from the beginning of the settling.
     """
 
     arm: Arm
@@ -175,11 +175,11 @@ def run_task(arm: Arm, servos: Model | Mapping[str, Model], path: ToolPath, *, c
         One kind at all joints, or by joint.
     path : ToolPath
     criterion : Criterion, optional
-        What a redundant arm does with its free joint; joints move as little as they can unless given.
+        Use that a redundant arm makes of its free joint; joints move as little as they can unless given.
     steering : Steering, optional
         Which controller; plain commands unless given.
     believed : Belief, optional
-        What it believes of servos and arm; the truth unless given.
+        Belief of the controller about servos and arm; the truth unless given.
     bus : Supply, optional
         That servos share, as of `ServoDrive`.
     settle : float
@@ -243,7 +243,7 @@ class IdealTask(NamedTuple):
     tool : ndarray, shape (n, 3)
         [m]
     torque : mapping of str to ndarray
-        What it takes of each joint, without servos [N m or N]
+        Torque or force of each joint that it takes, without servos [N m or N]
     contour : Contour
     """
 

@@ -31,7 +31,7 @@ class Told(NamedTuple):
     gain, zero : float
         1 and 0 where the servo turns endlessly: it is told a pulse width or a goal, whatever its mount.
     rest : float
-        What it is told before anybody has told it anything; nan: to hold where it begins.
+        Command before anybody has given one; nan: to hold where it begins.
     unit : str
         Of a command of the joint; empty where that is the joint's own, rad of a hinge and m of a slide.
     """

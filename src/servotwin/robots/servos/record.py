@@ -63,7 +63,7 @@ def set_iterations(model: Any, joints: Sequence[Joint], solver: str) -> SolverNo
     Returns
     -------
     SolverNote or None
-        What was raised, or what is low and was left; None if neither.
+        Setting that was raised, or that is low and was left; None if neither.
 
     Raises
     ------
@@ -245,7 +245,7 @@ class Record(Mapping[str, ServoRecord]):
     rows : ndarray, shape (n, numbers)
         Ends of the ticks [s], which are its `time`, energies, then what is kept of each servo.
     solver_note : SolverNote, optional
-        What was done about MuJoCo's solver.
+        Change of MuJoCo's solver.
     said : tuple of str
         Sentences on what was assumed of the servos.
     slides : tuple of str

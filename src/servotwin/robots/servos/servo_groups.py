@@ -112,7 +112,7 @@ class Crew:
     which : ndarray of int64
         Their numbers among all.
     parameters : mapping
-        What differs among them.
+        Parameters that differ among them.
     bus : list of tuple (Supply, lanes)
     watched : bool
         Whether the least voltages of supplies are kept.
@@ -374,9 +374,9 @@ class Harbour:
     table : ndarray of int64
         How many there are, then addresses of data and of words, for compiled code.
     asked : ctypes function
-        What compiled code calls.
+        Function that compiled code calls.
     error : Exception or None
-        What could not be raised there.
+        Exception that could not be raised there.
     """
 
     def __init__(self, joints: Sequence[Joint], crews: Sequence[Crew], dofs: int) -> None:

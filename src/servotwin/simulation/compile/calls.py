@@ -45,11 +45,11 @@ class Call:
     function : int
         Address of the C function `int64_t f(int64_t *words)`.
     words : ndarray of int64
-        What it is called with the address of.
+        Words of which the function is given the address.
     kept : tuple
-        What it uses the memory of.
+        Objects of which it uses the memory.
     before : Call or None
-        What has to be called before, each time.
+        Call that has to precede it, each time.
     """
 
     function: int

@@ -48,7 +48,7 @@ class Function:
     kinds : tuple of kinds
         Of its arguments.
     result : str
-        What it returns, as `translate.Entry` says it.
+        Returned values, as `translate.Entry` says them.
     """
 
     def __init__(self, address: int, kinds: tuple[Kind, ...], result: str) -> None:

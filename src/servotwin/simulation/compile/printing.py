@@ -48,7 +48,7 @@ class Variables:
     counters : set of str
         Those that count loops alone, each declared by its loops.
     before : dict
-        What is declared, with a value of zero, before a statement.
+        Variables that are declared, with a value of zero, before a statement.
     """
 
     def __init__(self, own: Specialised) -> None:

@@ -27,11 +27,11 @@ class Recipe:
     single : bool
         Whether floats have 32 bits.
     knows : int
-        What they follow, of all that a servo may ask for (`engine.demands`): flags of `terms.dependence`.
+        Demands that they follow, of all that a servo may ask for (`engine.demands`): flags of `terms.dependence`.
     leaves : int
         Where numbers act that they leave to other kernels.
     always : int
-        What all servos ask for that will run.
+        Demands of all servos that will run.
     never : tuple of str
         Constants of the engine that nothing will be equal to, beside those that come up by nothing that they know.
     by_numbers : bool

@@ -153,7 +153,7 @@ class LaneInputs:
     count : int
         Number of lanes B.
     numbers, words : mapping of str to ndarray, shape (B,)
-        What differs of servo and load, by dotted name.
+        Numbers and words of servo and load that differ, by dotted name.
     commands, loads : tuple
         Each once; `command_of` and `load_of` say which is a lane's.
     initial : mapping of str to ndarray, shape (B,) or (1,)

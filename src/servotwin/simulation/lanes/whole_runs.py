@@ -102,7 +102,7 @@ class VectorMemory:
     records, firms : ndarray, shape (lanes,)
         Records of each lane: of `models.engine.memory.Memory`, and of `models.terms.control.Firm`.
     command, torque : ndarray, shape (lanes,)
-        What each is told: width of the pulse [s] or control voltage [V]; external torque [N m].
+        Inputs of each: width of the pulse [s] or control voltage [V]; external torque [N m].
     status, ended : ndarray, shape (lanes,)
         Code of its `Status`, and when it failed [s].
     work : ndarray, shape (lanes,)

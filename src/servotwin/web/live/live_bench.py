@@ -420,7 +420,7 @@ class LiveBench:
         kind : str
             One of `servotwin.web.live.actions.KINDS`.
         value : object
-            What the kind takes.
+            Value of the kind.
         servo : int, optional
             To which servo; to all that it fits unless given.
 

@@ -256,9 +256,9 @@ class Scene:
     control : mapping of str to float
         Of the control circuit that makes the pulses, by `control_circuit.CONTROL_FIELDS`; empty: pulses are exact.
     view : mapping
-        What the page alone knows.
+        Settings that only the page knows.
     lesson : mapping
-        What a lesson says; empty for a bench that is none.
+        Texts of a lesson; empty for a bench that is none.
 
     Examples
     --------
@@ -457,7 +457,7 @@ def taken_over(scene: Scene, models: Sequence[Model], load: Mapping[str, float],
     models : sequence of Model
         With their numbers of now.
     load : mapping
-        What was changed of loads, by dotted name (SI).
+        Changed numbers of loads, by dotted name (SI).
     frame_rate : float
         Of now [Hz].
     file : str

@@ -130,7 +130,7 @@ def packed(header: Mapping[str, Any], push: Push) -> bytes:
     Parameters
     ----------
     header : mapping
-        What is told beside.
+        Entries that are told beside.
     push : Push
 
     Examples

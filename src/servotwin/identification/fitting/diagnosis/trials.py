@@ -183,7 +183,7 @@ class Candidate:
     ----------
     name : str
     words : str
-        What is then said, before the gain.
+        Statement of the cause, before the gain.
     remedy : str
     settings : callable
         Returns the settings from which it is tried; none where it makes no sense.
@@ -587,7 +587,7 @@ def diagnose(task: Task, point: Point, traces: Sequence[Trace], verdict: Verdict
     sensor : str
         The angle's name.
     budget : float
-        What may be simulated, in seconds of one lane of closed form.
+        Limit of simulation, in seconds of one lane of closed form.
     half : mapping of str to float
         Half widths of the intervals, on the scale of the search.
     tell : callable

@@ -99,7 +99,7 @@ class LogPart(NamedTuple):
     shared : ndarray, shape (m, p) or (m, 0)
     own : ndarray, shape (m, l) or (m, 0)
     later : ndarray, shape (m,)
-        What a delay changes: derivative by a scaled delay. Of signals that are no angles only where derivatives or
+        Effect of a delay: derivative by a scaled delay. Of signals that are no angles only where derivatives or
         rates were asked for.
     """
 
@@ -323,7 +323,7 @@ class Case:
     places : mapping of str to ndarray of int
         Which of them count for a sensor.
     values : mapping of str to ndarray
-        What that sensor measured there (SI).
+        Values that the sensor measured there (SI).
     start : tuple of float
         Angle [rad] and speed [rad/s] at the first sample as measured.
     scatter : float

@@ -37,7 +37,7 @@ class Finding:
     log : str
         Name of the log.
     sentence : str
-        What is seen, when, and what to do.
+        Observation, its time, and the remedy.
     mended : Log, optional
         The log with this, and the kinds before it in the list, put right; None where nobody can say how.
 

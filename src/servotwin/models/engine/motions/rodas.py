@@ -60,7 +60,7 @@ def step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, jac: tuple[float, .
     Parameters
     ----------
     numbers, mode, u, tau
-        What moves, and under which inputs.
+        Numbers and mode of the plant, its input, and the external torque.
     jac : tuple
         ∂F/∂(q, w, i), ∂E/∂(q, w, i), ∂F/∂t, ∂E/∂t at the start.
     t, y, h

@@ -394,7 +394,7 @@ class Derived:
     head : str
         Imports and constants.
     primitives : dict of str to str
-        What C has an expression for, by its name in the module.
+        Functions that C has an expression for, by their names in the module.
     in_any_order : frozenset of str
         Functions whose sums may be taken in any order.
     called : frozenset of str

@@ -45,7 +45,7 @@ class Expressions:
     Attributes
     ----------
     printers : dict
-        What prints each kind of expression.
+        Function that prints each kind of expression.
     """
 
     printers: ClassVar[dict[type[ast.expr], Callable[[Any, Any], str]]] = {}

@@ -21,7 +21,7 @@ class TranslationError(ServotwinError):
     line : str
         The text that has no form.
     instead : str
-        What to write.
+        Text to write in its place.
     """
 
     def __init__(self, function: str, line: str, instead: str) -> None:

@@ -42,7 +42,7 @@ class Entry:
         Of the function in C.
     arguments : tuple of kinds
     result : str
-        What the kernel returns: "" for nothing, "i" and "b" for a whole number and a truth value that the function
+        Result of the kernel: "" for nothing, "i" and "b" for a whole number and a truth value that the function
         itself returns, else what stands behind the arguments: "d" for a float, brackets around what is in a tuple.
     """
 

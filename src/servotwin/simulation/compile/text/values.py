@@ -47,7 +47,7 @@ class Values:
     kinds : dict
         Of its expressions, by node.
     calls : dict
-        What its calls of derived functions call, by node.
+        Functions that its calls of derived functions call, by node.
     local : dict
         Kinds of arguments and local variables, by name.
     owned : set of str

@@ -49,7 +49,7 @@ class Fits:
     Parameters
     ----------
     brought : Brought
-        What the visitor brought.
+        Uploads of the visitor.
     """
 
     def __init__(self, brought: Brought) -> None:

@@ -60,7 +60,7 @@ class Work:
         Raises
         ------
         InputError
-            What the work says is wrong, or that it took too long.
+            If the work says that something is wrong, or took too long.
         EndedError
             If it was ended.
         """
