@@ -256,7 +256,7 @@ class Scene:
     control : mapping of str to float
         Of the control circuit that makes the pulses, by `control_circuit.CONTROL_FIELDS`; empty: pulses are exact.
     view : mapping
-        What the page alone knows.
+        Values for the page alone.
     lesson : mapping
         What a lesson says; empty for a bench that is none.
 
