@@ -1,4 +1,4 @@
-"""Servo and control circuit on one supply: what the servo draws comes back in the pulse that it is told to follow."""
+"""Servo and control circuit on one supply: what the servo draws comes back in the pulse that it is to follow."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def run_on_one_supply(bench: Bench, command: Signal, duration: float, control: C
     CommandError
         If the command is no voltage.
     InputError
-        If the duration or the output step is out of range, the model knows no supply, or the delay goes beyond the
+        If the duration or the output step is out of range, the model has no supply, or the delay goes beyond the
         frame.
 
     Examples

@@ -610,7 +610,7 @@ class LoadCalibration:
     words: tuple[str, ...] = field(repr=False)
 
     def findings(self) -> tuple[str, ...]:
-        """Return all that is worth a sentence: the sheet, what is told and what not, the supply, curvature."""
+        """Return all that is worth a sentence: the sheet, what is determined and what not, the supply, curvature."""
         return self.words
 
     def figure(self, name: str) -> LoadFigure:

@@ -1,4 +1,4 @@
-"""How a shaft stands that was told to stand still: where, how far it swings, how often."""
+"""How a shaft stands that was commanded to stand still: where, how far it swings, how often."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Standing:
     current : float
         Root of the mean square of the armature current [A].
     lowest_bus : float
-        Lowest voltage of the supply; nan where the model knows none [V].
+        Lowest voltage of the supply; nan where the model has none [V].
     """
 
     mean: float

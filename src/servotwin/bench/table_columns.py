@@ -651,7 +651,7 @@ def settled_ways(table: BenchTable) -> NDArray[np.float64] | None:
     """Return which way each row was read, as `BenchTable.ways`, but at turning points by what was read there.
 
     A value that stands twice where the ways turn may have been read twice on one way, or again after the shaft had gone
-    beyond; of the first row no one knows where the shaft came from. If the other rows show hysteresis, such a row that
+    beyond; of the first row it is unknown where the shaft came from. If the other rows show hysteresis, such a row that
     lies off the line of its way by three times their noise, and nearer to that of the other way, is of the other.
 
     Examples

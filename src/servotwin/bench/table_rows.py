@@ -336,7 +336,7 @@ _LEAST_STEP = 4.0  # of the resolution of t_a: whole numbers have a smaller comm
 _MOST_STEP = 64.0  # µs: beyond it pulses were set to round numbers
 _HALVED = 0.5  # of the largest residual: what a step has to bring it to
 _LINES_ALIKE = 2  # that the same step has to help
-_MILLI = 0.1  # V: smaller residuals are told in mV
+_MILLI = 0.1  # V: smaller residuals are printed in mV
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -559,7 +559,7 @@ def _off(fit: TableFit, residual: float) -> str:
 def _shown(fit: TableFit) -> tuple[float, str]:
     return (1e3, "mV") if fit.unit == "V" and fit.line.max_residual < _MILLI else (1.0, fit.unit)
 
-# --- A table that was read on the way up and on the way down: hysteresis, told apart from noise -----------------------
+# --- A table that was read on the way up and on the way down: hysteresis, distinguished from noise --------------------
 
 LEVEL = 0.05
 """Chance that a table without hysteresis is said to have one: shared among its lines."""

@@ -343,7 +343,7 @@ def _told(found: list[Judged], asked: _Asked, shop: Prices | None, *, why: bool)
 
 
 def _footnotes(shown: list[Judged], asked: _Asked) -> list[str]:
-    """Return what one has to know to read the table."""
+    """Return the notes that the table needs."""
     notes, looked = [], [each for each in shown if each.rest is not None]
     if len(looked) < len(shown) and not asked.named:
         notes.append(f"what takes long is simulated of the first {len(looked)}; --among ID,ID names others")

@@ -46,7 +46,7 @@ def loop_pairs(loop: Loop, torque: float | None = None) -> list[tuple[str, str]]
     ----------
     loop : Loop
     torque : float, optional
-        A load whose droop is told as well [N m].
+        A load whose droop is stated as well [N m].
 
     Examples
     --------
@@ -349,7 +349,7 @@ def _while(seconds: float) -> str:
 
 
 def notes(sheet: DataSheet) -> list[str]:
-    """Return what one has to know to read a sheet: flags of what the maker prints, and what the model is."""
+    """Return the notes that a sheet needs: flags of what the maker prints, and what the model is."""
     from servotwin.datasheet.turning import slow_rotor
     from servotwin.models import BoundedServo, DigitalServo
 

@@ -312,7 +312,7 @@ def _advice(fit: Fit) -> Advice:
 
 
 def _further(model: Model) -> list[str]:
-    """Return the sensor that is easiest to add, of those that the model knows."""
+    """Return the sensor that is easiest to add, of those that the model has."""
     known: tuple[str, ...] = ("supply_current", "armature_current")
     return [name for name in known if name in model.available][:1]
 

@@ -56,7 +56,7 @@ def watch(words: Sequence[str]) -> None:
             if signal.getsignal(number) is signal.SIG_DFL:
                 signal.signal(number, _interrupted)
             elif number == _HANGUP:
-                signal.signal(number, lambda number, frame: _away_from_terminals())  # and goes on
+                signal.signal(number, lambda number, frame: _away_from_terminals())  # and continues
         _state.terminals = [stream for stream in (0, 1, 2) if os.isatty(stream)]
 
 

@@ -163,7 +163,7 @@ class Brief(TyperCommand):
 
 
 class Commands(typer.Typer):
-    """Commands of one kind, `Brief` ones: all of them know `--help-all`."""
+    """Commands of one kind, `Brief` ones: all of them have `--help-all`."""
 
     def command(self, name: str | None = None, **options: Any  # type: ignore[override]
                 ) -> Callable[[Command], Command]:

@@ -174,7 +174,7 @@ def _fit_result(found: ArmFit, told: dict[str, Any], stems: dict[str, str]) -> R
 
 # --- `servotwin robot`: robots whose joints are servos ----------------------------------------------------------------
 
-_MOST_NOTES = 6  # that are told
+_MOST_NOTES = 6  # that are printed
 
 
 robot = Commands(

@@ -35,11 +35,11 @@ if TYPE_CHECKING:
 
 HEAD = ("joint", "rms error", "at most", "late by", "peak", "supply", "winding", "margin")
 _ZERO_CELSIUS = 273.15
-_MOST = 100.0  # times: beyond it a margin is not told in numbers
+_MOST = 100.0  # times: beyond it a margin is not stated in numbers
 
 
 def run_facts(run: RobotRun, sized: dict[str, Sizing], robot: str) -> dict[str, Any]:
-    """Return what is worth knowing of a run, in SI, ready for JSON."""
+    """Return the facts of a run that matter, in SI, ready for JSON."""
     return {
         "robot": robot, "motion": run.motion.source, "duration": run.motion.duration,
         "timestep": float(run.model.opt.timestep), "blend_window": run.ideal.window,

@@ -144,7 +144,7 @@ def points_of(text: str | None, task: str = "square", size: str | None = None) -
 
 
 def mobile_facts(run: WaypointRun, servo: str, encoders: int | None, *, unequal: bool, ideal: bool) -> dict[str, Any]:
-    """Return what is worth knowing of a drive, in SI."""
+    """Return the facts of a drive that matter, in SI."""
     return {"robot": "mobile", "actuators": "ideal" if ideal else "servos", "servo": None if ideal else servo,
             "unequal": unequal and not ideal, "encoders": encoders, "waypoints": run.waypoints.tolist(),
             "arrived": run.arrived, "missed": run.missed, "turned_astray": run.turned_astray,
@@ -167,7 +167,7 @@ def mobile_pairs(found: dict[str, Any]) -> list[tuple[str, str]]:
 
 def mobile_result(run: WaypointRun, found: dict[str, Any], names: Sequence[str],
                   output_step: float) -> files.RobotResult:
-    """Return what is told and written of a drive."""
+    """Return what is printed and written of a drive."""
     label, record = "ideal wheels" if run.record is None else "servos", run.record
 
     def writers() -> Writers:
@@ -317,7 +317,7 @@ def conditions_picture(done: Sequence[Outcome]) -> Figure:
 
 
 def comparison_result(found: dict[str, Any], done: Sequence[Outcome]) -> files.RobotResult:
-    """Return what is told and written of a comparison."""
+    """Return what is printed and written of a comparison."""
     columns = {name: [case[name] for case in found["cases"]] for name in found["cases"][0]}
     return files.RobotResult(
         facts=found, title="distance of the tool from where it should be, rms, by pulse servos, mean of all tasks",
@@ -398,7 +398,7 @@ def _save_windows(traces: Sequence[plotting.ReplayTrace], page: int, path: Path)
 
 
 def validation_result(found: RobotValidation, told: dict[str, Any]) -> files.RobotResult:
-    """Return what is told and written of a validation."""
+    """Return what is printed and written of a validation."""
     worst, titles, rows = found.windows[0], validation_head(found), validation_rows(found)
     late = ", ".join(f"{name} {1e3 * value:.0f} ms" for name, value in found.latency.items())
     first = [("goals act later by", late),
@@ -481,7 +481,7 @@ def other_ways(arm: Arm, path: ToolPath, criterion: Criterion, joints: JointPath
 
 
 def task_facts(run: TaskRun, sized: Mapping[str, Sizing], ways: Ways, controller: str) -> dict[str, Any]:
-    """Return what is worth knowing of a task that servos have done, in SI, ready for JSON."""
+    """Return the facts that matter of a task that servos have done, in SI, ready for JSON."""
     return facts(run.run, dict(sized), run.arm.name) | _of_task(ways) | {
         "controller": controller, "chips_bypassed": run.control_bypasses, "actuators": "servos",
         "task_metrics": run.metrics._asdict(),
@@ -489,7 +489,7 @@ def task_facts(run: TaskRun, sized: Mapping[str, Sizing], ways: Ways, controller
 
 
 def ideal_facts(done: IdealTask, ways: Ways) -> dict[str, Any]:
-    """Return what is worth knowing of a task that ideal actuators have done, in SI, ready for JSON."""
+    """Return the facts that matter of a task that ideal actuators have done, in SI, ready for JSON."""
     return {"robot": ways.joints.arm.name, "motion": done.motion.source, "duration": done.motion.duration,
             **_of_task(ways), "actuators": "ideal",
             "ideal_contour": {"rms": done.contour.rms, "largest": done.contour.largest},
@@ -533,7 +533,7 @@ def way_rows(found: Mapping[str, Any]) -> list[tuple[str, ...]]:
 
 def task_result(run: TaskRun, sized: Mapping[str, Sizing], ways: Ways, names: Sequence[str], controller: str,
                 output_step: float) -> files.RobotResult:
-    """Return what is told and written of a task that servos have done."""
+    """Return what is printed and written of a task that servos have done."""
     found, asked = task_facts(run, sized, ways, controller), ways.joints.path
     inside = run.moving
     time = run.run.time[inside]
@@ -551,7 +551,7 @@ def task_result(run: TaskRun, sized: Mapping[str, Sizing], ways: Ways, names: Se
 
 
 def ideal_result(done: IdealTask, ways: Ways, names: Sequence[str], output_step: float) -> files.RobotResult:
-    """Return what is told and written of a task that ideal actuators have done."""
+    """Return what is printed and written of a task that ideal actuators have done."""
     found = ideal_facts(done, ways)
     trace = ("ideal actuators", done.time, done.tool, done.contour.error)
     return _result(found, ways, lambda: {

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from servotwin.signals import Signal
 
 
-# --- How a command that fits goes on after a signal, or the time that it was given: with the best so far --------------
+# --- How a command that fits continues after a signal, or the time that it was given: with the best so far ------------
 
 class _Fit(Protocol):
     @property

@@ -224,7 +224,7 @@ _ENERGY = ("winding", "bridge", "brush", "conversion", "friction", "stops", "loa
 
 
 def facts(result: Result) -> dict[str, Any]:
-    """Return what is worth knowing of a result, in SI, ready for JSON.
+    """Return the facts of a result that matter, in SI, ready for JSON.
 
     Examples
     --------

@@ -70,7 +70,7 @@ def wrapped(text: str, width: int, indent: str = "", *, ranges: bool = True) -> 
 
 
 def text_lines(text: str, width: int) -> list[Line]:
-    """Return a text as lines; what is indented goes on below itself."""
+    """Return a text as lines; what is indented continues below itself."""
     return [Line(line) for part in text.split("\n")
             for line in wrapped(part, max(width, _LEAST), "  " if part.startswith(" ") else "")]
 

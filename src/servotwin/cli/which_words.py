@@ -31,7 +31,7 @@ _PRICE = "price"
 _FORM = "NAME=VALUE, such as current=1A, mass=60g, voltage=7.4V, travel=180deg, time=0.2s, kind=digital or price=20"
 _ZERO_CELSIUS = 273.15
 _BURNT = 300.0  # °C
-_MANY = 100.0  # times; beyond it a margin is not told in numbers
+_MANY = 100.0  # times; beyond it a margin is not stated in numbers
 
 
 class Prices(NamedTuple):
@@ -177,13 +177,13 @@ def _motion_cells(tried: Tried) -> dict[str, str]:
 
 
 def note_pairs(found: Sequence[Judged]) -> list[tuple[str, str]]:
-    """Return what to know of candidates before buying, as pairs of name and text."""
+    """Return the notes on candidates to read before buying, as pairs of name and text."""
     said = ((each.candidate.servo.name, "; ".join((*each.candidate.notes, *remarks(each)))) for each in found)
     return [(name, text) for name, text in said if text]
 
 
 def remarks(each: Judged) -> list[str]:
-    """Return what was seen of a candidate that one wants to know: that it gets too hot, gives way, or buzzes."""
+    """Return what was seen of a candidate that matters to a buyer: that it gets too hot, gives way, or buzzes."""
     if each.rest is None:
         return []
     lift, found = each.rest.lift, []
@@ -212,7 +212,7 @@ def mass_cell(mass: float) -> str:
 
 
 def celsius(kelvin: Real) -> str:
-    """Return a temperature [K] in degrees Celsius; what has burnt long before is not told in numbers.
+    """Return a temperature [K] in degrees Celsius; what has burnt long before is not stated in numbers.
 
     Examples
     --------

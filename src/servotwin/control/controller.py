@@ -30,7 +30,7 @@ VOLTAGE, ANGLE = "armature_voltage", "command_angle"
 
 
 class Decision(NamedTuple):
-    """The decision of a controller: a command [V or rad], and the state to go on from."""
+    """The decision of a controller: a command [V or rad], and the state to continue from."""
 
     command: Any
     state: Any
@@ -40,7 +40,7 @@ class Decision(NamedTuple):
 class Controller(Protocol):
     """A frozen object whose numbers are its own; its state pickles, compares, and is passed in and out.
 
-    A controller knows measured signals only, so that the same object runs on `Simulator`, on `ServoDrive` and on
+    A controller has measured signals only, so that the same object runs on `Simulator`, on `ServoDrive` and on
     hardware. All of it is elementwise: numbers of one servo, or arrays (n,) of the joints of a robot.
     """
 
@@ -54,7 +54,7 @@ class Controller(Protocol):
 
     @property
     def ahead(self) -> Any:
-        """How far ahead it is told the reference: 0, a lead [s], or an array of them."""
+        """How far ahead it is given the reference: 0, a lead [s], or an array of them."""
 
     def initial(self, measured: Measured, reference: Reference) -> Any:
         """Return its state before the first tick."""

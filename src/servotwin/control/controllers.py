@@ -116,11 +116,11 @@ class ComputedTorque:
         ζ [1].
     load_torque : callable, optional
         Torque [N m] of measured angle and speed and commanded acceleration, beside the inertia and damping that the
-        inverse knows: `LoadModel` of one servo, the rigid-body dynamics of a robot.
+        inverse has: `LoadModel` of one servo, the rigid-body dynamics of a robot.
     filter_rate : float
         g of the two poles through which the speed is seen [rad/s].
     ahead : float
-        How far ahead it is told the reference [s].
+        How far ahead it is given the reference [s].
 
     Raises
     ------
@@ -300,7 +300,7 @@ class SidedState(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class _Sided:
-    """Moves what a controller commands, or what it is told, to the side to which the reference goes."""
+    """Moves what a controller commands, or what it is given, to the side to which the reference goes."""
 
     controller: Controller
     least_speed: Any = 1e-3
@@ -442,7 +442,7 @@ class Pid:
     tracking_time : float, optional
         T_t [s]; √(k_d/k_i) unless given, without a derivative k_p/k_i or, where that is 0 too, 1/k_i.
     ahead : float
-        How far ahead it is told the reference [s].
+        How far ahead it is given the reference [s].
 
     Raises
     ------
@@ -533,11 +533,11 @@ class Feedforward:
         Its own numbers.
     load_torque : callable, optional
         External torque [N m] of angle, speed and acceleration of the reference, beside the inertia and damping that the
-        inverse knows, such as `LoadModel`.
+        inverse has, such as `LoadModel`.
     feedback : Pid, optional
         Of the same period, that commands a voltage; its bounds are those of the sum.
     ahead : float
-        How far ahead it is told the reference [s].
+        How far ahead it is given the reference [s].
 
     Raises
     ------

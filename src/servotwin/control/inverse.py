@@ -167,7 +167,7 @@ class ServoInverse:
 
 
 def inverse_of(model: Model, load: Load | Part | None = None) -> ServoInverse:
-    """Return what a controller believes that knows a model, and of a load its inertia and damping.
+    """Return the inverse of a model for a controller, with the inertia and damping of a load.
 
     Gravity, springs and recorded torques of the load are what `LoadModel` computes.
 
@@ -222,7 +222,7 @@ def _own_loop(model: Model, R: float) -> tuple[float, float]:
         return model.value("firmware.proportional_gain") * V, float(model.firmware().h)
     if isinstance(model, PulseServo | PulseServoInductive):
         model.check_mean("the inverse servo")
-        behind = R / model.value("motor.armature_resistance")  # the mean voltage is told behind R_a alone
+        behind = R / model.value("motor.armature_resistance")  # the mean voltage is given behind R_a alone
         s_mu = model.value("electronics.one_shot_slope") * p
         return behind * model.mean_gain() * p, 0.5 * model.value_or("electronics.deadband", 0.0) / s_mu
     if model.servo.get("electronics.bridge_gain") is None or "electronics.bridge_gain" not in model.requires:

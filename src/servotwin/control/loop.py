@@ -39,7 +39,7 @@ def closed_loop_poles(controller: Controller, servo: ServoInverse, *, lag: float
     Parameters
     ----------
     controller : Controller
-        Told the reference of one time.
+        Gets the reference of one time.
     servo : ServoInverse
         Of the plant, numbers of one servo.
     lag : float
@@ -174,7 +174,7 @@ class ControlRun:
     Parameters
     ----------
     path : Path
-        Path that it was told to follow.
+        The path that it was to follow.
     time : ndarray, shape (n,)
         Of its ticks [s].
     command : ndarray, shape (n,) or (n, joints)
@@ -269,7 +269,7 @@ def run_loop(port: Port, controller: Controller, path: Path, duration: float | N
     duration : float, optional
         That of the path unless given [s].
     check : bool
-        Whether to look at stability first, where the port knows its servo.
+        Whether to look at stability first, where the port has a nominal servo.
 
     Raises
     ------

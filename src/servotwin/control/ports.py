@@ -1,4 +1,4 @@
-"""Ports of controllers: they measure, send, and let time go on; simulated here, hardware later."""
+"""Ports of controllers: they measure, send, and advance time; simulated here, hardware later."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ _TAPPED = ("potentiometer.feedback_gain", "potentiometer.feedback_offset")  # st
 
 
 def bare_bridge(servo: Servo, *, duty_steps: int = 1000, period: float = 1e-3, delay: float = 0.0) -> DigitalServo:
-    """Return motor, gear and bridge of a servo without its own loop, told by duties: the chip is bypassed.
+    """Return motor, gear and bridge of a servo without its own loop, commanded by duties: the chip is bypassed.
 
     Its program hands a goal on as the duty, as servos with a mode for PWM do; `SimulatedServo` takes voltages for it
     and sends v/(V_oc − V_ce0). The potentiometer can still be tapped; end stops do not count.
@@ -193,7 +193,7 @@ class Port(Protocol):
 
     @property
     def nominal(self) -> ServoInverse | None:
-        """The plant as its maker knows it, for a look at stability before running; None where nobody does."""
+        """The plant as its maker states it, for a look at stability before running; None where there is none."""
 
     @property
     def time(self) -> float:
@@ -212,7 +212,7 @@ class Port(Protocol):
         """Return at a time [s]."""
 
     def record(self, time: Array) -> Mapping[str, Any]:
-        """Return true signals since the start at times [s], by name; none on hardware, which knows none."""
+        """Return true signals since the start at times [s], by name; none on hardware, which has none."""
 
 
 class SimulatedServo:

@@ -100,7 +100,7 @@ class Candidate:
     reasons : tuple of Reason
         Why it does not suit; empty where it does.
     notes : tuple of str
-        Remarks to know before buying it.
+        Notes to read before buying.
     """
 
     servo: Servo
@@ -251,7 +251,7 @@ def _or_unknown(verb: str, value: float, unit: str, what: str) -> str:
 
 
 def notes_of(model: Model, voltage: float) -> tuple[str, ...]:
-    """Return what to know of a servo on a supply [V] before buying."""
+    """Return the notes on a servo on a supply [V] to read before buying."""
     servo = model.servo
     most = highest_voltage(servo)
     notes = [f"its sheet ends at {most:g} V"] if 0.0 < most < voltage else []
@@ -300,7 +300,7 @@ class Lifter:
     time : float
         From 30° below the horizontal to 30° above, from rest [s].
     notes : tuple of str
-        Remarks to know before buying it.
+        Notes to read before buying.
     """
 
     servo: Servo

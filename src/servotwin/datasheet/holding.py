@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 _Model = TypeVar("_Model", bound="Model")
 _MOST = 2.0  # times the highest voltage that the sheet prints
-_ABOVE = 1.25  # times that, at which nobody is told to buy a servo whose range no sheet states; assumed
+_ABOVE = 1.25  # times that, at which no servo is proposed whose range no sheet states; assumed
 _BELOW = 0.9  # times the lowest: a servo for 12 V runs on three cells, which are called 11.1 V; assumed, likewise
 _THERMAL = ("winding_capacity", "housing_capacity", "winding_to_housing", "housing_to_ambient", "ambient",
             "magnet_coefficient")
@@ -118,7 +118,7 @@ def check_voltage(servo: Servo, voltage: float) -> float:
     Raises
     ------
     InputError
-        If it is not positive, or more than twice what the sheet knows.
+        If it is not positive, or more than twice what the sheet states.
     """
     most = _MOST * highest_voltage(servo)
     allowed = "a positive number [V]" + (f" up to {most:g}, twice the highest of the sheet" if most else "")
@@ -461,7 +461,7 @@ def _remedy(name: str, now: float, first: float, most: float, at: Callable[[floa
 
 # --- A servo that stands ----------------------------------------------------------------------------------------------
 
-SETTLE, LOOK = 1.5, 0.5  # s: what is told of standing holds for the mean of the last half second of two, or more
+SETTLE, LOOK = 1.5, 0.5  # s: what is stated of standing holds for the mean of the last half second of two, or more
 _STANDS = math.radians(2.0)  # rad/s: what goes faster at the end does not stand
 _FURTHEST_STEP = math.radians(20.0)
 _WAIT, _MEAN = 1.0, 0.1  # s, after which a command has been followed or not, and over which the angle is averaged

@@ -266,7 +266,7 @@ class Loop:
 
     @property
     def _count(self) -> float:
-        """The step to which the program cuts angles, where it knows no fractions of a count."""
+        """The step to which the program cuts angles, where it has no fractions of a count."""
         return float(self._firmware.quantum if self._firmware.whole > 0.0 else 0.0)
 
     def _current(self, d: float) -> float:

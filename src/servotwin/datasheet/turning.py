@@ -141,7 +141,7 @@ def wheel_speed_of(model: Model, load: Load | Part | None = None, *, seed: int =
     Parameters
     ----------
     model : PulseServo, PulseServoInductive or DigitalServo
-        With `potentiometer.fixed_angle`, told by pulses.
+        With `potentiometer.fixed_angle`, commanded by pulses.
     load : Load, optional
         On its shaft: an inertia makes the bursts near the neutral pulse move it less.
     seed : int
@@ -215,5 +215,5 @@ def endless(model: Model) -> SwitchedServo:
 
 
 def is_pulsed(model: Model) -> bool:
-    """Tell whether a servo turns endlessly by pulses: then it is told their width."""
+    """Tell whether a servo turns endlessly by pulses: then its command is their width."""
     return model.endless and not (isinstance(model, DigitalServo) and model.takes_goals)

@@ -82,7 +82,7 @@ class Warming:
     Parameters
     ----------
     duration : float
-        How long it held; less than asked for where it could not go on [s].
+        How long it held; less than asked for where it could not continue [s].
     now : Temperatures
         At the end [K].
     cold, warm : Held

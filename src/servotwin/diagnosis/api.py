@@ -111,7 +111,7 @@ class Looked(NamedTuple):
     rests : int
         At the end of how many of them the shaft is at rest, or swings; in the others it is still on its way.
     swing : float
-        Swing below which a fast one cannot be told from noise; slow ones can, in means of several samples; nan without
+        Smaller fast swings do not stand out from noise; slow ones do, in means of several samples; nan without
         such a stretch [rad].
     """
 

@@ -566,7 +566,7 @@ def ranked(trials: Trials) -> tuple[list[Cause], tuple[Cause, Cause] | None]:
         if each.cause not in best or _rank(each) < _rank(best[each.cause]):
             best[each.cause] = each
     curing = sorted((each for each in best.values() if each.cures), key=_rank)
-    looked_at = len(curing) if not (curing and curing[0].odd > 1.0) else _SEARCHED  # the rest is not told apart by it
+    looked_at = len(curing) if not (curing and curing[0].odd > 1.0) else _SEARCHED  # the rest is not separated by it
     curing = [trials.with_need(each) if k < looked_at else each for k, each in enumerate(curing)]
     others = [each for each in best.values() if not each.cures]
     causes = sorted([*curing, *(each for each in others if each.share >= _SPEAKS)], key=_rank)

@@ -58,7 +58,7 @@ class Noise(NamedTuple):
 
     @property
     def swing(self) -> float:
-        """From end to end, as far as noise goes: what swings by less cannot be told from rest [rad]."""
+        """From end to end, as far as noise goes: a smaller swing cannot be distinguished from rest [rad]."""
         return max(AT_REST, 2.0 * self.reach * self.size + self.step)
 
     def of_means(self, many: int) -> Noise:
@@ -361,7 +361,7 @@ class Judged(NamedTuple):
     Parameters
     ----------
     value, limit : float
-        SI; the symptom is there where the value is above the limit; nan where it cannot be told.
+        SI; the symptom is there where the value is above the limit; nan where it cannot be determined.
     """
 
     value: float
@@ -463,4 +463,4 @@ SYMPTOMS: tuple[Symptom, ...] = (
     Symptom("gets warm", "ten minutes of this bring its housing above 51 deg C, or its winding above 100 deg C",
             "ISO 13732-1: skin burns after a minute at 51 deg C; a hot winding as in `curves`", _warms, (), "K"),
 )
-"""In the order in which they are told."""
+"""In the order in which they are reported."""

@@ -33,7 +33,7 @@ _IN_FLOATS, _FINEST_IN_FLOATS = 1e-5, 1e-6  # rad: accuracy unless another is as
 
 def c(model: Model, load: Load | Part | None = None, *, name: str | None = None, accuracy: float | None = None,
       parameters: bool = False, dtype: str = "float64") -> CCode:
-    """Return a servo as C: a header and a source of functions that start it, let it go on, and look at it.
+    """Return a servo as C: a header and a source of functions that start it, advance it, and look at it.
 
     They compute the same as `Simulator`, of the same kernels. The numbers of servo and load stand in a table;
     what these numbers have no use for is left out of the code.
@@ -43,7 +43,7 @@ def c(model: Model, load: Load | Part | None = None, *, name: str | None = None,
     model : Model
         Any but the two motors.
     load : Load, optional
-        Load on the shaft; none unless given. A recorded torque is told at each call instead.
+        Load on the shaft; none unless given. A recorded torque is given at each call instead.
     name : str, optional
         Of the files, and the beginning of all names in them; that of the servo unless given.
     accuracy : float, optional

@@ -619,7 +619,7 @@ def features_of_model(model: Any, load: Load) -> int:
 
 
 def wiring_of(model: Any) -> Wiring:
-    """Return how a model is told."""
+    """Return how a model is commanded."""
     if isinstance(model, BoundedServo):
         return wiring.bounded(model.given)
     if isinstance(model, AveragedServo | AveragedServoInductive):

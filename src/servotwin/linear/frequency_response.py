@@ -1,4 +1,4 @@
-"""The answer of a model to sines of a finite size, simulated: what no transfer function knows."""
+"""The answer of a model to sines of a finite size, simulated: what no transfer function has."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ def _crossing(frequency: Array, gain: Array, level: float) -> float:
     return float(frequency[k - 1] * (frequency[k] / frequency[k - 1]) ** share)
 
 
-# --- The answer of a model to sines of a finite size, simulated: what no transfer function knows ----------------------
+# --- The answer of a model to sines of a finite size, simulated: what no transfer function has ------------------------
 
 Complex = NDArray[np.complex128]
 
@@ -213,7 +213,7 @@ def frequency_response(model: Model, frequencies: ArrayLike, *, amplitude: Array
                        frame_period: float | None = None, seed: int = 0) -> FrequencyResponse:
     """Simulate sines until they are steady, and return the fundamental of the answer over that of the command.
 
-    Everything that the model knows takes part: deadband, friction, saturation, single pulses. So the answer depends
+    Everything that the model has takes part: deadband, friction, saturation, single pulses. So the answer depends
     on the amplitude; for small sines and without deadband and friction it is that of `transfer_function`.
 
     Parameters

@@ -205,7 +205,7 @@ _SAME = 1e-9  # of a tick
 
 
 class _Tick(NamedTuple):
-    """z' = transition z + drive d + told r, and the duty u = law z + direct r on which the program decides."""
+    """`z' = transition z + drive d + told r`, and the duty `u = law z + direct r` on which the program decides."""
 
     transition: Array
     drive: Array
@@ -266,7 +266,7 @@ class Ticks:
         z, moved = np.zeros((len(flat), size), complex), np.broadcast_to(np.eye(size), (len(flat), size, size))
         steps = [(t.transition + np.outer(t.drive, t.law), t.told + t.drive * t.direct) if closed else
                  (t.transition, t.drive) for t in ticks]
-        for k, (transition, told) in enumerate(steps):  # from nothing; then what has to be there for it to go on
+        for k, (transition, told) in enumerate(steps):  # from nothing; then what has to be there for it to continue
             z, moved = z @ transition.T + np.outer(turn**k, told), transition @ moved
         z = np.linalg.solve(turn[:, None, None] ** len(ticks) * np.eye(size) - moved, z[..., None])[..., 0]
         duty: Complex = np.zeros(len(flat), np.complex128)

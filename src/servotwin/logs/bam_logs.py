@@ -90,7 +90,7 @@ BAM_ACTUATORS = {
 
 
 def bam_actuator(name: str) -> BamActuator:
-    """Return what BAM's code knows of an actuator.
+    """Return what BAM's code has of an actuator.
 
     Parameters
     ----------
@@ -338,7 +338,7 @@ def read_bam_parameters(path: str | Path, *, gain: float | None = None, voltage:
     Raises
     ------
     InputError
-        If it is no such file, lacks a number of its model, or has one that its model does not know; if a gain is given
+        If it is no such file, lacks a number of its model, or has one that its model does not have; if a gain is given
         and BAM has no such actuator, or sets no duty of it.
     ParameterError
         If a number is not physical.
@@ -544,7 +544,7 @@ def _at_output(servo: Servo) -> dict[str, float]:
 
 
 def _smallest(numbers: Mapping[str, float]) -> str:
-    """Return the first model that knows all friction of these numbers."""
+    """Return the first model that has all friction of these numbers."""
     here = {key for key in _FRICTION if key in numbers} - {"friction_base", "dtheta_stribeck", "alpha"}
     if numbers["friction_stribeck"] == 0.0 and "load_friction_stribeck" not in here and not here & set(_M5):
         here.discard("friction_stribeck")

@@ -11,7 +11,7 @@ from servotwin.logs.columns import CLOCKS, COMMANDS, NAMES, SWITCH, Column, dime
 from servotwin.units.words import scaled_unit, units_written
 
 SAID = "--columns"
-COMMAND = "command"  # its kind is told by its unit
+COMMAND = "command"  # its kind follows from its unit
 SHORT = {"pulse": "pulse_width", "angle": "output_angle", "feedback": "feedback_voltage", "current": "supply_current",
          "voltage": "bus_voltage", "speed": "output_speed"}
 SIGNALS = ("time", COMMAND, *SHORT, *(name for name in NAMES if name != "time"))

@@ -179,7 +179,7 @@ def layout_of(table: TextTable, sidecar: Mapping[str, Column] | None, wanted: Ma
     Raises
     ------
     InputError
-        If time, command or angle cannot be told, or not without doubt: says how to say it.
+        If time, command or angle cannot be found, or not without doubt: says how to say it.
     """
     made: dict[str, tuple[Column, str]] = {}
     if sidecar is not None:
@@ -423,7 +423,7 @@ def _no_unit(table: TextTable, signal: str, column: str, meaning: names.Meaning 
 
 def _unknown(table: TextTable, lacking: list[str], made: Mapping[str, tuple[Column, str]], *, sidecar: bool = False,
              ) -> InputError:
-    """Return the error of a table without a time, a command or an angle that could be told."""
+    """Return the error of a table without a time, a command or an angle that could be found."""
     taken = {column.column for column, _ in made.values()}
     free = [name for name in table.header if name not in taken]
     if TIME not in lacking:  # what grows with time is proposed last
@@ -573,7 +573,7 @@ def read_csv_log(path: str | Path, *, sidecar: str | Path | None = None,
     Raises
     ------
     InputError
-        If file or sidecar cannot be read, time, command or angle cannot be told from its columns, a value is no number
+        If file or sidecar cannot be read, time, command or angle cannot be found from its columns, a value is no number
         or in a unit that cannot be, or time stands still or runs backwards: names file, line and column.
 
     Examples

@@ -1,4 +1,4 @@
-"""A log: what one servo was told, what it did, and under which load and conditions."""
+"""A log: the command of one servo, what it did, and under which load and conditions."""
 
 from __future__ import annotations
 
@@ -197,7 +197,7 @@ class Log:
         """Return the command; its t = 0 is the first sample.
 
         Where a command is missing or torque is off there are no pulses: frames start at regular edges, without those.
-        A servo without pulses then ends its drive by its `pulse_timeout`; the averaged models know no pulses.
+        A servo without pulses then ends its drive by its `pulse_timeout`; the averaged models have no pulses.
 
         Parameters
         ----------
@@ -250,7 +250,7 @@ class Log:
         load = replace(self.load, recorded=tuple(Recorded([t - shift for t in r.time], r.torque)
                                                  for r in self.load.recorded))
         command, on = self.command, self.torque_on
-        if np.isnan(command[keep][0]):  # what the servo was told last is only told before the part
+        if np.isnan(command[keep][0]):  # the last command is only given before the part
             command, on = self.held, self.sent
         return replace(self, name=name, time=self.time[keep], command=command[keep], load=load,
                        measured={key: values[keep] for key, values in self.measured.items()},

@@ -403,7 +403,7 @@ def _sent_twice(rows: _Rows, k: int) -> bool:
 
 
 def _misfit(rows: _Rows, k: int) -> int | None:
-    """Return the single row without which time goes on as it should; None if that is none."""
+    """Return the single row without which time advances as it should; None if that is none."""
     stamps, near = rows.stamps, _NEAR * rows.usual
     if any(True for _ in between(rows.table, k)):
         return None

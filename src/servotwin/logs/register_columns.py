@@ -179,7 +179,7 @@ def _are_raw(table: TextTable, named: Mapping[str, str]) -> bool:
 
 
 def _ask(table: TextTable, taken: Container[str]) -> None:
-    """Raise where columns are raw registers of a servo that nobody told."""
+    """Raise where columns are raw registers of a servo that is not given."""
     fitting: dict[str, list[str]] = {}
     for word in register_words():
         family = register_family(word)
@@ -195,7 +195,7 @@ def _ask(table: TextTable, taken: Container[str]) -> None:
 
 
 def _range(family: Family, one: Register) -> tuple[int, int]:
-    """Return the least and the greatest raw number of a register, with its sign told or not."""
+    """Return the least and the greatest raw number of a register, with its sign stated or not."""
     if one.signed:
         return -2 ** (8 * one.size - 1), 2 ** (8 * one.size) - 1
     if one.sign_bit is not None:

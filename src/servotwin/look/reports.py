@@ -139,7 +139,7 @@ class Report:
     sections : sequence of Section
         A part that is a text is a paragraph.
     remarks : sequence of str
-        Remarks that a reader has to know first.
+        Remarks that come first.
     style : str
         Further CSS of its page.
     contents : bool

@@ -86,7 +86,7 @@ COLOURS: Mapping[str, str] = MappingProxyType({
     "black": "#000000", "orange": "#E69F00", "sky": "#56B4E9", "green": "#009E73", "yellow": "#F0E442",
     "blue": "#0072B2", "vermilion": "#D55E00", "purple": "#CC79A7", "grey": "#666666",
 })
-"""The palette of Okabe and Ito (2008), told apart with any colour vision, and a grey."""
+"""The palette of Okabe and Ito (2008), distinguished with any colour vision, and a grey."""
 
 LINES: tuple[tuple[str, Any], ...] = (
     (COLOURS["blue"], "-"), (COLOURS["vermilion"], (0, (5, 2))), (COLOURS["green"], (0, (1, 1.4))),
@@ -95,7 +95,7 @@ LINES: tuple[tuple[str, Any], ...] = (
 """Colour and dash of the first, second, … curve: the dash alone tells them apart in grey print."""
 
 CURVES_A_PAGE = len(LINES)
-"""How many curves a picture shows at once: as many as are told apart."""
+"""How many curves a picture shows at once: as many as can be distinguished."""
 
 _RC = {
     "font.size": 9.0, "axes.titlesize": 9.0, "axes.labelsize": 9.0, "legend.fontsize": 8.0, "xtick.labelsize": 8.0,

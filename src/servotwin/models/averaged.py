@@ -78,7 +78,7 @@ class _Averaged(Model):
 class AveragedServo(_Averaged):
     """The paper's model, eq. (35)-(41) with the offsets of the measured servo; armature inductance neglected.
 
-    As printed it knows no supply: the armature voltage grows with the error without bound. It has no deadband and
+    As printed it has no supply: the armature voltage grows with the error without bound. It has no deadband and
     no static friction, so a loaded shaft creeps.
 
     Examples

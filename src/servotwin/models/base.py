@@ -287,7 +287,7 @@ def clipped(x: float, low: float, high: float) -> float:
 
 
 def check_sent(signal: Signal | LaneSignal, model: Model) -> None:
-    """Raise CommandError if a command has silences, which a model of the mean of pulses does not know."""
+    """Raise CommandError if a command has silences, which a model of the mean of pulses does not have."""
     if signal.silences:
         raise CommandError(
             f"command for {type(model).__name__}", got=f"no pulses from {max(signal.silences[0][0], 0.0):g} s on",

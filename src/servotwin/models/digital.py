@@ -73,7 +73,7 @@ class DigitalServo(SwitchedServo):
         """Names of the output signals that can be computed for this servo, `time` apart."""
         missing = {"feedback_voltage"} if self.servo.get("potentiometer.feedback_gain") is None else set()
         missing |= set(_OF_PULSES) if self.takes_goals else set()
-        goals = {"command_angle"} if self.takes_goals else set()  # told as it is, whatever the shaft does
+        goals = {"command_angle"} if self.takes_goals else set()  # given as it is, whatever the shaft does
         shown = {*super().available, *goals}
         return tuple(name for name in self.signals if name in shown and name not in missing)
 

@@ -41,7 +41,7 @@ _NO_PULSES = ("command_voltage", "command_angle")
 
 
 class SwitchedServo(Model):
-    """A servo whose motor hangs behind a switched bridge and which is told by pulses."""
+    """A servo whose motor hangs behind a switched bridge and which is commanded by pulses."""
 
     bears_flexible = True
 

@@ -84,7 +84,7 @@ _RESPONSES: tuple[tuple[str, str, str, str, str, str], ...] = (
 
 
 def pictures(study: PaperStudy, progress: Callable[[float], None]) -> tuple[Picture, ...]:
-    """Return all pictures; `progress` is told the fraction that is drawn."""
+    """Return all pictures; `progress` is called with the fraction that is drawn."""
     makers: list[Callable[[], Picture]] = [lambda row=row: _response(study, *row) for row in _RESPONSES]  # type: ignore[misc]
     makers += [lambda: _last_degrees(study), lambda: _feedback_over_position(study)]
     makers += [lambda number=number, row=row: _pulses(study, number, row)  # type: ignore[misc]
@@ -120,7 +120,7 @@ def _response(study: PaperStudy, name: str, title: str, signal: str, label: str,
 
 
 def _last_degrees(study: PaperStudy) -> Picture:
-    """Draw how the servos that know a supply come to a stand, and the pulses that bring one of them there."""
+    """Draw how the servos that have a supply come to a stand, and the pulses that bring one of them there."""
     time = np.linspace(*_LAST, 2001)
     columns: dict[str, Column] = {"time_s": time.tolist()}
     angles, voltages = [], []

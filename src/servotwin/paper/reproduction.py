@@ -219,7 +219,7 @@ class PaperStudy:
 
 
 def run_study(progress: Progress) -> PaperStudy:
-    """Compute everything; `progress` is told words and a fraction of the whole report."""
+    """Compute everything; `progress` is called with words and a fraction of the whole report."""
     progress("reading the servo and the tables", 0.02)
     servo = load_servo(SERVO)
     table = load_dataset("urrea-kern-table-2").columns

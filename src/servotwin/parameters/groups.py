@@ -389,7 +389,7 @@ class Friction(Group):
 
     def _relations(self) -> Iterator[Relation]:
         yield from self._only_with("stribeck_exponent", ("stribeck_speed",))
-        # Models M3 and M4 know one share for all torque through the gear, M5 and M6 one for each side of it.
+        # Models M3 and M4 have one share for all torque through the gear, M5 and M6 one for each side of it.
         one = [name for name in _ONE_SHARE if getattr(self, name) is not None]
         two = [name for name in _TWO_SHARES if getattr(self, name) is not None]
         if one and two:

@@ -442,7 +442,7 @@ def _read_entry(label: str, table: str, key: str, dimension: str, entry: Any) ->
 
 
 def _converted(value: Any, unit: str, dimension: str) -> Any:
-    """Convert numbers; anything else goes on as it is, for the group to refuse."""
+    """Convert numbers; anything else passes as it is, for the group to refuse."""
     if isinstance(value, list):
         return tuple(_converted(x, unit, dimension) for x in value)
     if isinstance(value, bool) or not isinstance(value, int | float):

@@ -72,7 +72,7 @@ class ServoDrive:
     A joint's angle is `zero + direction · ratio · servo's angle` (`Mount`). Rotor and gear become the joint's armature.
     An actuator that the model has at the joint gives its `ctrl` as the servo's command, an angle [rad] or place [m] of
     the joint, and no force of its own any more; where there is none, `command` says where to go. A servo that turns
-    endlessly (`potentiometer.fixed_angle`) is told a pulse width [s] instead, by `ctrl` or `command`, and on a bus its
+    endlessly (`potentiometer.fixed_angle`) takes a pulse width [s] instead, by `ctrl` or `command`, and on a bus its
     goal as the number that it is; direction and ratio of its mount say nothing of these.
 
     Parameters
@@ -182,17 +182,17 @@ class ServoDrive:
             raise InputError("data", got="an MjData of another model", allowed="one of the drive's model")
         return self._harbour.of(data)
 
-    # --- going on -----------------------------------------------------------------------------------------------------
+    # --- advancing ----------------------------------------------------------------------------------------------------
 
     def step(self, data: Any, steps: int = 1) -> None:
-        """Let MuJoCo go on by a step, or several, with the servos.
+        """Advance MuJoCo by a step, or several, with the servos.
 
         Raises
         ------
         InputError
             If the data is of another model, or another drive or another control callback is active.
         SimulationError
-            If a servo or MuJoCo cannot go on.
+            If a servo or MuJoCo cannot continue.
         """
         if type(steps) is not int or steps < 0:
             raise InputError("step(steps)", got=steps, allowed="a whole number, at least 0")
@@ -234,7 +234,7 @@ class ServoDrive:
         Raises
         ------
         SimulationError
-            If a servo or MuJoCo could not go on; names the joint.
+            If a servo or MuJoCo could not continue; names the joint.
         """
         self._raise(data, WELL)
 
@@ -251,7 +251,7 @@ class ServoDrive:
         Raises
         ------
         SimulationError
-            If a servo or MuJoCo could not go on; names the joint.
+            If a servo or MuJoCo could not continue; names the joint.
         """
         self.raise_failure(data)
         if self._solver_note and self._solver_note.kind == TOO_FEW:
@@ -294,7 +294,7 @@ class ServoDrive:
     def command(self, data: Any, goals: Mapping[str, float]) -> None:
         """Tell servos where to go, of joints with and without an actuator; before that they hold where they begin.
 
-        Those that turn endlessly are told how fast, by a pulse width; before that they get the one at which they stand.
+        Those that turn endlessly take their speed from a pulse width; before that they get the one at which they stand.
 
         Parameters
         ----------
@@ -391,7 +391,7 @@ class ServoDrive:
         return tuple(tuple(self.joints[k] for k in berth.crew.which.tolist()) for berth in self._of(data).berths)
 
     def changed(self, data: Any) -> None:
-        """Take up what was set in `simulators` since the last step; without it a step may go on from before."""
+        """Take up what was set in `simulators` since the last step; without it a step may continue from before."""
         instance, block = self._of(data), self._block(data)
         for berth in instance.berths:
             berth.refresh()

@@ -32,7 +32,7 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
 
     Controls that the environment writes into `data.ctrl` stay there, for its rewards, and are the command of the servo
     by a map that `maps` shows. The control of a position actuator means the angle that it meant. Of a motor, and of
-    anything else, the control range goes linearly onto where the joint can go that the servo can be told to go to as
+    anything else, the control range goes linearly onto where the joint can go that the servo can be sent to as
     well. Action space, observations and rewards are those of the environment. A policy for torques has to be trained
     anew: the action now says where to go.
 
@@ -45,7 +45,7 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
     Parameters
     ----------
     env : gymnasium.Env
-        Its `unwrapped` has an MjModel as `model` and an MjData as `data`, and lets `mujoco.mj_step` go on with them.
+        Its `unwrapped` has an MjModel as `model` and an MjData as `data`, and lets `mujoco.mj_step` advance them.
         The model is changed.
     servos : mapping of str to Model or Mount
         By the name of the actuator, or of its joint.
@@ -71,7 +71,7 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
     InputError
         Or one of its kinds, on bad input; also while stepping, if another control callback of MuJoCo is active.
     SimulationError
-        While stepping, if a servo or MuJoCo cannot go on.
+        While stepping, if a servo or MuJoCo cannot continue.
     MissingExtraError
         If MuJoCo or Gymnasium is not installed.
 
@@ -117,7 +117,7 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
     # --- what an environment does -------------------------------------------------------------------------------------
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """Let the environment go on with its servos."""
+        """Advance the environment with its servos."""
         observation, reward, terminated, truncated, info = self._with_servos(lambda: self.env.step(action))
         lost = [name for name in _LOST if self.data.warning[getattr(load_mujoco().mjtWarning, name)].number]
         if lost:

@@ -211,7 +211,7 @@ def overlap_words(model: Any, one: Overlap) -> str:
 def leave_out(model: Any, pairs: Iterable[tuple[int, int]]) -> None:
     """Let pairs of shapes touch no more, and all others as before; pairs that the file names itself still do.
 
-    MuJoCo's filter knows 32 kinds of shapes: each set of shapes that touch the same others becomes one.
+    MuJoCo's filter has 32 kinds of shapes: each set of shapes that touch the same others becomes one.
 
     Raises
     ------
@@ -259,7 +259,7 @@ def part_neighbours(model: Any, *, fixed: Sequence[int] = (), always: bool = Fal
     fixed : sequence of int
         Shapes of the world that are the robot's own: those of a root that was merged into it.
     always : bool
-        Whether all of them are left out, as of a URDF, which knows no contact; else, as an MJCF has its own choice,
+        Whether all of them are left out, as of a URDF, which has no contact; else, as an MJCF has its own choice,
         those alone whose shapes overlap in the first pose.
     parents : mapping of str to str, optional
         Links by their children, where a merged one has lost its name.

@@ -70,7 +70,7 @@ def notes_of(run: RobotRun) -> tuple[str, ...]:
 
 
 def _sag_words(run: RobotRun, joints: tuple[str, ...], supply: Supply, sag: Sag) -> list[str]:
-    """Return that a supply holds servos back, and that it falls below what anybody knows of them."""
+    """Return that a supply holds servos back, and that it falls below what is known of them."""
     who = "the supply" if len(joints) == len(run.mounts) else f"the supply of {', '.join(joints)}"
     said = [f"{who} holds back: {held_back(sag).words.partition(': ')[2]}, at {sag.time:.2f} s, of "
             f"{supply.open_circuit_voltage:g} V"] if sag.holds_back else []
@@ -270,7 +270,7 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
     settle : float
         [s]
     hold : str
-        Command of a servo between samples of the motion: "linear", or "previous", as LeRobot sends goals.
+        The command of a servo between samples of the motion: "linear", or "previous", as LeRobot sends goals.
     window : float, optional
         Over which the motion of the ideal actuators is blended; `blend_window` of it unless given [s]
     assume_heat : bool
@@ -279,7 +279,7 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
         Treatment of other shapes that lie over 1 mm in each other in the first pose or where the motion begins:
         "keep", their contact counts, and the servos are not judged; "ignore", it is left out. The ground is never.
     progress : bool or callable
-        Whether to show how far it is; a callable is told the steps done, and all.
+        Whether to show how far it is; a callable is called with the steps done, and all.
 
     Raises
     ------
@@ -287,7 +287,7 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
         Or one of its kinds: if a joint of the motion has no servo, a goal is beyond where its servo can start, or
         what `ServoDrive` refuses.
     SimulationError
-        If a servo or MuJoCo cannot go on.
+        If a servo or MuJoCo cannot continue.
 
     Examples
     --------
@@ -421,7 +421,7 @@ def finished(drive: ServoDrive, data: Any, motion: Motion, mounts: Mapping[str, 
     poses : ndarray, shape (n, nq)
         At the times of the record.
     tell : callable, optional
-        Is told how many times are done.
+        Called with how many times are done.
     """
     record, lowest = drive.result(data), drive.lowest_voltage(data)
     known = {joint: tuple(lowest[:, k].tolist()) for k, joint in enumerate(drive.joints) if np.isfinite(lowest[0, k])}
@@ -517,7 +517,7 @@ def begin(drive: ServoDrive, data: Any, motion: Motion, mounts: Mapping[str, Mou
     model, goals = drive.model, {}
     _put(model, data.qpos, motion, mounts)
     for joint, mount in mounts.items():
-        if not mount.model.endless:  # such as a bridge without its chip, which is told no angle
+        if not mount.model.endless:  # such as a bridge without its chip, which takes no angle
             goals[joint] = float(data.qpos[model.jnt_qposadr[model.joint(joint).id]])
             _check_travel(joint, mount, goals[joint])
     data.time = time
@@ -548,7 +548,7 @@ def _check_travel(joint: str, mount: Mount, start: float) -> None:
 
 
 def _goals(motion: Motion, time: Array, hold: str, near: float) -> Iterator[dict[str, float]]:
-    """Give what the servos are told at each time [s], samples that are so near too; nothing where it stays."""
+    """Give the goals of the servos at each time [s], samples that are so near too; nothing where it stays."""
     if hold == "previous":
         samples = np.clip(np.searchsorted(motion.time, time + near, side="right") - 1, 0, None)
         table = np.array([values[samples] for values in motion.angles.values()])

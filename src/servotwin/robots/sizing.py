@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from servotwin.robots.servos.record import ServoRecord
 
 
-# --- How warm the servos of a robot get, in a motion and where it goes on for ever ------------------------------------
+# --- How warm the servos of a robot get, in a motion and where it continues for ever ----------------------------------
 
 Array = NDArray[np.float64]
 
@@ -94,7 +94,7 @@ def mean_heat(record: ServoRecord, masses: Masses, since: float, until: float) -
 
 
 def heating(heat: float, mean_winding: float, masses: Masses, trip_temperature: float = math.inf) -> Heating:
-    """Return how warm a servo gets that goes on making a heat [W], which grows with the resistance of its copper.
+    """Return how warm a servo gets that continues to make a heat [W], which grows with the resistance of its copper.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def lasting_torque(model: Model, masses: Masses) -> float:
     """Return the torque that a servo can lift slowly without end: its winding comes to 130 °C [N m].
 
     Where it holds still instead, friction helps it. 0 where that current does not move the shaft, nan of a model that
-    knows no limit of current.
+    has no limit of current.
     """
     if "supply.current_limit" not in model.optional:
         return math.nan
@@ -169,7 +169,7 @@ def lasting_torque(model: Model, masses: Masses) -> float:
 
 _FREE = 1e-9  # N m, below which nothing is asked of a servo
 _LOOK = 0.02  # s, over which what a servo delivers is averaged: a frame of pulses
-_SAGS = 0.99  # of the supply's voltage: what others leave above it is not told apart
+_SAGS = 0.99  # of the supply's voltage: what others leave above it is not distinguished
 _MOST_TOLD = 100.0  # times
 _ZERO_CELSIUS = 273.15
 _COOL = Temperatures(REFERENCE_TEMPERATURE, REFERENCE_TEMPERATURE)
@@ -299,7 +299,7 @@ class Sizing:
 
 
 def _too_hot(found: Heating) -> list[str]:
-    """Say what happens to a servo that goes on with its motion."""
+    """Say what happens to a servo that continues its motion."""
     limits = ((found.winding, WIRE_LIMIT, found.limit_time, "gets too hot: its winding"),
               (found.housing, found.trip_temperature, found.trip_time, "trips by heat: its housing"))
     said = []

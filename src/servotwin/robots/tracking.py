@@ -35,7 +35,7 @@ from servotwin.units import is_finite
 # firm on them, and what it takes counts there (`linkage`).
 #
 # Where such a robot runs into itself or into what is fixed, nothing yields and no torque makes sense: such contacts are
-# told, and their forces do not count.
+# reported, and their forces do not count.
 
 Array = NDArray[np.float64]
 WINDOWS = (0.05, 0.1)  # s, shortest and longest window of a motion: in the former no servo gets up to speed
@@ -159,7 +159,7 @@ def ideal_run(model: Any, joints: Sequence[str], motion: Motion, time: Array, *,
     window : float, optional
         Over which the motion is blended; `blend_window` of it unless given [s]
     progress : callable, optional
-        Is told how many times are done.
+        Called with how many times are done.
 
     Raises
     ------

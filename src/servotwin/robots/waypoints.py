@@ -420,7 +420,7 @@ class WaypointRun:
     asked_speeds : ndarray, shape (n, 2)
         Speeds that the controller asks of them in this frame [rad/s].
     pulses : ndarray, shape (n, 2)
-        Widths that the servos are told in this frame [s]; nan where wheels are ideal.
+        Widths that the servos are sent in this frame [s]; nan where wheels are ideal.
     arrived : float
         When the robot believes to have arrived [s]; nan where it does not.
     record : Record, optional
@@ -474,7 +474,7 @@ def run_waypoints(servos: Sequence[Model] | None = None, waypoints: ArrayLike = 
                   progress: Progress = False) -> WaypointRun:
     """Let the mobile robot drive along waypoints by pure pursuit, once a frame, on two servos that turn endlessly.
 
-    Its controller knows wheels, track and the map from pulse to speed of a servo as it should be (`nominal`). Where it
+    Its controller has wheels, track and the map from pulse to speed of a servo as it should be (`nominal`). Where it
     is it takes from odometry alone: of its own pulses, by that map, or of encoders on the wheels. It begins at the
     first waypoint and looks to the second.
 
@@ -633,7 +633,7 @@ def _driven(pursuit: PurePursuit, start: Pose, frame: float, duration: float, go
 
 
 def _by_pulses(speeds: SpeedMap, frame: float) -> _Belief:
-    """Believe that wheels turn as the map says of the pulses that they are told."""
+    """Believe that wheels turn as the map says of the pulses that they are sent."""
     def believe(seen: _Seen, before: _Seen, pulses: _Two) -> _Two:
         left, right = (way * frame * float(speeds.speed(pulse)) for way, pulse in zip(_DIRECTIONS, pulses, strict=True))
         return left, right

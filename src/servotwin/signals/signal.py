@@ -275,7 +275,7 @@ class Signal:
 
 
 def headers(signals: Iterable[Signal]) -> NDArray[Any]:
-    """Return what there is to know of many signals but their pieces, as an array of records.
+    """Return all data of many signals but their pieces, as an array of records.
 
     `kind` is the place in `KIND_NAMES`; `lowest` and `highest` (SI) include `initial`; `frame_period` and
     `first_change` [s] are nan where there is none; `pieces` and `edges` count, and `edges` is -1 where there are none.

@@ -111,9 +111,9 @@ def voltages(plans: Sequence[Plan], source: Source, samples: Sequence[Samples]) 
 
 def taped(way: _Compiled | Plainly, until: float, written: Tape,
           tell: Callable[[float], object] | None = None) -> Rows:
-    """Let servos go on to a time [s], by a tape that is read whenever it is full; return what that leaves behind.
+    """Advance servos to a time [s], by a tape that is read whenever it is full; return what that leaves behind.
 
-    Whenever it is, `tell` is told the time [s].
+    Whenever it is, `tell` is called with the time [s].
     """
     found: list[list[Array]] = []
     count, status, when = 0, event_queue.PAUSED, 0.0
@@ -164,7 +164,7 @@ def _worth_it(plans: Sequence[Plan], frames: float) -> bool:
 
 
 def begun(plan: Plan, state: State) -> Memory:
-    """Return what a servo remembers that is about to go on; its program knows its next tick."""
+    """Return what a servo remembers that is about to continue; its program has its next tick."""
     if not plan.digital:
         return state.memory
     memory = resumed(True, plan.inputs, state.memory, False)._replace(firm=(control.thawed(state.memory.firm[0]),))
@@ -193,7 +193,7 @@ class Plainly:
         self.begin(plans, states)
 
     def begin(self, plans: Sequence[Plan], states: Sequence[State]) -> None:
-        """Take up what servos are told and remember; what they are in together goes on."""
+        """Take up what servos are sent and remember; what they are in together continues."""
         self.inputs = [plan.inputs for plan in plans]
         self.memories = [begun(plan, state) for plan, state in zip(plans, states, strict=True)]
         for seat, plan in zip(self.seats, plans, strict=True):
@@ -207,7 +207,7 @@ class Plainly:
         put_shared(self.shared, at_start(source))
 
     def go_on(self, until: float, written: Tape) -> tuple[int, float]:
-        """Go on to a time [s]; return a status and when."""
+        """Advance to a time [s]; return a status and when."""
         firms = self.seated()
         for seat in self.seats:
             seat.until = until - seat.origin
@@ -243,7 +243,7 @@ class _Compiled:
         self._kernels: Any = kernels(BUSES)
 
     def go_on(self, until: float, written: Tape) -> tuple[int, float]:
-        """Go on to a time [s]; return a status and when."""
+        """Advance to a time [s]; return a status and when."""
         status = self._kernels.go_on(
             self._lanes, self._tables, self._bus, 0, 1, 0.0, float(until), *self._room, written)
         return status, float(self._bus.ended[0])
@@ -338,10 +338,10 @@ def events_of(plans: Sequence[Plan], rows: Rows) -> list[tuple[Event, ...]]:
     return [tuple(events) for events in found]
 
 
-# --- Servos on one supply that stop and go on, in plain Python, and are looked at on the way --------------------------
+# --- Servos on one supply that stop and continue, in plain Python, and are looked at on the way -----------------------
 
 class BusSteps:
-    """Servos on one supply that stop and go on.
+    """Servos on one supply that stop and continue.
 
     Splitting an interval into several calls changes nothing beyond rounding.
 
@@ -374,7 +374,7 @@ class BusSteps:
 
     def go_on(self, source: Source, plans: Sequence[Plan], states: Sequence[State], looks: Looks,
               rows: Sequence[Any], events: Sequence[Any]) -> list[State]:
-        """Let all servos go on to the end of the looks; return their states there.
+        """Advance all servos to the end of the looks; return their states there.
 
         Parameters
         ----------
@@ -389,7 +389,7 @@ class BusSteps:
         Raises
         ------
         SimulationError
-            If the run cannot go on.
+            If the run cannot continue.
         """
         way = self._begun(source, plans, states)
         used = np.zeros(USED * len(plans), np.int64)
@@ -400,7 +400,7 @@ class BusSteps:
             status = together.go_on(way.inputs, self._posts, firms, way.shared, way.seats, way.mates, looks, self._tape,
                                     rows, events, used)
         except InputError:
-            raise  # of whoever is told the time
+            raise  # of the function that is called with the time
         except (ArithmeticError, ValueError):  # numbers beyond what a float holds
             status = DIVERGED
         for j, own in enumerate(rows):

@@ -124,7 +124,7 @@ class Plan:
 
 
 class State:
-    """Everything that a servo remembers; picklable, comparable, and enough to go on from.
+    """Everything that a servo remembers; picklable, comparable, and enough to continue from.
 
     Parameters
     ----------
@@ -275,7 +275,7 @@ def run(plan: Plan, state: State, until: float, record: RunLog | None = None) ->
     Raises
     ------
     SimulationError
-        If the run cannot go on; it carries status, time and cause.
+        If the run cannot continue; it carries status, time and cause.
     """
     own = kernels_of_one()
     memory, status = _plainly(plan, state, until, record) if own is None else plan.compiled.run(state, until, record)
@@ -361,7 +361,7 @@ _LOG_WORDS = 8  # address and length of four arrays
 
 
 def _inputs_of(plan: Plan) -> Inputs:
-    """Return what a servo is told as arrays."""
+    """Return the inputs of a servo as arrays."""
     told = plan.inputs
     table = np.array(plan.curve, np.float64).reshape(-1, 2)
     return Inputs(plan.command.rows, plan.torque.rows, told.constant_torque, told.period,

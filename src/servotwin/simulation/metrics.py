@@ -198,7 +198,7 @@ def holding_error(result: Result) -> float:
     """Return the mean of command less angle while the command stands still at the end [rad].
 
     The mean is that of the last tenth of a second, or of as much as there is since the command stands still; nan where
-    it never does, or the model knows no angle of its command.
+    it never does, or the model has no angle of its command.
     """
     last = result.command.pieces.table[-1]
     start = max(result.ended - _LOOK, last.start, 0.0)

@@ -25,7 +25,7 @@ _BETWEEN = 10.0  # s between lines where there is no terminal
 
 
 def lines(what: str, clock: Callable[[], float] = time.monotonic) -> Callable[[float, str], None]:
-    """Return a function that is told the share done and what goes on, and writes a line to stderr every 10 s.
+    """Return a function that is called with the share done and a text, and writes a line to stderr every 10 s.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def on_terminal() -> bool:
 
 @contextmanager
 def shown(progress: Progress, total: int, what: str) -> Iterator[Callable[[int], None]]:
-    """Give a function that is told how many lanes are done.
+    """Give a function that is called with how many lanes are done.
 
     Parameters
     ----------

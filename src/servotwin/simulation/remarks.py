@@ -134,14 +134,14 @@ def sag_in(time: Array, voltage: Array, supply: Supply, lowest: tuple[float, flo
 
 
 class Floor(NamedTuple):
-    """The voltage below which nobody knows what a servo does [V], and whether a register says so."""
+    """The voltage below which it is unknown what a servo does [V], and whether a register says so."""
 
     voltage: float
     of_register: bool
 
 
 def floor_of(servo: Servo) -> Floor:
-    """Return below which voltage nobody knows what a servo does.
+    """Return below which voltage it is unknown what a servo does.
 
     That is Min_Voltage_Limit of a servo with registers, what its maker promises; else what chips need.
 
@@ -238,12 +238,12 @@ class Remark(_Kind):
         "stays tripped": one still does.
         "does not come to rest": command and load stand still, and the shaft goes to and fro: `swing` from end to end
         [rad] at `frequency` [Hz].
-        "buzzes at rest": the shaft stands where friction alone would hold it, and the bridge goes on switching: `rate`
+        "buzzes at rest": the shaft stands where friction alone would hold it, and the bridge keeps switching: `rate`
         [Hz], `duty` in the mean [1], `current` of the supply in the mean [A].
         "held back by its supply": that fell to `voltage` [V], was below 0.8 of its own for `low` [s] and at its `limit`
         [A] for `limited` [s].
         "supply below what its electronics need", "... below its registers": it fell to `voltage`, below the `floor` [V]
-        under which nobody knows what the servo does.
+        under which it is unknown what the servo does.
     time : float
         Of the first such pulse, trip, or least voltage; otherwise the end of the run, of which the remark speaks [s].
     **numbers : float
@@ -332,7 +332,7 @@ def remarks_of(result: Result) -> tuple[Remark, ...]:
     refused = cosim.refused_from(accepts, rows, period, edges, end) if pulsed else math.nan
     tau = piece_value(cosim.piece_before(load.torque_pieces.rows, end, False), end)
     final = [float(values[0]) for values in (last.angle, last.speed, last.winding, last.housing)]
-    if model.endless:  # it is told no angle
+    if model.endless:  # it takes no angle
         marks = 0
     elif firmware is not None:
         marks = _program_marks(numbers, firmware, last, tau, final)
@@ -345,7 +345,7 @@ def remarks_of(result: Result) -> tuple[Remark, ...]:
 
 
 def _of_supply(result: Result) -> tuple[Remark, ...]:
-    """Return that the supply holds a servo back, and that it falls below what anybody knows of it."""
+    """Return that the supply holds a servo back, and that it falls below what is known of it."""
     sag, said = result.sag, []
     if sag is None:
         return ()
@@ -394,7 +394,7 @@ def _program_marks(numbers: Numbers, firmware: Firmware, last: Samples, tau: flo
     upper, lower = numbers.stops.upper, numbers.stops.lower
     at_stop = q >= upper - _AT_STOP * max(abs(upper), 1.0) or q <= lower + _AT_STOP * max(abs(lower), 1.0)
     found = cosim.ON_STOP if w == 0.0 and at_stop else 0
-    if abs(float(last.duty[0])) > 1.0 or trip > 1:  # without torque, as it is told
+    if abs(float(last.duty[0])) > 1.0 or trip > 1:  # without torque, as it is commanded
         return found
     if heat.present(numbers.heat):
         numbers = at_temperature(numbers, T_w, T_h)

@@ -218,7 +218,7 @@ def rest_of(result: Result, *, with_current: bool = True) -> Rest | None:
 
 
 def _looks_of(run: Result) -> Array | None:
-    """Return when a shaft is looked at to see what it does at the end [s]; None where that is not to be told."""
+    """Return when a shaft is looked at to see what it does at the end [s]; None where that cannot be determined."""
     model, end = run.model, run.ended
     if not run.status.ok or model.endless or "command_angle" not in model.available:
         return None

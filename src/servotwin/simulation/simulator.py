@@ -155,7 +155,7 @@ class Simulator:
         Raises
         ------
         SimulationError
-            If the run cannot go on.
+            If the run cannot continue.
         """
         last = self._last  # all that changes from call to call, as a rule, is the time
         if (last is not None and last[0] is command and external_torque == last[1].external_torque
@@ -203,7 +203,7 @@ class Simulator:
 
     def changed(self, state: State, *, parameters: Mapping[str, Any] | None = None,
                 torque_enable: bool | None = None) -> State:
-        """Return a state from which the servo goes on with other numbers; all that it remembers stays.
+        """Return a state from which the servo continues with other numbers; all that it remembers stays.
 
         Parameters
         ----------
@@ -243,7 +243,7 @@ class Simulator:
         return state.with_memory(memory, places=own.model.states, changes=changes)
 
     def of(self, state: State) -> Simulator:
-        """Return the simulator with whose numbers a state goes on: this one, unless `changed` gave it others.
+        """Return the simulator with whose numbers a state continues: this one, unless `changed` gave it others.
 
         Examples
         --------

@@ -70,7 +70,7 @@ class BusSet:
         self.rooms = [(*room_of(most), *units_of(most)) for _ in range(workers)]
 
     def advance(self, store: Store) -> None:
-        """Let all buses go on by a tick; status and end of all lanes are kept up to date."""
+        """Advance all buses by a tick; status and end of all lanes are kept up to date."""
         buses, status, ended = self.buses, store.status, store.ended
         buses.status[:] = status[self.which]
         before = buses.status.copy()
@@ -90,7 +90,7 @@ class BusSet:
             self.rows["point"]["y"][failed] = math.nan
 
     def _break_up(self, places: Indices) -> None:
-        """Let nobody on the buses of these lanes move together, until time goes on."""
+        """Let no servos on the buses of these lanes move together, until time advances."""
         touched = np.unique(self._bus_at[places])
         mates = np.flatnonzero(np.isin(self._bus_at, touched) & (self.buses.joined >= 0))
         self.rows["point"]["anchor_time"][mates] = math.inf

@@ -48,7 +48,7 @@ def run_plan(plan: Plan, folder: Folder | None, executor: Any, show: Callable[[i
     executor : optional
         Anything with the `submit` of `concurrent.futures`; threads on all cores unless given.
     show : callable
-        Is told how many lanes are done.
+        Called with how many lanes are done.
     """
     table: Columns = {"lane": np.arange(plan.lanes), **plan.columns, **plan.followed}
     table |= {name: np.empty(plan.lanes) for name in plan.job.metrics}
@@ -128,7 +128,7 @@ def sweep(
     directory : str or Path, optional
         Folder that the study is written to, chunk by chunk.
     resume : bool
-        Whether a study that the folder holds unfinished is gone on with.
+        Whether a study that the folder holds unfinished is continued.
     file_format : str
         Of the lanes in the folder: "csv" or "parquet".
     chunk : int, optional

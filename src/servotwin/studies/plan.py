@@ -385,7 +385,7 @@ def _job(model: Model, command: Signal, load: Load, duration: float, metrics: Se
 
 
 def _chunk_size(lanes: int, times: int) -> int:
-    """Return how many lanes are worked on together: the same on every machine, so that it can go on elsewhere."""
+    """Return how many lanes are worked on together: the same on every machine, so that it can continue elsewhere."""
     usual = min(_CHUNK_NUMBERS // times, max(_LEAST_CHUNK, lanes // _LEAST_CHUNKS), _MOST_CHUNK)
     return 1 << (max(1, usual).bit_length() - 1)
 

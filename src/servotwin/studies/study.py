@@ -54,7 +54,7 @@ class Folder:
     file_format : str
         "csv" or "parquet".
     resume : bool
-        Whether a folder with the same study is gone on with.
+        Whether a folder with the same study is continued.
 
     Raises
     ------

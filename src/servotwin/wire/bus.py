@@ -251,7 +251,7 @@ class Counts:
 class Bus:
     """Servos on a wire: Feetech's STS and SMS, or Dynamixel's X with protocol 2.0.
 
-    The twins stand on one supply and go on together, compiled. A packet sees the state of its arrival; an answer is
+    The twins stand on one supply and advance together, compiled. A packet sees the state of its arrival; an answer is
     through after the servo's return delay and the time of its bytes. The same bytes at the same times give the same
     bytes, in every run.
 
@@ -394,14 +394,14 @@ class Bus:
     # --- time ---------------------------------------------------------------------------------------------------------
 
     def advance(self, duration: float) -> bytes:
-        """Go on for a time [s]; return the bytes that have come out of the wire since.
+        """Advance by a time [s]; return the bytes that have come out of the wire since.
 
         Raises
         ------
         InputError
             If the time is none.
         SimulationError
-            If a servo cannot go on.
+            If a servo cannot continue.
         """
         if not 0.0 <= duration < 1e6:
             raise InputError("advance(duration)", got=duration, allowed="a number of seconds, at least 0")
@@ -433,7 +433,7 @@ class Bus:
         return max(time for time, _, _ in self._out if time <= last)
 
     def ask(self, data: bytes, patience: float = 0.05) -> bytes:
-        """Send bytes, go on until nothing is left to be answered, at most for a time [s]; return what came."""
+        """Send bytes, advance until nothing is left to be answered, at most for a time [s]; return what came."""
         self.write(data)
         end, found = self.time + patience, self.advance(0.0)
         while self.due is not None and self.due <= end:

@@ -125,7 +125,7 @@ class Device:
     model : DigitalServo
     family : Family
     say : callable
-        Told what is not computed, a line each time.
+        Called with what is not computed, a line each time.
     version : tuple of int
         Of the firmware.
     """
@@ -209,7 +209,7 @@ class Device:
             self._say(f"servo {self.id}: {text}")
 
     def tune(self, *names: str) -> None:
-        """Let the twin go on with what these registers hold."""
+        """Let the twin continue with what these registers hold."""
         made = {one.name: one for name in names for one in self._settings[name]}
         if not made:
             return

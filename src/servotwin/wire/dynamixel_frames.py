@@ -25,7 +25,7 @@ _CRC = _table()
 
 
 def crc16(data: bytes, crc: int = 0) -> int:
-    """Return the CRC-16 (polynomial 0x8005) of bytes, going on from that of those before.
+    """Return the CRC-16 (polynomial 0x8005) of bytes, continued from that of those before.
 
     Examples
     --------

@@ -36,7 +36,7 @@ def frame(id: int, code: int, data: bytes = b"") -> bytes:
 def split(buffer: bytearray) -> tuple[list[Packet], int]:
     """Take whole packets out of a buffer; return them, and how many had a bad checksum.
 
-    Bytes before a header are skipped. After a bad checksum the search goes on behind the header, so that a bent length
+    Bytes before a header are skipped. After a bad checksum the search resumes behind the header, so that a bent length
     costs no packet that follows.
 
     Examples

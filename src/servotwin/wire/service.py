@@ -152,7 +152,7 @@ class TcpPort:
             return 0
 
     def rate(self) -> float | None:
-        """Return None: TCP knows no speed."""
+        """Return None: TCP has no speed."""
         return None
 
     def close(self) -> None:
@@ -218,7 +218,7 @@ class Keep:
     path : path
     bus : Bus
     say : callable
-        Told when it cannot be written, and when it can again; the bus goes on meanwhile.
+        Called when it cannot be written, and when it can again; the bus continues meanwhile.
     """
 
     def __init__(self, path: str | Path, bus: Bus, say: Callable[[str], None]) -> None:
@@ -321,7 +321,7 @@ class Timing:
 
 
 class Service:
-    """A bus at a port: what comes is answered, and time goes on as the wall clock's.
+    """A bus at a port: what comes is answered, and time advances as the wall clock's.
 
     Parameters
     ----------
@@ -333,7 +333,7 @@ class Service:
     keep : path, optional
         File in which what is stored outlives the process.
     say : callable, optional
-        Told lines that people should know.
+        Called with lines for the user.
     each : callable, optional
         Called with the bus before each piece of simulated time, such as to move a hand.
 

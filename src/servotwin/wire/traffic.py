@@ -1,4 +1,4 @@
-"""Traffic on a wire as logs: what servos told a program, and the truth beside."""
+"""Traffic on a wire as logs: what servos sent a program, and the truth beside."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Traffic:
     Parameters
     ----------
     folder : path
-        Gets `ID.csv` with what the servo told, in the units of a real log, and `truth/ID.csv` (SI); it is made.
+        Gets `ID.csv` with what the servo sent, in the units of a real log, and `truth/ID.csv` (SI); it is made.
     bus : Bus
 
     Raises

@@ -43,7 +43,7 @@ class Seen(NamedTuple):
 
 
 class Crew:
-    """Servos on one supply, told and seen one by one, led on together.
+    """Servos on one supply, commanded and seen one by one, led on together.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class Crew:
     loads : sequence of Load
     seed : int
     say : callable
-        Told what cannot be computed.
+        Called with what cannot be computed.
     """
 
     def __init__(self, models: Sequence[DigitalServo], supplies: Sequence[tuple[Supply, list[int]]],
@@ -93,7 +93,7 @@ class Crew:
     # --- time ---------------------------------------------------------------------------------------------------------
 
     def advance(self, duration: float) -> None:
-        """Let all go on [s]."""
+        """Advance all [s]."""
         if duration <= 0.0:
             return
         self._rows = None
@@ -112,7 +112,7 @@ class Crew:
             self.lead(duration)
 
     def lead(self, duration: float) -> None:
-        """Let time go on [s] with nothing to be changed meanwhile."""
+        """Advance time [s] with nothing to be changed meanwhile."""
         if self._hands:
             held = [k for k in self._hands if not self._torque[k]]
             if held:
@@ -123,7 +123,7 @@ class Crew:
         else:
             self.sims.advance(duration)
 
-    # --- what a servo is told -----------------------------------------------------------------------------------------
+    # --- what a servo is sent -----------------------------------------------------------------------------------------
 
     def goal(self, servo: int, angle: float) -> None:
         """Tell a servo where to go [rad]."""
@@ -144,7 +144,7 @@ class Crew:
         self._releases[servo] = _TICK
 
     def change(self, servo: int, numbers: Mapping[str, float | str]) -> None:
-        """Give a servo other numbers (SI), by dotted name, before time goes on."""
+        """Give a servo other numbers (SI), by dotted name, before time advances."""
         have = self._have[servo]
         for name, value in numbers.items():
             if have.get(name) != value:
@@ -211,7 +211,7 @@ class Crew:
         return self._rows[servo]
 
     def failed(self) -> str | None:
-        """Return why a servo cannot go on; None while all can."""
+        """Return why a servo cannot continue; None while all can."""
         failures = self.sims.failures if self.sims.status.any() else ()
         return f"servo {failures[0].lane}: {failures[0].cause}" if failures else None
 
@@ -293,7 +293,7 @@ class LinkCrew(Crew):
         self.sims.set(torque_enable=False)
 
     def lead(self, duration: float) -> None:
-        """Let MuJoCo and the servos go on by whole steps; what is left waits."""
+        """Advance MuJoCo and the servos by whole steps; what is left waits."""
         if self._told:
             self._drive.command(self._data, dict(zip(self._joints, self._goals.tolist(), strict=True)))
             self._told = False
@@ -319,7 +319,7 @@ class LinkCrew(Crew):
         self._dirty = True
 
     def restart(self, servo: int) -> None:
-        """Let a servo's program begin anew, limp; where its shaft is, MuJoCo knows."""
+        """Let a servo's program begin anew, limp; its shaft is where MuJoCo has it."""
         self._goals[servo] = self.seen(servo).angle
         self.torque(servo, False)
         self._told, self._rows = True, None

@@ -65,7 +65,7 @@ class _Point(NamedTuple):
 
 
 class MockBackend:
-    """A board without a board. Its time goes on while somebody reads, by as much as the reader would wait.
+    """A board without a board. Its time advances while it is read, by as much as the reader would wait.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ class MockBackend:
             self._obey(frame, kind, values)
 
     def read(self, timeout: float) -> bytes:
-        """Return what is to be told; let time go on until something is, or the timeout is over."""
+        """Return the bytes that are due; advance time until some are, or the timeout is over."""
         self._check()
         until = self._now + protocol().ticks(timeout)
         while not self._out and self._now < until:
@@ -141,7 +141,7 @@ class MockBackend:
         return data
 
     def close(self) -> None:
-        """Cut the wire; the board goes on without it until it is silent for too long."""
+        """Cut the wire; the board continues without it until it is silent for too long."""
         self._is_open = False
 
     def _check(self) -> None:
@@ -221,7 +221,7 @@ class MockBackend:
             return "range"  # nobody turns a knob here
         return "ok"
 
-    # time goes on
+    # time advances
 
     def _begin(self) -> None:
         if not self._framing:
@@ -340,7 +340,7 @@ _REFERENCES = {0: "external", 1: "supply", 3: "internal"}  # bits REFS1 and REFS
 
 
 class EmulatedBackend:
-    """The firmware on an emulated ATmega328P. Its time goes on while somebody reads, as fast as the computer can.
+    """The firmware on an emulated ATmega328P. Its time advances while it is read, as fast as the computer can.
 
     Each conversion sees the voltages of the instant at which it is held, each pulse is what the compare unit makes, to
     the cycle. Each opening switches a new board on, whose pins find the plant as the last one has left it.
@@ -381,7 +381,7 @@ class EmulatedBackend:
         self._display = Display()
         self._heard = bytearray()
         self.light: list[tuple[float, int]] = []
-        """When the light went on (1) and off (0) [s]."""
+        """When the light turned on (1) and off (0) [s]."""
 
     @property
     def time(self) -> float:
@@ -422,7 +422,7 @@ class EmulatedBackend:
         self._running.send(data)
 
     def read(self, timeout: float) -> bytes:
-        """Return what has come; let time go on until something has, or the timeout is over."""
+        """Return what has come; advance time until something has, or the timeout is over."""
         board = self._running
         until = board.cycle + max(round(timeout * FREQUENCY), _LEAST)
         while not self._heard and board.cycle < until:

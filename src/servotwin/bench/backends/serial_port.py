@@ -85,7 +85,7 @@ class SerialBackend:
             self._open = serial.Serial(self._port, self._baud, timeout=0, write_timeout=1.0, exclusive=True)
         except (OSError, ValueError) as error:
             raise self._failed(error) from None
-        # an FTDI chip else keeps what has come for 16 ms; Linux only, and not every driver knows it
+        # an FTDI chip else keeps what has come for 16 ms; Linux only, and not every driver has it
         with contextlib.suppress(OSError, ValueError, AttributeError, NotImplementedError):
             self._open.set_low_latency_mode(True)
 

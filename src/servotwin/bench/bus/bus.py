@@ -18,7 +18,7 @@ from servotwin.bench.bus.sdk_wire import BITS, PATIENCE, Answer, BusWire
 from servotwin.bench.recording.experiment import Experiment
 from servotwin.errors import BenchError, InputError
 
-# --- A servo on a wire, as the recorder knows it: its registers, what it was told, what it said -----------------------
+# --- A servo on a wire, as the recorder has it: its registers, what it was sent, what it said -------------------------
 
 _ALERT = 128  # of a status byte of protocol 2
 
@@ -348,7 +348,7 @@ class Bus:
     def run(self, experiments: Mapping[int, Experiment]) -> Iterator[dict[int, tuple[float, ...]]]:
         """Command an experiment for each servo and yield a row for each at every tick.
 
-        Servos whose experiment has ended keep their last command. A servo is read first and told then, so that a
+        Servos whose experiment has ended keep their last command. A servo is read first and commanded then, so that a
         command comes up to a tick's traffic after the row that has it, always by the same time.
 
         Raises

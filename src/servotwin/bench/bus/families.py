@@ -1,4 +1,4 @@
-"""Families of bus servos: by which registers they are told where to go and tell where they are.
+"""Families of bus servos: which registers take the goal, and which give the position.
 
 Names, addresses, bytes and signs are those of `servotwin.parameters.registers`; those of protocol 1 have their bytes
 and signs here (Robotis' e-manual of MX and AX).
@@ -78,7 +78,7 @@ MX = laid(MX_REGISTERS, sizes=_ONE_SIZES, signs={
 AX = laid(AX_REGISTERS, sizes=_ONE_SIZES, signs=_ONE_SIGNS)
 """Dynamixel AX."""
 
-# --- Families of bus servos: by which registers they are told where to go and tell where they are ---------------------
+# --- Families of bus servos: which registers take the goal, and which give the position -------------------------------
 
 _ZERO_CELSIUS = 273.15
 _RPM = 6.0  # deg/s

@@ -74,7 +74,7 @@ def fronts_of(wiring: Wiring) -> Mapping[str, Front]:
 class ServoOnPins:
     """A servo whose pulses are the edges at a pin, and whose tap, current and supply are voltages at others.
 
-    A rising edge does not tell how wide its pulse will be, and no servo knows: it decides when the pulse has ended
+    A rising edge does not tell how wide its pulse will be, so a servo decides when the pulse has ended
     (physics of the pulse servo). So whatever is asked for within a pulse is computed ahead with a pulse that is still
     high, the longest that it takes, and once more from the rising edge when the falling one has come. A servo in
     silence is thus awake while a pulse is high of which it shows only then that it is too long.

@@ -1,4 +1,4 @@
-"""The emulated microcontroller, in a process of its own: it goes on by a time, and says what happens at its pins."""
+"""The emulated microcontroller, in a process of its own: it advances by a time, and says what happens at its pins."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ class Display:
         self._move(self._step)
 
     def _move(self, by: int) -> None:
-        """Go on in the order of its memory: the second line follows the first, and the first the second."""
+        """Move on in the order of its memory: the second line follows the first, and the first the second."""
         place = self._at if self._at < _ROW else self._at - _SECOND + _ROW
         place = (place + by) % (2 * _ROW)
         self._at = place if place < _ROW else place - _ROW + _SECOND
@@ -242,7 +242,7 @@ class Microcontroller:
         return self._process.pid
 
     def go(self, until: int) -> bytes:
-        """Go on to a cycle, or a little beyond, and return what has come over the wire meanwhile.
+        """Advance to a cycle, or a little beyond, and return what has come over the wire meanwhile.
 
         Raises
         ------

@@ -100,7 +100,7 @@ class Terminal:
             self.step()
 
     def step(self) -> None:
-        """Take what a program has written, let the board go on a little, and pass on what it has said."""
+        """Take what a program has written, advance the board a little, and pass on what it has said."""
         written = self._taken()
         if written:
             self.backend.send(written)

@@ -106,7 +106,7 @@ class AnalogRig:
             last = mean
 
     def measure(self, seconds: float) -> dict[str, list[float]]:
-        """Return the counts of every channel over a while, by name; pulses go on as they are."""
+        """Return the counts of every channel over a while, by name; pulses continue as they are."""
         self._stream("fast")
         self._messages.clear()
         self.board.wait(seconds)
@@ -188,7 +188,7 @@ class _Upload:
 class _Rows:
     """Makes rows of what the board tells, in the order of their times.
 
-    Scans are told some at a time and edges at once, so each waits until the other is known up to its time: an edge says
+    Scans arrive some at a time and edges at once, so each waits until the other is known up to its time: an edge says
     when the next one comes, and scans are regular.
     """
 
@@ -222,7 +222,7 @@ class _Rows:
 
     def _edge(self, message: Message) -> list[Sequence[float]]:
         if self._frames == 0:
-            return []  # the last pulse goes on; its frames are not asked for
+            return []  # the last pulse continues; its frames are not asked for
         self._frames -= 1
         width, tick, time = message.values["width"], protocol().tick, message.time - (self._start or 0.0)
         pulse = round(1e6 * width * tick, 3) if width else math.nan

@@ -218,7 +218,7 @@ FEWEST = 3  # points: a line, and how far they are off it
 CHANNEL = {"reference": "command", "supply": "supply", "shunt": "shunt"}
 """Which channel each calibration reads; the reference is measured by a voltage at the pin of the command."""
 UNIT = {"reference": "V", "supply": "V", "shunt": "A"}
-_SURE = 3.0  # standard errors: a zero further away is told
+_SURE = 3.0  # standard errors: a zero further away is reported
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -274,7 +274,7 @@ def calibrated(wiring: Wiring, what: str, meter: Sequence[float], counts: Sequen
     if (y >= FULL - 1).any():
         raise InputError(f"calibration of {what}", got="a count at the end of the converter", allowed="smaller values")
     volts = (y + 0.5) / FULL * (1.0 if what == "reference" else wiring.reference_voltage.value)
-    # Both read with an error; the meter's is told by its maker, the counts' by the line: counts are what scatters
+    # Both read with an error; the meter's is stated by its maker, the counts' by the line: counts are what scatters
     line = fit_line(x, volts)
     if line.slope <= 0.0:
         raise InputError(f"calibration of {what}", got="counts that fall while the meter rises", allowed="a line up")

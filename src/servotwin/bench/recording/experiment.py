@@ -1,4 +1,4 @@
-"""An experiment: what a servo is told, piece by piece, before it is known through which wire."""
+"""An experiment: the commands of a servo, piece by piece, before it is known through which wire."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from servotwin.logs import Log
 
 
-# --- An experiment: what a servo is told, piece by piece, before it is known through which wire -----------------------
+# --- An experiment: the commands of a servo, piece by piece, before it is known through which wire --------------------
 
 KINDS = {"pulse_width": "s", "angle": "rad"}  # kind of command -> its SI unit
 _ROUNDING = 1e-9  # of a range
@@ -32,7 +32,7 @@ class Hold:
     duration : float
         Positive [s]; a wire that works in frames or ticks rounds it to whole ones, at least one.
     value : float or None
-        In SI, by the kind of the experiment; None: the servo is told nothing, and goes limp (no pulses, torque off).
+        In SI, by the kind of the experiment; None: the servo gets no command, and goes limp (no pulses, torque off).
     frame_period : float or None
         From pulse to pulse [s]; that of the experiment unless given.
     """

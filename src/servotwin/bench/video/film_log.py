@@ -1,4 +1,4 @@
-"""A filmed angle as a log: beside what the servo was told, if a recorder's log says that."""
+"""A filmed angle as a log: beside the servo's command, if a recorder's log has it."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def film_log(filmed: Filmed, log: str | Path | None = None, *, mend: Sequence[st
 
     Notes
     -----
-    A fit knows no negative delay. So with a log the angle comes later than it was seen: by half a picture, which is
+    A fit has no negative delay. So with a log the angle comes later than it was seen: by half a picture, which is
     what the instant of an LED may be off, and after a first jump by one more frame, for which its pulse may have
     waited. The sidecar says by how much.
     """

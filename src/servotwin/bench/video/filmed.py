@@ -87,7 +87,7 @@ class Clip:
             raise InputError(f"{self.path}: the clip is cut, the end of its file is missing; copy it from the phone "
                              "again")
         with quiet():
-            # one thread, or what others complain of would be told between two pictures
+            # one thread, or what others complain of would be printed between two pictures
             self._film = cv2.VideoCapture(str(self.path), cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1])
         if not self._film.isOpened():
             raise InputError(f"{self.path}", got="no video that OpenCV reads", allowed="a video, such as .mp4 or .mov")
@@ -640,7 +640,7 @@ def read_clip(path: str | Path, *, mark: int = HORN, instant: str | float = JUMP
     one offset for all its logs.
 
     The camera's tilt is found from all pictures at once, see above; neither its focal length
-    nor the size of the mark has to be known. A mark on the case is also what a camera that moves is told by.
+    nor the size of the mark has to be known. A mark on the case is also what shows that a camera moves.
 
     Parameters
     ----------
@@ -648,7 +648,7 @@ def read_clip(path: str | Path, *, mark: int = HORN, instant: str | float = JUMP
     mark : int
         Id of the mark on the horn.
     instant : {"jump", "led", "none"} or float
-        Time 0: the first motion, a light that goes on, the first picture, or a time in the clip [s].
+        Time 0: the first motion, a light that turns on, the first picture, or a time in the clip [s].
     led : tuple of int, optional
         Where the light is: left, top, width, height [pixels]; makes the instant that of the light.
     flip : bool

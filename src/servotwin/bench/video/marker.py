@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-# --- The instant that a clip and a log have in common: a light that goes on, or the first motion ----------------------
+# --- The instant that a clip and a log have in common: a light that turns on, or the first motion ---------------------
 
 LED, JUMP, NONE = "led", "jump", "none"
 _ACROSS = 160  # blocks, in which a light is looked for
@@ -90,7 +90,7 @@ class Lights:
         self._seen.append(self._cv2.resize(brightest, shape, interpolation=self._cv2.INTER_AREA))
 
     def instant(self, time: NDArray[np.float64], axis: NDArray[np.float64], reach: float) -> Instant:
-        """Return when the light went on.
+        """Return when the light turned on.
 
         Parameters
         ----------
@@ -104,12 +104,12 @@ class Lights:
         Raises
         ------
         InputError
-            If none goes on, or one of two things may be it.
+            If none turns on, or one of two things may be it.
         """
         seen = np.array(self._seen)
         stay = max(2, min(round(_STAY / float(np.median(np.diff(time)))), (len(time) - 2) // 2))
         # By how much blocks are brighter after a picture than before it, shape (n - 2 stay, rows, columns): picture
-        # k + stay itself is in neither, for the light may go on while it is taken
+        # k + stay itself is in neither, for the light may turn on while it is taken
         sums = np.concatenate([np.zeros((1, *seen.shape[1:]), np.float32), np.cumsum(seen, axis=0, dtype=np.float32)])
         mean = (sums[stay:] - sums[:-stay]) / stay  # of pictures k to k + stay - 1
         steps = np.asarray(mean[stay + 1:] - mean[:-stay - 1])
@@ -137,7 +137,7 @@ def _switched(time: NDArray[np.float64], level: NDArray[np.float64], k: int, sta
     share = (level - dark) / (light - dark)
     on = next((j for j in range(max(k - 2, 1), len(level)) if share[j] >= _ON), k + 1)
     off = next((j for j in range(on - 1, -1, -1) if share[j] <= _OFF), on - 1)
-    # no wider than a picture: where one was taken while the light went on, that is the one
+    # no wider than a picture: where one was taken while the light turned on, that is the one
     return Instant(LED, float(0.5 * (time[off] + time[on])), float(_RECTANGLE * (time[on] - time[off]) / (on - off)))
 
 

@@ -262,7 +262,7 @@ def confirmed(causes: Sequence[ArmCause], what: Problem, arm: Copies, noise: Noi
               slopes: Sequence[Array]) -> tuple[ArmCause, ...]:
     """Return causes that make the whole robot fit better too, in its numbers; gains have been searched anyway.
 
-    Of single joints the first stage knows what others ask of them by smoothed measurements only: heavier links explain
+    Of single joints the first stage has what others ask of them by smoothed measurements only: heavier links explain
     some of what that lacks.
 
     Parameters

@@ -550,7 +550,7 @@ def _held_out(count: int, asked: int | None) -> int:
 
 
 def _pushed(way: Way) -> list[str]:
-    """Return a line on each belief that the episodes push far and know better."""
+    """Return a line on each belief that the episodes push far and determine better."""
     what, x, doubts, found = way.what, way.x, way.doubts, []
     for k, one in enumerate(what.numbers.all):
         if one.name == CLOCK:

@@ -509,7 +509,7 @@ def noise_of(episodes: Sequence[Episode], residuals: Sequence[Array], used: Sequ
 
 
 def spread_of(residuals: Sequence[Array], used: Sequence[Mask]) -> float:
-    """Return how far residuals spread: the mean logarithm of the joints' rms, of noise that nobody knows yet."""
+    """Return how far residuals spread: the mean logarithm of the joints' rms, of noise that is not known yet."""
     r, mask = np.concatenate(list(residuals)), np.concatenate(list(used))
     squares = (np.where(mask, r, 0.0)**2).sum(axis=0) / np.maximum(mask.sum(axis=0), 1)
     return float(np.mean(0.5 * np.log(squares + _LEAST**2)))

@@ -1,1 +1,1 @@
-"""Fits to logs: what is searched, the search, how surely it knows, what it cannot say, and what to record next."""
+"""Fits to logs: what is searched, the search, how certain it is, what it cannot say, and what to record next."""

@@ -100,7 +100,7 @@ class Advice:
     def __str__(self) -> str:
         best, name = self.experiments[0], self.widest
         text = f"next: {best}; {name} from {_share(self.now[name])} to {_share(best.widths[name])}"
-        # Where priors say more than a tenth of it, what the logs say is told apart
+        # Where priors say more than a tenth of it, what the logs say is stated apart
         if self.alone[name] <= _TOLD * self.now[name] and best.alone[name] <= _TOLD * best.widths[name]:
             return text
         return f"{text}; by logs alone, without priors, from {_share(self.alone[name])} to {_share(best.alone[name])}"

@@ -224,9 +224,9 @@ def ends(search: Search, best: Outcome, doubt: Uncertainty, which: Sequence[int]
     rows : sequence of Rows
         Of the fitted logs: how their own numbers follow.
     tell : callable, optional
-        Is told how many are done, after each step.
+        Called with how many are done, after each step.
     deeper : callable, optional
-        Is told of points that cost clearly less than the end of the search: it lies in another valley.
+        Called with points that cost clearly less than the end of the search: it lies in another valley.
     """
     reaches = {k: doubt.quantile(level, k) for k in which}
     exact = {k: Ends(-reaches[k], reaches[k], "normal") for k in which if not doubt.std[k] > 0.0}  # residuals are 0
@@ -319,7 +319,7 @@ def begins(search: Search, best: Outcome, doubt: Uncertainty, k: int, steps: flo
            ) -> tuple[Point, Point]:
     """Return two points with one number moved far: all others where the parabola wants them, and where they are.
 
-    Beyond a kink the parabola knows nothing.
+    Beyond a kink the parabola says nothing.
     """
     shared = best.point.shared.copy()
     shared[k] = np.clip(shared[k] + steps * doubt.std[k], search.lower[k], search.upper[k])

@@ -30,14 +30,14 @@ if TYPE_CHECKING:
     pass
 
 
-# --- The arguments of `identify`, checked before anything runs, and what a reader has to know afterwards --------------
+# --- The arguments of `identify`, checked before anything runs, and the warnings for a reader afterwards --------------
 
 _KINDS = (PulseServo, PulseServoInductive, BoundedServo, DigitalServo)
 _PLANT = ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque")
 _LOOP_GAIN = "firmware.proportional_gain"
 _FITTED = ("output_angle", "feedback_voltage", "armature_current", "supply_current")
 _TOO_FAST = 4.0  # times the speed without load
-_PATIENCE = 1.0  # s before time left is told
+_PATIENCE = 1.0  # s before time left is shown
 
 
 def checked_logs(logs: Any) -> tuple[Log, ...]:
@@ -227,7 +227,7 @@ def checked_count(what: str, number: Any, *, least: int) -> int:
 
 @contextmanager
 def shown(progress: Any) -> Iterator[Callable[[float, str], None]]:
-    """Give a function that is told the share that is done and what goes on."""
+    """Give a function that is called with the share that is done and the work in progress."""
     if callable(progress):
         yield lambda share, text: (progress(share, text), None)[1]
         return

@@ -85,7 +85,7 @@ def split(logs: Sequence[Log], holdout: Any, seed: int) -> tuple[list[int], list
 LINEARISED_TIMES = 3.0
 """Times as wide as where the problem is straight, assumed: among kinks those of a finished fit are up to so wide."""
 NOT_YET = "not determined yet"
-"""How an interval is told that a fit which was stopped has left open."""
+"""How an interval is shown that a fit which was stopped has left open."""
 LEAST_SHARE = 0.005
 """Of an interval: less prior than this is not worth a word."""
 
@@ -128,10 +128,10 @@ class Fit:
     noise : mapping of str to float
         Standard deviation of the residuals of each sensor, robust (SI).
     warnings : tuple of str
-        Warnings that a reader has to know, a line each.
+        Remarks for a reader, a line each.
     doubt : Uncertainty
     spans : mapping of str to tuple of float
-        Ranges (SI) of what is told by pulses: the delay.
+        Ranges (SI) of what pulses determine: the delay.
     phased : bool
         Whether the pulses of each log came when the log wanted.
     ticked : bool

@@ -133,7 +133,7 @@ def counts_of(forecast: Forecast, k: int) -> Counts | None:
     return Counts(np.concatenate(reading), np.concatenate(power), belief)
 
 
-# --- The doubts of a fit: how surely it knows its numbers, and what the logs do not say of them -----------------------
+# --- The doubts of a fit: how certain its numbers are, and what the logs do not say of them ---------------------------
 
 Told = Callable[[float, str], None]
 
@@ -237,8 +237,8 @@ def _information(task: Task, found: Outcome, central: Sequence[LogPart]) -> Arra
 
 # --- The last stage of a fit: its verdict, and where that is bad the trials of what may be the matter -----------------
 
-_OUTLIERS = 0.005  # of the samples: then they are told
-_FINEST = 1e-9  # SI: what no simulation is told to be nearer
+_OUTLIERS = 0.005  # of the samples: then they are reported
+_FINEST = 1e-9  # SI: the accuracy below which no simulation goes
 _EFFORT = 3.0  # times that of the fit, for all trials: the verdict itself and their start are not counted
 
 
@@ -253,7 +253,7 @@ def with_verdict(task: Task, point: Point, fit: Fit, course: Course, slew: Mappi
         Where it ended.
     fit : Fit
     course : Course
-        Told the share done, and what goes on.
+        Called with the share done, and the work in progress.
     slew : mapping of int to ndarray
         Residuals of delay, slew and lag where each log is judged (SI); none where there is no such model beside.
     trials : bool
@@ -424,7 +424,7 @@ def _delay(task: Task) -> int:
 
 
 def _pulses(task: Task, found: Outcome) -> dict[str, tuple[float, float]]:
-    """Return the range of the delay (SI) where pulses have not told yet which of them carries a command: a frame."""
+    """Return the range of the delay (SI) where pulses do not show yet which of them carries a command: a frame."""
     k = _delay(task)
     if k < 0 or not task.forecast.phased:
         return {}
@@ -435,7 +435,7 @@ def _pulses(task: Task, found: Outcome) -> dict[str, tuple[float, float]]:
 # --- `identify` -------------------------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
-_VALLEYS = 3  # that a fit goes on to, at most
+_VALLEYS = 3  # to which a fit continues, at most
 _FREED = 3  # numbers that the file leaves out
 _VOLTAGE = "supply.open_circuit_voltage"
 Progress = bool | Callable[[float, str], object]
@@ -514,7 +514,7 @@ def identify(
     seed : int
         Of random starts and of what is held out.
     progress : bool or callable
-        True shows a bar with the time left; a callable is called with the share that is done and what goes on.
+        True shows a bar with the time left; a callable is called with the share that is done and the work in progress.
     diagnose : bool
         Where what is left is no noise, causes are tried: at most four times what the fit itself took. False leaves
         that out; the verdict stays.
@@ -613,7 +613,7 @@ def _beginnings(registers: RegisterSearch | None, names: Sequence[str]) -> tuple
 
 
 def _seen_before(starts: int | Begin, mend: Sequence[str]) -> bool:
-    """Tell whether another fit looked at the logs before, which goes on, and again at its end."""
+    """Tell whether another fit looked at the logs before, which is continued, and again at its end."""
     return isinstance(starts, Begin) and bool(starts.own) and not starts.exactly and not mend
 
 
@@ -700,7 +700,7 @@ def _compared(task: Task, held_out: Sequence[int], traces: tuple[Trace, ...], fi
 
 def _with_doubts(task: Task, found: Outcome, level: float,
                  show: Callable[[float, str], None]) -> tuple[Outcome, Doubts]:
-    """Return where the search ended and its doubts; where these saw a deeper valley, it goes on from there.
+    """Return where the search ended and its doubts; where these saw a deeper valley, it continues from there.
 
     One at whose bottom more numbers stand at a bound is none of a servo: logs that no servo can follow have such.
     """

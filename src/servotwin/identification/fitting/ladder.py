@@ -38,7 +38,7 @@ from servotwin.simulation.lanes.inputs import LOAD_NAMES
 
 Array = NDArray[np.float64]
 _STANDS = 0.02  # of a log's largest speed: below, it stands
-_WINDOW = 0.05  # s, over which that is told: counts of an encoder are no speed
+_WINDOW = 0.05  # s, over which that is determined: counts of an encoder are no speed
 _LEAST = 0.02  # share of an error that is worth a word
 
 
@@ -167,7 +167,7 @@ class _Told(NamedTuple):
 
 
 def told_of(rungs: Sequence[Rung], select: str) -> _Told:
-    """Return the error on logs that did not choose: those held out in two halves, each told by the other's choice."""
+    """Return the error on logs that did not choose: those held out in two halves, each judged by the other's choice."""
     if _by_criterion(rungs, select):
         chosen, _ = choice_of(rungs, select)
         return _Told(next(rung.holdout for rung in rungs if rung.name == chosen), ())
@@ -405,7 +405,7 @@ class _Climb(NamedTuple):
 
 
 def may_give_way(model: Model, logs: Sequence[Log], free: Sequence[str]) -> tuple[str, ...]:
-    """Return what may give way and is worth a trial: the model reads it, and nobody knows how much it does.
+    """Return what may give way and is worth a trial: the model reads it, and how much it does is unknown.
 
     A bus that was measured says how far its supply gives way; that is not left to the angles then.
 
@@ -442,7 +442,7 @@ def _contains(name: str, other: str) -> bool:
 
 
 def _start(base: Servo, name: str, servo: Servo) -> Servo:
-    """Return where a rung begins that goes on from another one, or from the servo itself: its further terms small."""
+    """Return where a rung begins that continues from another one, or from the servo itself: its further terms small."""
     law, extra = _parts(name)
     values: dict[str, Any] = {}
     for share, both in _ALIKE.items():

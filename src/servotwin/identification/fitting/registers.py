@@ -59,7 +59,7 @@ _FAR = 1.25  # step of a register at which the logs tell its value if they do
 _FOLLOWS = (0.7, 0.85, 1.0, 1.2, 1.4)  # times a register, while another one has another value
 _SAME = 1e-4  # of an error: a register that changes no more does nothing in these logs
 _LOOKED = 8  # states elsewhere, of those that leave least on parts of the logs, that all of the logs judge
-_BEGINNINGS = 4  # of sweeps, that go on from different values of the first register
+_BEGINNINGS = 4  # of sweeps, that continue from different values of the first register
 _STARTS = 2  # further beginnings of a search
 _FINER = (1.25, 1.1, 1.04)  # steps of a register about the best of its values, one round each
 TAKEN = 0.5
@@ -582,7 +582,7 @@ def busiest(time: Array, goals: Array, angles: Array, still: float,
             seconds: float = _SECONDS) -> tuple[float, float] | None:
     """Return start and end of the part in which goals go furthest, from rest on [s]; None of what is short.
 
-    In motion nobody knows where the profile of the program stands.
+    In motion it is unknown where the profile of the program stands.
 
     Parameters
     ----------

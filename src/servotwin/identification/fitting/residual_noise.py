@@ -3,7 +3,7 @@
 White noise shows in second differences, also while the shaft moves smoothly; noise that remembers itself only while the
 shaft stands, or where the same command was recorded twice; an instrument that counts scatters by its step over √12.
 
-A model that holds leaves noise, and noise knows nothing of commands: `resid` of the System Identification Toolbox tests
+A model that holds leaves noise, and noise does not follow commands: `resid` of the System Identification Toolbox tests
 the same (Ljung 1999, 16.6). Both are filtered so that noise has no memory (Box & Jenkins 1970; Haugh 1976).
 """
 
@@ -461,7 +461,7 @@ def _centred(values: Array) -> Array:
 
 
 class _Part(NamedTuple):
-    """Residuals and changes of the command in one log, and where it begins and goes on after gaps."""
+    """Residuals and changes of the command in one log, and where it begins and continues after gaps."""
 
     residual: Array
     changes: Array

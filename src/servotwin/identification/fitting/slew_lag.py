@@ -124,7 +124,7 @@ class SlewLag:
 
 
 def usable(log: Log, signal: str) -> NDArray[np.bool_]:
-    """Return which samples of a log count for a model that knows no servo without pulses, shape (n,)."""
+    """Return which samples of a log count for a model that has no servo without pulses, shape (n,)."""
     if signal not in log.measured:
         return np.zeros(len(log), np.bool_)
     used = log.used(signal)

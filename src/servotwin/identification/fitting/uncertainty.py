@@ -1,4 +1,4 @@
-"""How surely a fit knows its numbers: covariance from the curvature of the cost and from how the residuals scatter.
+"""How certain the numbers of a fit are: covariance from the curvature of the cost and from how the residuals scatter.
 
 Where the residuals of a log follow each other (a model never fits perfectly), their number overstates what they say.
 The covariance is then that of first-order autoregressive residuals, widened to that of Newey & West (1987) where these
@@ -92,7 +92,7 @@ def _bases(rows: Sequence[Rows], directions: Array) -> list[tuple[Array, Array]]
 
 
 def echo(columns: Array, rho: float) -> Array:
-    """Return columns y of columns x that go on by y_k = x_k + ρ y_(k−1), as first-order noise does.
+    """Return columns y of columns x that continue by y_k = x_k + ρ y_(k−1), as first-order noise does.
 
     Examples
     --------
@@ -142,7 +142,7 @@ def _left(bases: Sequence[tuple[Array, Array]], rho: float) -> Array:
     return np.array([max(squares, _LEAST * total), products])
 
 
-# --- How surely a fit knows its numbers -------------------------------------------------------------------------------
+# --- How certain the numbers of a fit are -----------------------------------------------------------------------------
 Array = NDArray[np.float64]
 _MANY_LOGS = 5  # as many logs for each number
 _HARDLY, _SURELY = 1.5, 3.0  # standard errors of a correlation of 0
@@ -465,7 +465,7 @@ def _sandwich(bread: Array, meat: Array) -> Array:
 
 
 def _inverse(H: Array) -> Array:
-    """Return the inverse of a symmetric matrix; what has no curvature at all stays without, and is told apart."""
+    """Return the inverse of a symmetric matrix; what has no curvature at all stays without, and is distinguished."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-12 * max(float(np.diag(H).max(initial=0.0)), 1e-12)))
     values, vectors = np.linalg.eigh(H * np.outer(scale, scale))
     values = np.maximum(values, 1e-14)

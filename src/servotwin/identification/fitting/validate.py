@@ -117,7 +117,7 @@ def fitted_rig(forecast: Forecast, start: Point, asked: Sequence[str], show: Cal
     asked : sequence of str
         Searched parameters.
     show : callable
-        Told the share that is done, and what goes on.
+        Called with the share that is done, and the work in progress.
     """
     task = _task(forecast)
     task.asked = tuple(asked)

@@ -262,7 +262,7 @@ def rival(name: str, pairs: Sequence[tuple[Array, Array]], step: float, noise: f
 
 
 def against(verdict: Verdict, rival: Rival | None, sensor: str) -> Verdict:
-    """Return a verdict that knows the simplest model beside the fit; where that is nearer, it says so first."""
+    """Return a verdict with the simplest model beside the fit; where that is nearer, it says so first."""
     if rival is None or not rival.beats:
         return replace(verdict, rival=rival)
     where = "logs that were held out" if rival.held_out else "the same logs"

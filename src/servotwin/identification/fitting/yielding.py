@@ -37,7 +37,7 @@ from servotwin.logs.log import Log
 if TYPE_CHECKING:
     from servotwin.identification.fitting.traces import ErrorTables
 
-# --- How surely a fit knows each number: intervals, what the logs leave open, and how much of it is prior -------------
+# --- How certain each number of a fit is: intervals, what the logs leave open, and how much of it is prior ------------
 
 _RISE = 1.92  # of the cost at the ends of a 95 % interval of one number
 _PART = 0.05  # of a direction
@@ -436,7 +436,7 @@ def settle(task: Task, found: Outcome, tell: Told) -> tuple[Outcome, tuple[Dropp
 
     All that are contradicted one by one go at once, and come back one at a time where the logs do not contradict them
     beside those that are still there. Those that the logs push, if less far, are widened one after the other. The task
-    goes on so.
+    continues so.
 
     Parameters
     ----------
@@ -444,7 +444,7 @@ def settle(task: Task, found: Outcome, tell: Told) -> tuple[Outcome, tuple[Dropp
     found : Outcome
         The end of its search.
     tell : callable
-        Is told the share that is done, and what goes on.
+        Called with the share that is done, and the work in progress.
     """
     left: list[Dropped] = []
     count = 0 if task.doubted else int((task.prior.weight > 0.0).sum())
@@ -456,7 +456,7 @@ def settle(task: Task, found: Outcome, tell: Told) -> tuple[Outcome, tuple[Dropp
             if not trials:
                 break
             best = max(trial.gain for trial in trials)
-            # Fits that are as good are told apart by how far its own prior has to be left
+            # Fits that are as good are distinguished by how far its own prior has to be left
             chosen = min((t for t in trials if t.gain > best - _REACH), key=lambda t: t.moved)
             gone, point = [chosen.dropped], chosen.end.point
             if len(going := [trial for trial in trials if math.isinf(trial.dropped.wide)]) > 1:
@@ -506,7 +506,7 @@ def yielded(task: Task, found: Outcome, left: Sequence[Dropped], doubts: Doubts)
     Parameters
     ----------
     task : Task
-        As it goes on without them.
+        As it continues without them.
     found : Outcome
     left : sequence of Dropped
     doubts : Doubts
@@ -652,7 +652,7 @@ def _judged(task: Task, found: Outcome, k: int, end: Outcome, base: float) -> _T
 
 
 # --- Which searched numbers the logs can hardly tell, before any search -----------------------------------------------
-_FACTOR = 1.0  # standard error (scaled), a factor of e, beyond which a number without a prior is not told
+_FACTOR = 1.0  # standard error (scaled), a factor of e, beyond which a number without a prior is not determined
 _LEAST = 1e-9  # SI
 _INERTIAS = ("output_inertia", "motor.rotor_inertia")
 
@@ -696,9 +696,9 @@ motor settles in 20 ms
 def foreseen(task: Task) -> tuple[Foreseen, ...]:
     """Return which searched numbers the fitted logs can hardly tell, by the derivatives where the search begins.
 
-    A number is told if the logs alone, with all other shared numbers known, leave a standard error below that of its
-    prior, or below a factor of e where it has none. That is necessary, not enough: several numbers may still be told
-    together only, which the fit says at its end. Noise is that which neighbouring samples show.
+    A number is determined if the logs alone, with all other shared numbers known, leave a standard error below that of
+    its prior, or below a factor of e where it has none. That is necessary, not enough: several numbers may still be
+    determined together only, which the fit says at its end. Noise is that which neighbouring samples show.
     """
     forecast = task.forecast
     noise, strict = forecast.noise, forecast.strict
@@ -733,7 +733,7 @@ def _noise(cases: list[Case], name: str) -> float:
 
 
 def _reason(task: Task, cases: list[Case], name: str) -> str:
-    """Return a simple cause why a number cannot be told; nothing where none is seen."""
+    """Return a simple cause why a number cannot be determined; nothing where none is seen."""
     if not any(case.log.changes.size for case in cases):
         return "the command never changes"
     servo = task.forecast.model.servo
@@ -747,7 +747,7 @@ _OVERFITTED = 1.6  # error of new logs over that of the fitted ones
 
 
 def warnings_of(yielded: Sequence[Yielded | Widened], tables: ErrorTables) -> tuple[str, ...]:
-    """Return what a reader has to know of a fit, a line each."""
+    """Return the warnings on a fit for a reader, a line each."""
     found = [str(one) for one in yielded]
     if tables.holdout and tables.training:
         model = tables.holdout.models[0]

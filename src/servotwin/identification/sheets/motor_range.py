@@ -348,7 +348,7 @@ def sheet_contradictions(sheet: Sheet) -> tuple[Contradiction, ...]:
 
 
 def sheet_flags(sheet: Sheet) -> tuple[str, ...]:
-    """Return what someone who uses this sheet should know, each in a few words.
+    """Return the warnings for the use of this sheet, each in a few words.
 
     Examples
     --------

@@ -1,1 +1,1 @@
-"""Modes, events, motions and the one step, as plain functions over floats; they know `math` and nothing else."""
+"""Modes, events, motions and the one step, as plain functions over floats; they use `math` and nothing else."""

@@ -184,7 +184,7 @@ def rise(inputs: Inputs, firm: Any) -> None:
 
 
 def resume(inputs: Inputs, memory: Memory) -> None:
-    """Find the next tick and pulse of a program that goes on, under commands that may be others than before."""
+    """Find the next tick and pulse of a program that continues, under commands that may be others than before."""
     firmware, firm = inputs.firmware[0], of(memory)
     time = origin_of(memory) + memory.point.time
     firm.hears = -math.inf

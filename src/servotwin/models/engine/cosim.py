@@ -126,7 +126,7 @@ def carried(follows: float, angle: float, half_play: float) -> float:
     return min(max(follows, angle - half_play), angle + half_play)
 
 
-# --- From servos side by side to servos one by one, and back: the same memory, told in two ways -----------------------
+# --- From servos side by side to servos one by one, and back: the same memory, stored in two ways ---------------------
 
 def remembered(tile: Any, j: int, firm: Programs) -> Memory:
     """Return the memory of a servo that runs side by side, where times count from now [s].
@@ -398,7 +398,7 @@ def note_lost_buses(which: Indices, own: Indices, rows: Any, status: Any, ended:
 
 
 def break_up(joined: Indices, shared: Any, rows: Any) -> None:
-    """Let nobody on any bus move together until time goes on, and all motions begin anew."""
+    """Let no servos on any bus move together until time advances, and all motions begin anew."""
     for k in range(joined.size):
         joined[k], rows[k].point.anchor_time = -1, math.inf
     for k in range(len(shared)):
@@ -458,7 +458,7 @@ def refused_from(chip: Chip, command: NDArray[np.float64], period: float,
 
 def told(pulsed: bool, numbers: Numbers, chip: Chip, command: NDArray[np.float64], period: float,
          edges: Sequence[float] | NDArray[np.float64], duration: float) -> tuple[float, float]:
-    """Return the angle [rad] that the servo was told last, and how far from it nothing is done."""
+    """Return the angle [rad] that the servo was sent to last, and how far from it nothing is done."""
     p, b_o = numbers.sensor.p, numbers.sensor.b_o
     if not pulsed:
         voltage = piece_value(piece_before(command, duration, False), duration)
@@ -488,7 +488,7 @@ def marks(pulsed: bool, numbers: Numbers, chip: Chip, command: NDArray[np.float6
     `tau` is the part of the load's torque that depends on time alone [N m], `source` the voltage of the supply, other
     servos' currents apart [V], `final` the last angle and speed, and temperatures of winding and housing.
     """
-    if numbers.sensor.p == 0.0:  # neither a motor nor a servo that turns without end is told an angle
+    if numbers.sensor.p == 0.0:  # neither a motor nor a servo that turns without end takes an angle
         return 0
     q, w, T_w, T_h = final[0], final[1], final[2], final[3]
     target, slack = told(pulsed, numbers, chip, command, period, edges, duration)

@@ -1,6 +1,6 @@
-"""Lanes: what many servos are and are told, a column or an entry of each array for each.
+"""Lanes: numbers and inputs of many servos, a column or an entry of each array for each.
 
-In plain Python servos on a bus are told by a list of inputs, compiled by the arrays of all lanes.
+In plain Python servos on a bus have a list of inputs, compiled they have the arrays of all lanes.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     Smalls = NDArray[np.int8]
 
 PLAIN = True  # the compiler takes it for False
-# Status of a lane that has gone on in this call already, side by side with others or by legs: for all of it, or not yet
+# Status of a lane that has advanced in this call, side by side with others or by legs: for all of it, or not yet
 ARRIVED, UNDERWAY = -2, -1
 
 chip_at = reader("chip_at", Chip)
@@ -94,7 +94,7 @@ def chip_of(lanes: Lanes, lane: int) -> Chip:
 
 
 def inputs_of(lanes: Lanes, curve: Floats, torque: Floats, lane: int) -> Inputs:
-    """Return what a lane is told, and what hangs on its shaft with a recorded torque."""
+    """Return the inputs of a lane, and what hangs on its shaft with a recorded torque."""
     first, last = lanes.piece_first[lane], lanes.piece_first[lane] + lanes.piece_count[lane]
     own = lanes.edge_count[lane]
     edges = lanes.edges[lanes.edge_first[lane]:lanes.edge_first[lane] + max(own, 0)]
@@ -107,7 +107,7 @@ def inputs_of(lanes: Lanes, curve: Floats, torque: Floats, lane: int) -> Inputs:
 
 
 def inputs_at(told: Any, seat: Any) -> Inputs:
-    """Return what the servo in a seat is told, and what hangs on its shaft."""
+    """Return the inputs of the servo in a seat, and what hangs on its shaft."""
     if PLAIN:
         inputs: Inputs = told[seat.place]
         return inputs

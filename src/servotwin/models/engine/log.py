@@ -1,4 +1,4 @@
-"""The log of a run: rows of motions and of events, written while it goes on, from which all signals follow.
+"""The log of a run: rows of motions and of events, written while it lasts, from which all signals follow.
 
 Compiled, rows are numpy's records; in plain Python named tuples in lists.
 """

@@ -157,7 +157,7 @@ def instant(pulsed: bool, inputs: Inputs, memory: Memory, time: float) -> float:
 
 
 def resumed(pulsed: bool, inputs: Inputs, memory: Memory, changed: bool) -> Memory:
-    """Return a memory ready to go on under inputs that may be others than before.
+    """Return a memory ready to continue under inputs that may be others than before.
 
     `changed` is whether the servo itself is another one.
     """
@@ -185,7 +185,7 @@ def resumed(pulsed: bool, inputs: Inputs, memory: Memory, changed: bool) -> Memo
 
 
 def silent_now(memory: Memory) -> int:
-    """Tell whether no pulses come, 1 or 0, before a servo goes on; one that did not heed that may do so now."""
+    """Tell whether no pulses come, 1 or 0, before a servo continues; one that did not heed that may do so now."""
     if memory.point.anchor_time == math.inf:
         return 1 if memory.chip.clock <= memory.point.time else 0
     return memory.chip.silent

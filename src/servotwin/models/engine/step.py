@@ -1,4 +1,4 @@
-"""The one step: a servo goes on from event to event, to the next one or to a given time.
+"""The one step: a servo advances from event to event, to the next one or to a given time.
 
 Runs of one servo, lanes of many and servos on a bus all are loops over it. The state is kept at the *anchor*, where
 the present motion began, and everything is evaluated from there. So the result depends neither on the output times
@@ -27,7 +27,7 @@ from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.models.terms.sensor import sensed_voltage, wiper_at
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
 
-MOST_IDLE = 200  # events without time going on
+MOST_IDLE = 200  # events without time advancing
 _MOST_OSCILLATIONS = 1e7  # within one motion
 
 # How a step ends; the members of simulation.Status carry the same numbers.
@@ -36,7 +36,7 @@ COMPLETED, DIVERGED, STEP_TOO_SMALL, CHATTER, TOO_FAST, CROWDED = range(6)
 
 def step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, m: Motion,
          until: float) -> tuple[Memory, Motion, int, int]:
-    """Go on to the next event, or to `until` at the latest, by the times of the memory [s].
+    """Advance to the next event, or to `until` at the latest, by the times of the memory [s].
 
     `m` is the motion of the step before, or `motion.nothing`. Return the memory, the motion on which it went, the
     event that ended it (−1: none), and a status.
@@ -86,7 +86,7 @@ def step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, m: Motion
 
 def onward(numbers: Numbers, point: Point, u: Piece, tau: Piece, m: Motion, new: bool, limit: float,
            until: float, accuracy: float) -> tuple[Point, Motion, int, int]:
-    """Go on, under inputs that stay until `limit` [s], to the next event or to `until`.
+    """Advance, under inputs that stay until `limit` [s], to the next event or to `until`.
 
     `m` is the motion so far, which is taken up again if it is still the right one and the inputs are not `new`. Return
     the point, the motion, the event (−1: none) and a status.

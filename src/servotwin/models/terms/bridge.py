@@ -198,7 +198,7 @@ def drops(bridge: Bridge, source: Source, motor: Motor, u: float) -> tuple[float
 
 
 def pack(given: Given) -> Bridge:
-    """Return the numbers of an analog servo's bridge; without pulses it is off as between drives unless told."""
+    """Return the numbers of an analog servo's bridge; without pulses it is off as between drives unless stated."""
     coast = 1.0 if given.electronics_off_state == _COAST else 0.0
     silence = given.electronics_silence_state
     silent_coast = coast if not is_given(silence) else 1.0 if silence == _SILENT_COAST else 0.0

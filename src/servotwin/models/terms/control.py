@@ -34,7 +34,7 @@ def present(firmware: Firmware) -> bool:
 
 
 def follow(firmware: Firmware, firm: Any) -> None:
-    """Let the reference go on by a tick."""
+    """Advance the reference by a tick."""
     if not present(firmware):
         firm.r, firm.rate = firm.goal, 0.0
         return
@@ -62,7 +62,7 @@ def follow(firmware: Firmware, firm: Any) -> None:
 
 NONE, OVERLOAD, CURRENT, HEAT, UNDERVOLTAGE = range(5)  # as `trip` shows them
 OFF = -1.0  # of a clock that does not run
-COOLER = 5.0  # K below its trip it goes on again
+COOLER = 5.0  # K below its trip it works again
 
 
 def acting(firm: Any) -> int:
@@ -259,7 +259,7 @@ def tick(firmware: Firmware, firm: Any, angle: float, sensed: Sensed, silence: f
 
 
 def _has_started(firmware: Firmware, firm: Any, silence: float) -> bool:
-    """Tell whether a program that starts anew is ready by now; what it was told before is lost."""
+    """Tell whether a program that starts anew is ready by now; what it was sent before is lost."""
     slack = NEARLY * firmware.T_c
     if firm.restart > firmware.T_c + slack or silence > firmware.T_c - firm.restart + slack:
         firm.goal = NOWHERE
@@ -287,7 +287,7 @@ def _is_limp(firmware: Firmware, firm: Any) -> bool:
 
 
 def _stay(firm: Any) -> None:
-    """Be told to stay where the shaft is."""
+    """Set the goal to where the shaft is."""
     firm.goal = firm.r = firm.y
     firm.rate, firm.on_course = 0.0, 0
 
@@ -325,7 +325,7 @@ def rests(firmware: Firmware, travel: float) -> bool:
 
 
 def _whole(firmware: Firmware) -> float:
-    """Return what angles are cut to: a count, where the program knows no fractions of one."""
+    """Return what angles are cut to: a count, where the program has no fractions of one."""
     return firmware.quantum if firmware.whole > 0.0 else 0.0
 
 

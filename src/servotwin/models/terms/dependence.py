@@ -1,7 +1,7 @@
 """Flags of terms, which `|` unites.
 
 `depends` of a term says on what the acceleration depends through it in a mode; dependence on the speed in a straight
-line is not told, for every solution has it. `needs` says what else whoever follows a servo has to follow. `ACTS` says
+line is not stated, for every solution has it. `needs` says what else whoever follows a servo has to follow. `ACTS` says
 of each number of a term where it acts; a number that it does not name may act anywhere.
 """
 

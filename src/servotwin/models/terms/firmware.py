@@ -123,7 +123,7 @@ def needs(firmware: Firmware) -> int:
 
 
 def pack(given: Given, period: float) -> Firmware:
-    """Return the numbers of a servo's program, told by pulses in frames of so many seconds; nan: as the servo says."""
+    """Return the numbers of a servo's program under pulses in frames of so many seconds; nan: as the servo says."""
     slope, T_0 = either(given.electronics_one_shot_slope, 0.0), either(given.electronics_one_shot_offset, 0.0)
     p, b_o = either(given.potentiometer_feedback_gain, 0.0), either(given.potentiometer_feedback_offset, 0.0)
     s_mu = slope * p

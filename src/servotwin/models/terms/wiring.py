@@ -1,4 +1,4 @@
-"""How a servo is told: what the engine follows of a command, which commands it takes, and where it rests under one.
+"""How a servo is commanded: what the engine follows of a command, which ones it takes, and where it rests under one.
 
 The engine of a servo without pulses follows a control voltage [V], that of others the width of a pulse [s], or a goal
 on a bus [rad].
@@ -128,12 +128,12 @@ def averaged_by_voltage(given: Given) -> Line:
 
 
 def averaged(given: Given) -> Wiring:
-    """Return how an averaged servo is told."""
+    """Return how an averaged servo is commanded."""
     return _by_voltage(given, averaged_by_pulse(given), -math.inf, math.inf)
 
 
 def bounded(given: Given) -> Wiring:
-    """Return how a bounded servo is told."""
+    """Return how a bounded servo is commanded."""
     return _by_voltage(given, bounded_by_pulse(given), either(given.stops_lower_angle, -math.inf),
                        either(given.stops_upper_angle, math.inf))
 
@@ -147,7 +147,7 @@ def _by_voltage(given: Given, line: Line, lower: float, upper: float) -> Wiring:
 
 
 def pulsed(given: Given, period: float) -> Wiring:
-    """Return how a servo is told by pulses in frames of so many seconds; nan: as the servo says."""
+    """Return how a servo is commanded by pulses in frames of so many seconds; nan: as the servo says."""
     per_angle, at_zero = pulse_of_angle(given)
     p, b_o = feedback_line(given)
     return Wiring(
@@ -159,7 +159,7 @@ def pulsed(given: Given, period: float) -> Wiring:
 
 
 def digital(given: Given, period: float) -> Wiring:
-    """Return how a digital servo is told: by pulses, or by goals on a bus."""
+    """Return how a digital servo is commanded: by pulses, or by goals on a bus."""
     if not takes_goals(given):
         return pulsed(given, period)
     least, most = either(given.firmware_lower_goal, -math.inf), either(given.firmware_upper_goal, math.inf)

@@ -58,7 +58,7 @@ MX_MODELS = (
     _one("MX-28", 29, "mx", 0.114, unprinted=_LARGE | _DUAL, Baud_Rate=34),
     _one("MX-64", 310, "mx", 0.114, unprinted=_DUAL, Baud_Rate=34, Max_Voltage_Limit=240),
     _one("MX-106", 320, "mx", 0.114, Baud_Rate=34),
-    # its page prints 104 as model number; 360 is what programs know it by
+    # its page prints 104 as model number; 360 is what programs identify it by
     _one("MX-12W", 360, "mx", 0.916, unprinted=_LARGE | _DUAL | {"Model_Number"}, P_Gain=8, D_Gain=8, Punch=32),
 )
 AX_MODELS = (

@@ -168,7 +168,7 @@ _GUESS = "assumed"
 _POSITION, _TURNS, _BY_CURRENT = 3, 4, 5
 _by_voltage, _by_heat, _by_load = on(0, "Shutdown"), on(2, "Shutdown"), on(5, "Shutdown")
 # Divisors of P up to which the range goes, assumed: of a model whose page was read, beyond the 141 of an MX-64(2.0) and
-# the 147 of an MX-106(2.0), which were measured; of one that is not told, that of an XL330
+# the 147 of an MX-106(2.0), which were measured; of one that is not given, that of an XL330
 _MOST, _MOST_OF_ANY = 150.0, 256.0
 _NO_SCALE = "the scale of the feed-forward is not published; set firmware.velocity_feedforward and the like instead"
 _FEEDBACK = tuple((name, address) for name, address in (

@@ -34,7 +34,7 @@ class Register:
     why : str
         Reason why the others are not computed.
     reading : bool
-        Whether the servo writes it, as what it measured or was told last: a new one holds nothing to speak of.
+        Whether the servo writes it, as what it measured or was sent last: a new one holds nothing to speak of.
     size : int
         Bytes, the low one first: 1, 2 or 4.
     sign_bit : int, optional

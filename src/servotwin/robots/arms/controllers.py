@@ -1,4 +1,4 @@
-"""Which controller a robot's servos have: plain commands, or one that knows them and the arm that they move.
+"""Which controller a robot's servos have: plain commands, or one with a model of them and of the arm.
 
 A controller has models of its own: an inverse of each servo, and a MuJoCo model of the arm, which may differ from
 the ones that it is wired to.
@@ -200,7 +200,7 @@ class _Sent:
             self._first = exact(middle) - self._per_angle * middle
 
     def shaft(self, value: float) -> float:
-        """Return the angle [rad] that the drive has to be told: of a bare bridge its duty."""
+        """Return the angle [rad] that the drive has to be given: of a bare bridge its duty."""
         return (self._carried(value) - self._first) / self._per_angle
 
 
@@ -228,7 +228,7 @@ class Delayed:
         return found
 
 
-# --- Which controller a robot's servos have: plain commands, or one that knows them and the arm that they -------------
+# --- Which controller a robot's servos have: plain commands, or one with a model of them and of the arm ---------------
 
 
 class RigidBody:
@@ -435,7 +435,7 @@ class AtMotor(OwnPid):
 
 @dataclass(frozen=True, kw_only=True)
 class BeyondPlay(AtMotor):
-    """The same, told to go half of the play further than the tool has to."""
+    """The same, commanded to go half of the play further than the tool has to."""
 
     def controller(self, known: Known) -> Controller:
         """Return the controller."""
@@ -455,7 +455,7 @@ class RigidBodyTorque(_Bare):
 
 @dataclass(frozen=True, kw_only=True)
 class Observed(_Bare):
-    """A disturbance observer at each joint, about a controller that knows neither friction nor the other joints."""
+    """A disturbance observer at each joint, about a controller that models neither friction nor the other joints."""
 
     def controller(self, known: Known) -> Controller:
         """Return the controller."""
@@ -467,7 +467,7 @@ class Observed(_Bare):
 
 def known_of(arm: Arm, mounts: Mapping[str, Mount], angles: Mapping[str, float], *, speed: Any = 0.0,
              frame: float = 0.0, lag: float = 0.0) -> Known:
-    """Return what a controller knows that believes in an arm, and in servos at its joints.
+    """Return the model that a controller has of an arm, and of servos at its joints.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ class Belief:
 
 
 class TaskMetrics(NamedTuple):
-    """How well a task was done; nan where a model knows nothing of it.
+    """How well a task was done; nan where a model has nothing of it.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def run_task(arm: Arm, servos: Model | Mapping[str, Model], path: ToolPath, *, c
     MissingExtraError
         If MuJoCo or mink is not installed.
     SimulationError
-        If a servo or MuJoCo cannot go on.
+        If a servo or MuJoCo cannot continue.
 
     Examples
     --------
@@ -314,11 +314,11 @@ WRONG = {"motor.armature_resistance": 1.3, "motor.rotor_inertia": 1.3, "friction
          "friction.coulomb_torque_backward": 0.7}
 """Shares of the true numbers that a controller believes in which is 30 % wrong."""
 PAYLOAD = 0.05
-"""Of the tool; with load it is twice as much, of which controllers know nothing, `assumed` [kg]."""
+"""Of the tool; with load it is twice as much, which is in no controller's model, `assumed` [kg]."""
 LOW_BATTERY = Supply(open_circuit_voltage=4.4, internal_resistance=0.3)
 """Four tired cells that all servos share, `assumed`; controllers believe in the servo's own supply."""
 PLAY = 0.0175
-"""Of worn gears, 1 degree, of which the controllers know: physics.md has 0.3 to 1 degree [rad]."""
+"""Of worn gears, 1 degree, which is in the controllers' models: physics.md has 0.3 to 1 degree [rad]."""
 _HORN = 1e-5  # kg m² of gear wheel and horn behind the play, assumed
 _FREE = 10.0  # times the supply: one that does not end
 
@@ -354,7 +354,7 @@ class Condition:
     Parameters
     ----------
     payload : float
-        That the tool carries, beside what controllers know [kg]
+        That the tool carries, beside that in the controllers' models [kg]
     believes : mapping of str to float
         Shares of the true numbers that controllers believe in.
     bus : Supply, optional
@@ -417,7 +417,7 @@ class Comparison:
     speed: float = 0.08
 
     def arm(self, case: Case) -> Arm:
-        """Return the arm that controllers know."""
+        """Return the arm of the controllers' models."""
         return ROBOTS[case.robot](payload=PAYLOAD)
 
     def joints(self, case: Case) -> JointPath:

@@ -300,7 +300,7 @@ def _glide(time: Array, duration: float) -> Array:
 # --- Inverse kinematics: from the path of a tool to those of the joints, with mink on MuJoCo --------------------------
 
 # mink solves a quadratic programme for a small step of the joints within their limits; here it is asked again until the
-# tool is where it has to be, to 1e-10 m. Between these times joints go on cubic splines.
+# tool is where it has to be, to 1e-10 m. Between these times joints follow cubic splines.
 
 Array = NDArray[np.float64]
 _WELL = 1e-10  # m and rad: what the tool may be off by

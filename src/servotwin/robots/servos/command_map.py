@@ -29,9 +29,9 @@ class Told(NamedTuple):
     kind : str
         Of the servo's command, "command_angle" or "pulse_width".
     gain, zero : float
-        1 and 0 where the servo turns endlessly: it is told a pulse width or a goal, whatever its mount.
+        1 and 0 where the servo turns endlessly: it takes a pulse width or a goal, whatever its mount.
     rest : float
-        Command before anybody has given one; nan: to hold where it begins.
+        Its command before the first one is given; nan: to hold where it begins.
     unit : str
         Of a command of the joint; empty where that is the joint's own, rad of a hinge and m of a slide.
     """
@@ -54,7 +54,7 @@ class Told(NamedTuple):
 
 
 def told(mount: Mount) -> Told:
-    """Return how the servo of a mount is told where to go, or how fast to turn."""
+    """Return how the servo of a mount is commanded where to go, or how fast to turn."""
     model = mount.model
     if not model.endless or not isinstance(model, SwitchedServo):
         return Told("command_angle", mount.gain, mount.zero, math.nan, "")
@@ -144,7 +144,7 @@ class Seat:
     key : str
         By which somebody asked for it.
     actuator, control : int
-        Its number, and where in `ctrl` it is told what to do.
+        Its number, and where in `ctrl` its command is.
     joint : str
     number : int
         Of the joint.
@@ -338,7 +338,7 @@ def _given_ends(key: str, given: Any, unit: str) -> tuple[float, float]:
 
 
 def _reach(model: Any, seat: Seat, mount: Mount) -> tuple[float, float]:
-    """Return where the joint can go that the servo can be told to go to as well, or all pulses that it takes."""
+    """Return where the joint can go that the servo can be commanded to go to as well, or all pulses that it takes."""
     if mount.model.endless:
         return _pulses(seat, mount)
     ends = VectorSimulator(mount.model, 1).c_entry().commands("command_angle")

@@ -2,7 +2,7 @@
 
 It runs as derived text, compiled or not. Words are those of `joints_layout`.
 
-A servo sees the inertia 1/(M⁻¹)ᵢᵢ and the acceleration aᵢ that its joint would have without it. It goes on for a tick
+A servo sees the inertia 1/(M⁻¹)ᵢᵢ and the acceleration aᵢ that its joint would have without it. It advances by a tick
 and ends at another speed; the joint gets the mean torque τᵢ = (Δω/Δt − aᵢ)/(M⁻¹)ᵢᵢ. The torques of the other servos,
 which aᵢ needs too, are predicted: each is what it was, less its share of what another aᵢ asks of it; one at rest takes
 up all. Where that was wrong by more than a speed that does not count, all go through the tick again.
@@ -218,7 +218,7 @@ def note_forces(d: int, drive: Words, instance: Words, block: Numbers, total: Nu
         force[speed_at[i]] += block[place.HEAD + i]
 
 
-# --- Servos at joints: where they stand, what they are told, and how they go on for a tick ----------------------------
+# --- Servos at joints: where they stand, what they are sent, and how they advance by a tick ---------------------------
 
 def stand(d: int, drive: Words, room: Rows) -> int:
     """Put angles and speeds, as the servos see them, into their room; return who has none, or −1."""
@@ -275,7 +275,7 @@ def stay(drive: Words, block: Numbers, room: Rows, dt: float, rk4: bool) -> None
 
 
 def go_on(instance: Words, room: Rows, dt: float, watched: bool) -> int:
-    """Let all servos go on for a tick; return who cannot, or −1."""
+    """Advance all servos by a tick; return which cannot, or −1."""
     groups = words(instance[place.GROUPS], instance[place.COUNT])
     lost = -1
     for k in range(instance[place.COUNT]):
@@ -434,7 +434,7 @@ def learn(speed_at: Words, gain: Numbers, inverse: Rows, known: Numbers, room: R
 
 def _tick(m: int, d: int, drive: Words, instance: Words, block: Numbers, room: Rows, before: int, dt: float, rk4: bool,
           again: bool) -> None:
-    """Let the servos go on from the beginning of the tick, and find the torques that the joints get meanwhile."""
+    """Advance the servos from the beginning of the tick, and find the torques that the joints get meanwhile."""
     n, dofs = drive[place.SERVOS], drive[place.DOFS]
     at = instance[place.ROOM]
     torque = block[place.HEAD:place.HEAD + n]
@@ -465,7 +465,7 @@ def _tick(m: int, d: int, drive: Words, instance: Words, block: Numbers, room: R
 
 def _settle(drive: Words, instance: Words, block: Numbers, inverse: Rows, room: Rows, square: Rows, before: int,
             dt: float, watched: bool) -> int:
-    """Go through the tick until the torques of all servos are those predicted; return who cannot go on, or −1."""
+    """Go through the tick until the torques of all servos are those predicted; return which cannot continue, or −1."""
     n = drive[place.SERVOS]
     known, speed_at = block[place.HEAD + n:place.HEAD + 4 * n], words(drive[place.SPEED_AT], n)
     gain, armature = numbers(drive[place.GAIN], n), numbers(drive[place.ARMATURE], n)
@@ -534,7 +534,7 @@ def _start_anew(drive: Words, instance: Words, block: Numbers, room: Rows, half:
 def _begin(drive: Words, instance: Words, block: Numbers, room: Rows, halves_at: int, t: float, dt: float) -> bool:
     """Find out where in time this call stands, and let the servos stand there; return whether this tick was met before.
 
-    Time that goes on by a tick goes on from what the servos remember at its end; the same instant once more begins the
+    Time that advances by a tick continues from what the servos remember at its end; the same instant again begins the
     tick anew; any other instant is a new beginning for the servos too, at rest.
     """
     n, size, head = drive[place.SERVOS], drive[place.MEMORY], place.HEAD
@@ -623,7 +623,7 @@ def control(m: int, d: int) -> None:
 
 
 def step(drive_at: int, m: int, d: int, steps: int) -> int:
-    """Let the engine go on with the servos, under this callback alone; return `WELL` or what is wrong."""
+    """Advance the engine with the servos, under this callback alone; return `WELL` or what is wrong."""
     drive = words(drive_at, place.DRIVE_WORDS)
     slot = words(drive[place.SLOT], 1)
     before = slot[0]

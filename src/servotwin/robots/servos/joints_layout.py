@@ -12,7 +12,7 @@ ARRAYS = ("angle_at", "speed_at", "command_at", "gain", "zero", "armature", "low
           "control_scale", "control_offset", "control_low", "control_high", "told_gain", "told_zero", "rest")
 """Of each servo: places in qpos, qvel and ctrl (or −1); what a turn of the servo is at the joint, and where it begins;
 its own inertia there; ends of its travel, and of its commands; what a control asks of the joint, and its ends; what a
-command of the joint is to the servo, and what it is told before there is one (nan: to hold where it begins)."""
+command of the joint is to the servo, and its command before there is one (nan: to hold where it begins)."""
 DRIVE = ("servos", "dofs", "coordinates", "wide", "bodies", "timestep", "integrator", *PLACES, *FUNCTIONS, "slot",
          "own", "others", *ARRAYS, "longest", "kept_at", "memory", "instances", "ask")
 """All that servos share, wherever they are simulated."""
@@ -31,7 +31,7 @@ ROOM = ("angle", "speed", "goal", "load", "inertia", "after", "free", "accelerat
 for equations. The last two are the passive force of its joint without its torque, and with it."""
 GROUP = ("advance", "tick", "duration", "look", "lanes", "which", "angle", "speed", "goal", "load", "inertia",
          "reached", "after", "status", "seen", "pieces", "count")
-"""Servos of one model there, `which` of all: the function that lets them go on, its struct, where in this the duration
+"""Servos of one model there, `which` of all: the function that advances them, its struct, where in this the duration
 and the address of a signal stand, and arrays."""
 PIECE = ("address", "rows", "stride", "bytes")
 """A part of their memory."""
@@ -51,7 +51,7 @@ OF_EACH = ("torque", *_CARRIED, *(f"{name} before" for name in _CARRIED), "held"
            "told")
 """Numbers of each servo in a block: its mean torque over the tick; from where on the next torque is predicted, and how
 much of another acceleration of its joint the servo takes up, from 0 (nothing) to 1 (it holds); where it holds before a
-command; what the joint was told to, of one without an actuator, and whether it was (0: not)."""
+command; the goal sent to the joint, of one without an actuator, and whether one was (0: not)."""
 
 ASK_NEW, ASK_RESET, ASK_ROOM = range(3)
 """Calls of compiled code to Python."""

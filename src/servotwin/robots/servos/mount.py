@@ -231,7 +231,7 @@ def supplied(model: Model, supply: Supply | None) -> Model:
     InputError
         If the supply has no voltage, or one that is not for this servo.
     """
-    if isinstance(model, AveragedServo):  # it knows no supply, but has one
+    if isinstance(model, AveragedServo):  # its law has no supply, but the servo has
         model = BoundedServo(model.servo)
     if supply is None:
         return model

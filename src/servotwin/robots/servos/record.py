@@ -259,7 +259,7 @@ class Record(Mapping[str, ServoRecord]):
         The most so far by which it has exceeded what it was when the record began and the work of servos, other
         actuators and applied forces since, but for what a semi-implicit step borrows of gravity [J]. Contacts and
         limits can only take; a solver that has not converged lets them give. Where bodies are moved as mocap it cannot
-        be told and is nan. State that is set by hand counts.
+        be determined and is nan. State that is set by hand counts.
     cause : str
         Why energy comes from nowhere, in words; empty until somebody has found out, as `run_motion` does.
 

@@ -192,7 +192,7 @@ def _sharing(joints: Sequence[Joint], buses: list[tuple[Supply, list[int]]]) -> 
 
 
 class Berth:
-    """A crew in one of MuJoCo's data: its simulator, and the words by which compiled code lets it go on."""
+    """A crew in one of MuJoCo's data: its simulator, and the words by which compiled code advances it."""
 
     def __init__(self, crew: Crew) -> None:
         self.crew, self.sims = crew, crew.simulator()
@@ -352,7 +352,7 @@ _ASK = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, ctypes.c
 
 
 def goals_in(block: NDArray[np.float64], servos: int) -> NDArray[np.float64]:
-    """Return where a block has goals, and whether they were told: a view, shape (2, servos)."""
+    """Return where a block has goals, and whether they were given: a view, shape (2, servos)."""
     first = len(BLOCK) + OF_EACH.index("goal") * servos
     return block[first:first + 2 * servos].reshape(2, servos)
 
@@ -408,7 +408,7 @@ class Harbour:
         return self._found[address] if address in self._known else None
 
     def _ask(self, what: int, first: int, second: int) -> int:
-        """Answer compiled code, in whatever thread it runs; an error is kept until somebody can be told."""
+        """Answer compiled code, in whatever thread it runs; an error is kept until it can be raised."""
         try:
             with self._lock:
                 if what == ASK_NEW:
@@ -513,7 +513,7 @@ def arrays_of(joints: Sequence[Joint], berths: Sequence[Berth], maps: Sequence[C
 
 
 def put_into_model(mujoco: Any, model: Any, joints: Sequence[Joint], armature: NDArray[np.float64]) -> None:
-    """Let MuJoCo know of rotors and gears, and silence the actuators that servos replace."""
+    """Put rotors and gears into MuJoCo's model, and silence the actuators that servos replace."""
     for joint, own in zip(joints, armature.tolist(), strict=True):
         model.dof_armature[joint.speed_at] = own
         if joint.actuator >= 0:

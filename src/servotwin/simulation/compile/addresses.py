@@ -1,7 +1,7 @@
 """Memory at addresses, and functions there: what text that is compiled reads, writes and calls.
 
 In plain Python they are views of memory and calls through ctypes; in compiled text single expressions take their place.
-An array shares its numbers with whoever else knows the address, which has to be theirs for as long as it is used. A
+An array shares its numbers with whatever else has the address, which has to be theirs for as long as it is used. A
 function that is called keeps Python's lock.
 """
 
@@ -20,7 +20,7 @@ Rows = NDArray[np.float64]
 Bytes = NDArray[np.int8]
 Halves = NDArray[np.int32]
 
-_kept = [0]  # what `activate` was told
+_kept = [0]  # what `activate` was called with
 
 
 def words(address: int, count: int) -> Words:

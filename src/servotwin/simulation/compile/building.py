@@ -123,7 +123,7 @@ def _tell() -> None:
 
 @contextlib.contextmanager
 def _alone(path: Path) -> Iterator[None]:
-    """Hold a lock, which the operating system takes away from a process that ends; without locks, go on without."""
+    """Hold a lock, which the operating system takes away from a process that ends; without locks, continue without."""
     flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
     try:
         file = os.fdopen(os.open(path.with_suffix(".lock"), flags, 0o600), "r+")

@@ -84,7 +84,7 @@ _TAKEN = frozenset(
         name + end for name in MATH for end in ("", "f")}
 _OURS = re.compile(r"\w+_(\d+|end|given|)|(as|equal|slice_of|array|min|max)_\w+|in_order|is_in|record|table")
 """Names that are made here: of types, tables, helpers, and of what a statement needs beside its variables."""
-_NAMED = ((FLOAT64, 1), (FLOAT64, 2), (INT64, 1), (INT8, 1), (INT32, 1))  # arrays that the header knows
+_NAMED = ((FLOAT64, 1), (FLOAT64, 2), (INT64, 1), (INT8, 1), (INT32, 1))  # arrays that the header has
 
 
 def identifier(name: str) -> str:

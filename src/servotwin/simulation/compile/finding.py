@@ -32,7 +32,7 @@ from servotwin.simulation.compile.storage import distrust, is_there, kept_folder
 
 _GENERAL = ("-std=c99", "-shared", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math",
             "-fwrapv", "-fno-strict-aliasing", "-fopenmp-simd", "-w")
-_X86 = {  # what the levels of the x86-64 psABI have beyond the lower ones; gcc knows their names from version 11 on
+_X86 = {  # what the levels of the x86-64 psABI have beyond the lower ones; gcc has their names from version 11 on
     "x86-64-v2": ("-mcx16", "-msahf", "-mpopcnt", "-msse3", "-mssse3", "-msse4.1", "-msse4.2"),
     "x86-64-v3": ("-mavx", "-mavx2", "-mbmi", "-mbmi2", "-mf16c", "-mfma", "-mlzcnt", "-mmovbe"),
     "x86-64-v4": ("-mavx512f", "-mavx512bw", "-mavx512cd", "-mavx512dq", "-mavx512vl"),

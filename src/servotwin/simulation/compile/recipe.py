@@ -33,7 +33,7 @@ class Recipe:
     always : int
         Demands of all servos that will run.
     never : tuple of str
-        Constants of the engine that nothing will be equal to, beside those that come up by nothing that they know.
+        Constants of the engine that nothing will be equal to, beside those that come up by nothing that they follow.
     by_numbers : bool
         Whether C calls the entries with their whole numbers, instead of with words.
     in_floats : bool

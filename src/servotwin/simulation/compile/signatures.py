@@ -123,7 +123,7 @@ def _of_buses() -> Mapping[str, tuple[Kind, ...]]:
 
 @cache
 def _of_the_bench() -> Mapping[str, tuple[Kind, ...]]:
-    """Return what entries are called with that let servos go on at a bench that is looked at."""
+    """Return what entries are called with that advance servos at a bench that is looked at."""
     from servotwin.models.engine.bus.bus_records import Mate, Seat, Shared, Tape
     from servotwin.models.engine.lanes import Tables
     from servotwin.models.engine.live.posts import Circuit, Post, Sender, Told, Weights

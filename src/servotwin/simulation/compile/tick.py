@@ -115,7 +115,7 @@ def _show(t: Words, h: Words, lanes: int) -> None:
 
 
 def advance(tick: int) -> int:
-    """Go on by one tick, and return `DONE` or what is wrong; then nothing has changed."""
+    """Advance by one tick, and return `DONE` or what is wrong; then nothing has changed."""
     if tick == 0:
         return NOTHING_GIVEN
     if words(tick, 1)[0] != VERSION:

@@ -1,4 +1,4 @@
-"""The entry of a `VectorSimulator` for C: the address of one function that goes on by a tick, and its struct."""
+"""The entry of a `VectorSimulator` for C: the address of one function that advances by a tick, and its struct."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class CEntry:
 
     @property
     def simulator(self) -> int:
-        """Address of what the function knows of the simulator."""
+        """Address of the simulator's data for the function."""
         return self._handle.ctypes.data
 
     @property

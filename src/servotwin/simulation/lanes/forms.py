@@ -1,6 +1,6 @@
 """Which lanes run in which form: the fastest that can follow what their terms do, else the general one.
 
-Nothing here names a term: what kernels leave out, and which numbers they know, follows from what terms say.
+Nothing here names a term: what kernels leave out, and which numbers they cover, follows from what terms say.
 """
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ def last_of(recipe: Recipe) -> Recipe:
 
 
 def steps_of(recipe: Recipe, ended: Any, nearly: bool = False) -> Iterator[tuple[Recipe, str, tuple[Any, ...]]]:
-    """Return the kernels by which lanes of a form go on one after the other, each with its entry.
+    """Return the kernels by which lanes of a form advance one after the other, each with its entry.
 
     All of them have the arguments of `runs.go_on` up to the status, and these. `nearly` is as readings have it.
     """
@@ -221,15 +221,15 @@ class Terms:
         return found
 
     def fit(self, recipe: Recipe) -> Any:
-        """Tell for which lanes kernels are made: for those whose numbers they know, and all of whose terms."""
+        """Tell for which lanes kernels are made: for those whose numbers they cover, and all of whose terms."""
         return self.suit(recipe.knows) & self.known_to(parts_of(recipe))
 
     def known_to(self, parts: Parts) -> Any:
-        """Tell in which lanes kernels, or what they call, know all numbers."""
+        """Tell in which lanes kernels, or what they call, cover all numbers."""
         return np.logical_not(self.have_any(_unknown(parts)))
 
     def suit(self, knows: int) -> Any:
-        """Tell for which lanes kernels would be made that follow this, if they knew all numbers."""
+        """Tell for which lanes kernels would be made that follow this, if they covered all numbers."""
         return (self.demands & ~knows) == 0
 
 
@@ -244,7 +244,7 @@ def _said(law: Callable[..., int], *given: Any) -> Any:
 
 @cache
 def _unknown(parts: Parts) -> tuple[str, ...]:
-    """Return the numbers that kernels do not know, nor those by which they may go."""
+    """Return the numbers that kernels do not cover, nor those by which they may go."""
     return tuple(dict.fromkeys(name for part in parts for name in unread(*part)))
 
 
@@ -265,7 +265,7 @@ class SideBySide(NamedTuple):
 class OneByOne(NamedTuple):
     """Lanes that run one by one, by a form that leaves out what they lack.
 
-    Some may go on calmly, or all of them go quickly.
+    Some may advance calmly, or all of them go quickly.
     """
 
     which: Indices
@@ -324,7 +324,7 @@ def _alone(terms: Terms, left: Mask) -> Iterator[OneByOne]:
 
 
 def _at_last(terms: Terms, left: Mask) -> Iterator[OneByOne]:
-    """Return how those run that no faster form takes: none that its kernels do not know either, as terms are now."""
+    """Return how those run that no faster form takes: none that its kernels do not cover either, as terms are now."""
     runs = DIGITAL if np.any(terms.ask(PROGRAM)) else RUNS
     if is_plain():  # a fast form has no worth there, nor to ask for it
         yield OneByOne(np.flatnonzero(left), runs)

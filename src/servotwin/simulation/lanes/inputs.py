@@ -139,7 +139,7 @@ Indices = NDArray[np.int64]
 LAWS: dict[type[Model], str] = {
     DCMotor: "voltage", GearedMotor: "voltage", AveragedServo: "bounded", AveragedServoInductive: "bounded",
     BoundedServo: "bounded", PulseServo: "pulse", PulseServoInductive: "pulse", DigitalServo: "digital"}
-"""How each model is told what to do; the averaged servos are bounded ones without bounds, under a smoothed friction."""
+"""How each model is commanded; the averaged servos are bounded ones without bounds, under a smoothed friction."""
 
 
 @dataclass(frozen=True, eq=False)

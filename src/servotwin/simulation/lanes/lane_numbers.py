@@ -271,7 +271,7 @@ class LaneNumbers:
                 for own, part in self.supplies.parts(self.inputs, which)]
 
     def _joined(self) -> Packed:
-        """Return all lanes, which are told one thing for ever."""
+        """Return all lanes, whose inputs stay the same for ever."""
         parts = [(chunk.which, chunk.packed(self.accuracy)) for chunk in self.chunks]
         lanes, B = [part.lanes for _, part in parts], self.count
 
@@ -329,7 +329,7 @@ class LaneNumbers:
         """Take other numbers of programs in place, where nothing else follows from them; return whether that was all.
 
         So it is with lanes on shared supplies, whose kernels read them at every tick: a few microseconds, and motions
-        go on, where `changed` lays all lanes out anew.
+        continue, where `changed` lays all lanes out anew.
 
         Raises
         ------
@@ -496,7 +496,7 @@ class LaneNumbers:
                              allowed=f"{lower[k]:.6g} to {upper[k]:.6g} rad, between the stops")
 
     def check_recorded(self, now: Array, duration: float) -> None:
-        """Raise LoadError if a recorded torque ends before lanes that go on for a duration [s] do; names the lane."""
+        """Raise LoadError if a recorded torque ends before lanes that advance by a duration [s] do; names the lane."""
         for lane in np.flatnonzero(self.torque.count).tolist():
             load = self.inputs.loads[self.inputs.load_of[lane]]
             try:
@@ -515,7 +515,7 @@ class LaneNumbers:
     # --- what shows ---------------------------------------------------------------------------------------------------
 
     def commanded(self, name: str, command: Array) -> Array:
-        """Return `command_voltage`, `command_angle` or `pulse_width` of all lanes, told as the engine follows it."""
+        """Return `command_voltage`, `command_angle` or `pulse_width` of all lanes, as the engine follows it."""
         found = np.empty(self.count)
         for chunk in self.chunks:
             found[chunk.which] = chunk.model.command_signal(name, command[chunk.which, None])[:, 0]

@@ -49,12 +49,12 @@ if TYPE_CHECKING:
     from servotwin.simulation.lanes.lane_numbers import LaneNumbers
 
 
-# --- Lanes that stop and go on, in sets of one form: in tiles side by side, or in records one by one ------------------
+# --- Lanes that stop and continue, in sets of one form: in tiles side by side, or in records one by one ---------------
 
 SHAFT = {"output_angle": "q", "output_speed": "w"}  # where tiles and records have them
 _WORD = 8  # bytes
 _WORTH = 64  # tiles for a thread: fewer cost more in waking it
-_WORTH_QUICK, _WORTH_SLOW = 64, 4  # lanes for a thread that go on one by one, by kernels that take so long
+_WORTH_QUICK, _WORTH_SLOW = 64, 4  # lanes for a thread that advance one by one, by kernels that take so long
 
 
 class Chain:
@@ -94,7 +94,7 @@ class Tiles:
         self._look: Call | None = None
 
     def chains(self, store: Store) -> list[Chain]:
-        """Return what lets the lanes go on, a chain a thread."""
+        """Return what advances the lanes, a chain a thread."""
         if not self._chains:
             self._chains = [self._chain(store, part) for part in _cuts(len(self.rows), self._workers)]
         return self._chains
@@ -167,7 +167,7 @@ class Tiles:
         return self._look
 
     def calls(self, store: Store) -> dict[str, list[Call]]:
-        """Return what compiled code calls at each stage of a tick but going on and looking."""
+        """Return what compiled code calls at each stage of a tick but advancing and looking."""
         room, which, rows = store.room, self.which, self.rows
         places = np.arange(len(which))
         return {
@@ -192,13 +192,13 @@ class Records:
         self._look: Call | None = None
 
     def chains(self, store: Store) -> list[Chain]:
-        """Return what lets the lanes go on, a chain a thread."""
+        """Return what advances the lanes, a chain a thread."""
         if not self._chains:
             self._chains = [self._chain(store, part) for part in _cuts(len(self.which), self._workers)]
         return self._chains
 
     def _chain(self, store: Store, part: slice) -> Chain:
-        """Return what lets some lanes go on: those without an event at once, if some may go on calmly."""
+        """Return what advances some lanes: those without an event at once, if some may advance calmly."""
         going = Going.of(self.which[part], taken(self.memories, part))
         done = np.zeros(len(going.which), np.int64)
         calm = [call_of(forms.CALM, "go", store.columns, going.which, store.now, store.status,
@@ -256,7 +256,7 @@ class Records:
         return self._look
 
     def calls(self, store: Store) -> dict[str, list[Call]]:
-        """Return what compiled code calls at each stage of a tick but going on and looking."""
+        """Return what compiled code calls at each stage of a tick but advancing and looking."""
         room, which = store.room, self.which
         return clock_of(self, store, room) | {
             "refit": [call_of(TICKS, "forget_motions", self.rows)],
@@ -266,7 +266,7 @@ class Records:
 
 
 def _one_by_one(recipe: Recipe, store: Store, going: Going, number: Indices | None = None) -> list[Call]:
-    """Return the calls that let lanes go on one by one, the first so many if that is said, and note who has failed."""
+    """Return the calls that advance lanes one by one, the first so many if that is said, and note which have failed."""
     ended: Any = np.zeros(len(going.first_output))
     if number is not None:
         ended = Some(ended, number)
@@ -289,7 +289,7 @@ Indices = NDArray[np.int64]
 
 
 class Store:
-    """The memories of lanes, and how they go on.
+    """The memories of lanes, and how they advance.
 
     Parameters
     ----------
@@ -358,7 +358,7 @@ class Store:
         self.now[1] = 1.0
 
     def refit(self, which: Indices, otherwise: bool) -> None:
-        """Take what another simulator has imposed on some lanes, which may run `otherwise` then; memories go on."""
+        """Take what another simulator has imposed on some lanes, which may run `otherwise` then; memories continue."""
         if otherwise and not _same(self._kinds_now(), self._kinds):
             self.renew(self.numbers, which)
             return
@@ -366,14 +366,14 @@ class Store:
             some.refit(self.columns, which[of], places)
 
     def renew(self, numbers: LaneNumbers, which: Indices) -> None:
-        """Take other numbers of some lanes; memories go on."""
+        """Take other numbers of some lanes; memories continue."""
         memories, common = self.memories(), self.common()
         self._build(numbers)
         self.hang(self.torque)
         self._go_on_from(memories, which, common)
 
     def takes(self, part: LaneNumbers, which: Indices, names: Iterable[str]) -> bool:
-        """Take other numbers of some lanes in place, if they run in the same way as before; memories go on."""
+        """Take other numbers of some lanes in place, if they run in the same way as before; memories continue."""
         for kind in kinds_of(part.packed(), self._dtype, watched=self.watched):
             for k in np.unique(self._set_of[which[kind.which]]).tolist():
                 if not self.sets[k].runs(kind):
@@ -441,7 +441,7 @@ class Store:
         return point
 
     def start(self, which: Indices, memories: Memories) -> None:
-        """Put lanes where they start; their noise goes on."""
+        """Put lanes where they start; their noise continues."""
         before = self.memories(which)
         memories.rows["chip"]["draws"], memories.firms["draws"] = before.rows["chip"]["draws"], before.firms["draws"]
         self.status[which], self.ended[which], self.work[which] = 0, 0.0, 0.0
@@ -499,10 +499,10 @@ class Store:
         found[failed] = self.ended[failed]
         return found
 
-    # --- going on -----------------------------------------------------------------------------------------------------
+    # --- advancing ----------------------------------------------------------------------------------------------------
 
     def advance(self, duration: float) -> None:
-        """Let all lanes go on [s]."""
+        """Advance all lanes [s]."""
         self.now[0] = duration
         if self._reads_pieces:
             self.columns.pieces[:, 1] = self.command

@@ -1,4 +1,4 @@
-"""`VectorSimulator`: many servos that stop and go on, tick by tick, under commands and loads given at each."""
+"""`VectorSimulator`: many servos that stop and continue, tick by tick, under commands and loads given at each."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ class VectorSimulator:
 
     @property
     def kernels(self) -> NDArray[np.str_]:
-        """The name of the kernels by which each lane goes on, shape (lanes,), as `Batch.stats` has it."""
+        """The name of the kernels by which each lane advances, shape (lanes,), as `Batch.stats` has it."""
         found = np.empty(len(self), "U24")
         for some in self._store.sets:
             found[some.which] = some.kernel
@@ -176,7 +176,7 @@ class VectorSimulator:
 
     def advance(self, duration: float, *, pulse_width: ArrayLike | None = None, command_angle: ArrayLike | None = None,
                 command_voltage: ArrayLike | None = None, external_torque: ArrayLike | None = None) -> None:
-        """Go on for a time, all lanes at once.
+        """Advance by a time, all lanes at once.
 
         Parameters
         ----------
@@ -211,7 +211,7 @@ class VectorSimulator:
     def reset(self, *, pulse_width: ArrayLike | None = None, command_angle: ArrayLike | None = None,
               command_voltage: ArrayLike | None = None, output_angle: ArrayLike | None = None,
               lanes: ArrayLike | None = None) -> None:
-        """Put lanes at rest and their clocks to 0, their torque on; noise goes on where it was.
+        """Put lanes at rest and their clocks to 0, their torque on; noise continues where it was.
 
         Parameters
         ----------
@@ -259,7 +259,7 @@ class VectorSimulator:
         Raises
         ------
         UnknownNameError
-            If one is none that is looked up: what is told, and the motor's own, are not.
+            If one is none that is looked up: commands, and the motor's own, are not.
         """
         unknown = next((name for name in names if name not in _COLUMNS or name not in self._numbers.available), None)
         if unknown is not None:
@@ -276,7 +276,7 @@ class VectorSimulator:
             load_inertia: ArrayLike | None = None, bus_voltage: ArrayLike | None = None,
             parameters: Mapping[str, Any] | None = None, torque_enable: ArrayLike | None = None,
             lanes: ArrayLike | None = None) -> None:
-        """Impose what another simulator decides, or change numbers; all else that lanes remember goes on.
+        """Impose what another simulator decides, or change numbers; all else that lanes remember stays.
 
         Parameters
         ----------
@@ -364,7 +364,7 @@ class VectorSimulator:
                          "into another one of the same arguments by restore()")
 
     def c_entry(self) -> CEntry:
-        """Return what a program in C needs to go on with this simulator: an address, a struct and its header.
+        """Return what a program in C needs to advance this simulator: an address, a struct and its header.
 
         All that its lanes may need is compiled now, once on a machine.
         """
@@ -392,7 +392,7 @@ class VectorSimulator:
 
 
 def _first_command(model: Model) -> Signal:
-    """Return what a servo is told until the first command: a pulse in the middle of those that it takes, or a goal."""
+    """Return a servo's command until the first is given: a pulse in the middle of those that it takes, or a goal."""
     if isinstance(model, DigitalServo) and model.takes_goals:
         low, high = (model.value_or(f"firmware.{end}_goal", model.value_or(f"stops.{end}_angle", math.nan))
                      for end in ("lower", "upper"))

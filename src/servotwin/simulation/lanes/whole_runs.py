@@ -102,14 +102,14 @@ class VectorMemory:
     records, firms : ndarray, shape (lanes,)
         Records of each lane: of `models.engine.memory.Memory`, and of `models.terms.control.Firm`.
     command, torque : ndarray, shape (lanes,)
-        Inputs of each: width of the pulse [s] or control voltage [V]; external torque [N m].
+        The command of each: width of the pulse [s] or control voltage [V]; external torque [N m].
     status, ended : ndarray, shape (lanes,)
         Code of its `Status`, and when it failed [s].
     work : ndarray, shape (lanes,)
         Of the speeds that were set [J].
     numbers : ndarray
         Tiles of `models.terms.numbers.Numbers`: what the lanes were. They are not restored; a lane that has others by
-        then goes on from where it stood.
+        then continues from where it stood.
     common : Common, optional
         Of lanes that share supplies.
     """
@@ -167,7 +167,7 @@ def run(work: Work) -> Raw:
 
 
 class Going(NamedTuple):
-    """Lanes that go on one by one: what the kernels are called with of `runs.go_on` after lanes, tables and torques."""
+    """Lanes that run one by one: what the kernels are called with of `runs.go_on` after lanes, tables and torques."""
 
     which: Indices
     durations: Floats  # [s]
@@ -179,7 +179,7 @@ class Going(NamedTuple):
 
     @classmethod
     def of(cls, which: Indices, memories: Memories, times: Floats = _NEVER) -> Going:
-        """Return lanes that are not told yet how far they go."""
+        """Return lanes for which it is not set yet how far they go."""
         count = len(which)
         return cls(which, np.zeros(count), times, np.zeros(count, np.int64),
                    np.zeros((count, len(ALL_FIELDS), len(times))), memories, np.zeros(count, np.int64))
@@ -226,7 +226,7 @@ def run_one_by_one(work: Work, lanes: Lanes, which: Indices, raw: Raw, recipe: R
 
 def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: Indices, memories: Memories,
             raw: Raw, recipe: Recipe) -> None:
-    """Let lanes go on one after the other, for durations of their own [s], from outputs of their own on."""
+    """Advance lanes one after the other, by durations of their own [s], from outputs of their own on."""
     times, inputs = as_kernels_take(work.asked.times), work.packed.inputs
     at_once = max(1, _ROOM // (len(ALL_FIELDS) * max(len(times), 1)))
     for start in range(0, len(which), at_once):

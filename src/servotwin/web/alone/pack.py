@@ -154,7 +154,7 @@ def csv_rules() -> dict[str, Any]:
 
 _AT_ONCE = 64  # rows of what each servo on a shared supply does at once
 _STEPS = 150_000  # of a servo in a call, half a second of computing: a motion that takes more stands
-_ROWS, _EVENTS, _PULSES, _TRAIN, _GIVEN = 4096, 512, 1024, 64, 8  # room for what shows, and what is told
+_ROWS, _EVENTS, _PULSES, _TRAIN, _GIVEN = 4096, 512, 1024, 64, 8  # room for what shows, and what is sent
 
 
 def limits() -> dict[str, Any]:
@@ -373,7 +373,7 @@ _OF_EACH = ("value", "origin", "source", "spread", "low", "high")
 
 
 def world(first: Scene) -> dict[str, Any]:
-    """Return what the page knows, as plain values; `first` is the bench that it begins with.
+    """Return what the page has, as plain values; `first` is the bench that it begins with.
 
     Raises
     ------

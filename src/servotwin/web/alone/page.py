@@ -1,4 +1,4 @@
-"""The page as one file: its modules, what they know, and the kernel, packed into one text of HTML."""
+"""The page as one file: its modules, their data, and the kernel, packed into one text of HTML."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def _told(kind: Kind) -> Any:
     return "array"
 
 
-# --- The page as one file: its modules, what they know, and the kernel, packed into one text of HTML ------------------
+# --- The page as one file: its modules, their data, and the kernel, packed into one text of HTML ----------------------
 
 _HERE = Path(__file__).parent
 _PAGE = _HERE.parent / "page"

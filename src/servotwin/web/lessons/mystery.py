@@ -112,7 +112,7 @@ def is_hidden(name: str) -> bool:
 
 
 def known_of(now: Servo) -> Servo:
-    """Return what a pupil knows of a mystery servo: the base servo, with what was changed at the bench in sight.
+    """Return what a pupil sees of a mystery servo: the base servo, with what was changed at the bench in sight.
 
     Parameters
     ----------

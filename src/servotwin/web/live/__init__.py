@@ -1,4 +1,4 @@
-"""The bench behind the page, without any network: a text of its state, and servos that go on under it in time."""
+"""The bench behind the page, without any network: a text of its state, and servos that run under it in time."""
 
 from servotwin.web.live.live_bench import LiveBench, Push, ServoPush
 from servotwin.web.live.replay import Replayed, replay

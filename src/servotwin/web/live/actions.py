@@ -222,7 +222,7 @@ def action_of(row: Any, servos: int) -> Action:
 
 
 def checked(time: float, kind: Any, value: Any, servo: Any, servos: int) -> Action:
-    """Return an action whose value has been looked at; whether a servo takes it, only the servo knows.
+    """Return an action whose value has been looked at; whether a servo takes it, the servo decides.
 
     Parameters
     ----------

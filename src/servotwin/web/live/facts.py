@@ -1,4 +1,4 @@
-"""A servo as the page's controls know it: each parameter with unit, range, meaning and source; travel, registers."""
+"""A servo as the page's controls have it: each parameter with unit, range, meaning and source; travel, registers."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def _count(converter: Converter, voltage: float | None) -> int | None:
         return None
 
 
-# --- A servo as the page's controls know it: each parameter with unit, range, meaning and source; travel, -------------
+# --- A servo as the page's controls have it: each parameter with unit, range, meaning and source; travel, -------------
 
 
 
@@ -129,7 +129,7 @@ LOADS = (
 
 
 def facts_of(model: Model, scene: Scene, registers: Servo | None = None) -> dict[str, Any]:
-    """Return what the page knows of a servo, as plain values.
+    """Return what the page has of a servo, as plain values.
 
     Parameters
     ----------

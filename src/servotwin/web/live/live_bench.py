@@ -1,4 +1,4 @@
-"""A bench that goes on in time: servos under one transmitter, what was done to them, and what shows of them."""
+"""A bench that runs in time: servos under one transmitter, what was done to them, and what shows of them."""
 
 from __future__ import annotations
 
@@ -54,12 +54,12 @@ class SharedSupply:
         self._stations, self._steps = stations, BusSteps([one.post for one in stations])
 
     def advance(self, until: float, rate: float, *, switches: bool = True) -> list[Seen]:
-        """Let all go on to a time [s]; return what shows of each, as `Station.advance` does.
+        """Advance all to a time [s]; return what shows of each, as `Station.advance` does.
 
         Raises
         ------
         SimulationError
-            If they cannot go on.
+            If they cannot continue.
         """
         those = self._stations
         rows, events = [Endless(one.tell) for one in those], [Endless() for _ in those]
@@ -225,14 +225,14 @@ def models_of(scene: Scene) -> tuple[Model, ...]:
 
 
 def _with_play(model: Model) -> Model:
-    """Return a model whose play is given, 0 if it is not known, so that there can be some while time goes on."""
+    """Return a model whose play is given, 0 if it is not known, so that there can be some while time advances."""
     if not isinstance(model, SwitchedServo) or model.servo.get(_PLAY) is not None:
         return model
     return type(model)(model.servo.replace({_PLAY: 0.0}, source=NO_PLAY))
 
 
 def load_of(scene: Scene) -> Load:
-    """Return what hangs on each shaft: always all of it, so that each number can change while time goes on.
+    """Return what hangs on each shaft: always all of it, so that each number can change while time advances.
 
     Raises
     ------
@@ -288,7 +288,7 @@ def _hold(value: float) -> dict[str, Any]:
     return {"shape": "hold", "unit": "deg", "value": value}
 
 
-# --- A bench that goes on in time: servos under one transmitter, what was done to them, and what shows of -------------
+# --- A bench that runs in time: servos under one transmitter, what was done to them, and what shows of ----------------
 
 _AT_FIRST = 200  # actions at t = 0 that are done at once: what scenes have
 WHOLE = ("command", "push", "torque")  # of these the last at an instant is all that counts
@@ -311,7 +311,7 @@ class Push(NamedTuple):
 
 
 class LiveBench:
-    """Servos that go on side by side under the same commands.
+    """Servos that advance side by side under the same commands.
 
     Actions of a scene are done at their times; those of `do` meanwhile come beside.
 
@@ -378,7 +378,7 @@ class LiveBench:
 
     @property
     def due(self) -> bool:
-        """Whether something is still to be done before time goes on."""
+        """Whether something is still to be done before time advances."""
         return bool(self._todo) and self.reached(self._todo[0].time)
 
     def reached(self, time: float) -> bool:
@@ -393,7 +393,7 @@ class LiveBench:
         hurry : callable
             Says whether `advance` is to return early, between two things that were done at one instant.
         tell : callable
-            Is told the time [s] now and then within a motion; the bench cannot go on after it has raised.
+            Called with the time [s] now and then within a motion; the bench cannot continue after it has raised.
         """
         self._hurry = hurry
         for station in self._stations:
@@ -436,7 +436,7 @@ class LiveBench:
         return action
 
     def advance(self, until: float, points_per_second: float, *, switches: bool = True) -> Push:
-        """Go on to a time; return what shows on the way.
+        """Advance to a time; return what shows on the way.
 
         Parameters
         ----------
@@ -450,7 +450,7 @@ class LiveBench:
         Raises
         ------
         SimulationError
-            If a servo cannot go on.
+            If a servo cannot continue.
         """
         if not (is_finite(until) and self.time <= until <= LONGEST):
             raise InputError("advance(until)", got=until, allowed=f"a time from {self.time:g} to {LONGEST:g} s")

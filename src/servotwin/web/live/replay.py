@@ -78,14 +78,14 @@ def replay(scene: Scene | str, *, output_step: float = 1e-3, switches: bool = Tr
     switches : bool
         Whether the times at which a bridge switches come beside, each twice: just before and just after.
     progress : callable, optional
-        Is told the share that is done.
+        Called with the share that is done.
 
     Raises
     ------
     InputError
         Or one of its kinds, if the scene is not possible.
     SimulationError
-        If a servo cannot go on.
+        If a servo cannot continue.
 
     Examples
     --------
@@ -160,7 +160,7 @@ def exported(kind: str, scene: Scene, models: tuple[Model, ...], servo: int = 0,
     servo : int
         Of which, for "csv" and "servo".
     progress : callable, optional
-        Is told the share that is done.
+        Called with the share that is done.
 
     Raises
     ------
@@ -207,7 +207,7 @@ def _table(scene: Scene, servo: int, progress: Callable[[float], object] | None)
 
 
 def _as_heard(columns: Mapping[str, Array], pulses: Array) -> dict[str, Array]:
-    """Return a table whose times can be told apart in its text, and whose pulses are those of their frames.
+    """Return a table whose times can be distinguished in its text, and whose pulses are those of their frames.
 
     A bench that stands at an edge has not heard its pulse yet; of a log this is the first sample of the new one.
     """

@@ -256,7 +256,7 @@ class Scene:
     control : mapping of str to float
         Of the control circuit that makes the pulses, by `control_circuit.CONTROL_FIELDS`; empty: pulses are exact.
     view : mapping
-        Settings that only the page knows.
+        Values for the page alone.
     lesson : mapping
         Texts of a lesson; empty for a bench that is none.
 

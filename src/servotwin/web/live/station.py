@@ -1,4 +1,4 @@
-"""A servo at the bench: its model, where it stands, what it is told, what shows of it."""
+"""A servo at the bench: its model, where it stands, its commands, what shows of it."""
 
 from __future__ import annotations
 
@@ -213,7 +213,7 @@ def _line(model: Model, name: str) -> tuple[float, float]:
     return float(at[1] - at[0]), float(at[0])
 
 
-# --- A servo at the bench: its model, where it stands, what it is told, what shows of it ------------------------------
+# --- A servo at the bench: its model, where it stands, its commands, what shows of it ---------------------------------
 
 Row = tuple[float, ...]
 _SHOWN = frozenset(SHOWN.values())
@@ -229,7 +229,7 @@ def post_of(model: Model) -> Any:
 
 
 class Endless:
-    """Rows without an end, as kernels fill them in plain Python; `tell` is told the time [s] now and then."""
+    """Rows without an end, as kernels fill them in plain Python; `tell` is called with the time [s] now and then."""
 
     def __init__(self, tell: Callable[[float], object] | None = None) -> None:
         self.rows: list[list[float]] = []
@@ -267,7 +267,7 @@ class Seen(NamedTuple):
 
 
 class Station:
-    """A servo that goes on by itself.
+    """A servo that advances by itself.
 
     Parameters
     ----------
@@ -297,7 +297,7 @@ class Station:
         self._look_with(model, load)
         self.push = 0.0  # N m, by hand
         self.tell: Callable[[float], object] | None = None
-        """Is told the time [s] now and then within a motion."""
+        """Called with the time [s] now and then within a motion."""
 
     @property
     def model(self) -> Model:
@@ -322,7 +322,7 @@ class Station:
         return Change(state, self.told.fits(model), model)
 
     def put(self, change: Change) -> None:
-        """Go on with other numbers."""
+        """Continue with other numbers."""
         self.state = change.state
         self.told.put(change.command)
         self._look_with(change.model, self._simulator.of(change.state).load)
@@ -332,12 +332,12 @@ class Station:
         self._picks = [COLUMNS.index(name) for name in self.columns]
 
     def advance(self, until: float, rate: float, *, switches: bool = True) -> Seen:
-        """Go on to a time [s]; return what shows at a rate [Hz], and, if asked for, where the bridge switches.
+        """Advance to a time [s]; return what shows at a rate [Hz], and, if asked for, where the bridge switches.
 
         Raises
         ------
         SimulationError
-            If it cannot go on.
+            If it cannot continue.
         """
         plan, before, record = self.plan, self.state, RunLog(self.tell)
         self.state = run(plan, before, until, record)

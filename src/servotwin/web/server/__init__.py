@@ -1,1 +1,1 @@
-"""The server of the page: who is let in, what they say, and benches that go on in real time."""
+"""The server of the page: who is let in, what they say, and benches that run in real time."""

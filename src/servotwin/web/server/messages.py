@@ -66,7 +66,7 @@ class Allowance:
 VERSION = 1
 _BYTES = 8  # of a number
 _DEEPEST = 6  # tables in tables of a message
-_LONGEST_LINE = 300  # characters of what is told
+_LONGEST_LINE = 300  # characters of what is sent
 
 
 def message_of(text: object) -> dict[str, Any]:
@@ -99,7 +99,7 @@ def message_of(text: object) -> dict[str, Any]:
 
 
 def id_of(message: Mapping[str, Any]) -> int | None:
-    """Return the number by which a page knows its message; None without.
+    """Return the number by which a page identifies its message; None without.
 
     Examples
     --------
@@ -130,7 +130,7 @@ def packed(header: Mapping[str, Any], push: Push) -> bytes:
     Parameters
     ----------
     header : mapping
-        Entries that are told beside.
+        Sent beside the numbers.
     push : Push
 
     Examples

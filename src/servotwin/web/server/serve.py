@@ -22,7 +22,7 @@ MOST_CONNECTIONS = 400
 PATIENCE = 15.0
 """In which a request has to be said [s]."""
 _LONGEST = 300.0  # s until an answer is taken: the largest log comes within that
-_LINGER = 3.0  # s that a browser has to take the end of what it was told
+_LINGER = 3.0  # s that a browser has to take the end of what it was sent
 _UNSENT = 65536  # bytes that the system keeps of what a browser has not taken: old pushes are worth nothing
 _UNWRITTEN = 16384  # bytes that wait here
 
@@ -69,7 +69,7 @@ class Line(WebSocketsSansIOProtocol):
                 return
 
     def keepalive_timeout(self) -> None:
-        """End a connection that does not answer: what it was told is not waited for."""
+        """End a connection that does not answer: what it was sent is not waited for."""
         super().keepalive_timeout()
         self.transport.abort()
 
@@ -129,7 +129,7 @@ def serve(scene: Scene, *, host: str = LOOPBACK, port: int = 8000, classroom: bo
     classroom : bool
         Whether there is one bench, which the teacher steers and others watch.
     ready : callable, optional
-        Is told the `Links` as soon as the server listens.
+        Called with the `Links` as soon as the server listens.
 
     Raises
     ------

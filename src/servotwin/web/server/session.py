@@ -1,4 +1,4 @@
-"""A room: a bench that goes on in real time, and the browsers that look at it."""
+"""A room: a bench that runs in real time, and the browsers that look at it."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ if TYPE_CHECKING:
     from servotwin.web.server.messages import Outbox
 
 
-# --- How a bench is let go on: in stretches that are short enough that others have their turn -------------------------
+# --- How a bench is advanced: in stretches that are short enough that others have their turn --------------------------
 
 BUDGET = 0.010  # s of computing in a turn
 SHORT, LONG = 0.2 * BUDGET, 0.5 * BUDGET  # s of computing: a stretch of less, and of more, is given another length
 FIRST = 5e-4  # s of bench time: the first stretch, of which nothing is known yet
-LONGEST = 0.1  # s: one that begins at rest may go on in motion, which costs a thousand times as much
+LONGEST = 0.1  # s: one that begins at rest may continue in motion, which costs a thousand times as much
 PATIENCE = 1.0
 """How long a stretch may take [s]: then the bench stands."""
 
 
 class Stint:
-    """A bench that is let go on.
+    """A bench that is advanced.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class Stint:
         self._stretch = FIRST
         self._ends = self._stands = 0.0
         self.broken: str | None = None
-        """Why it cannot go on, in a line."""
+        """Why it cannot continue, in a line."""
         bench.hurried(lambda: _now() > self._ends, self._within)
 
     def begin(self) -> None:
@@ -67,7 +67,7 @@ class Stint:
         self._stretch = FIRST
 
     def until(self, target: float, points: float) -> Push:
-        """Let it go on to a time [s], but for no longer than a turn may take; return what shows, at a rate [Hz]."""
+        """Advance it to a time [s], but for no longer than a turn may take; return what shows, at a rate [Hz]."""
         self._ends, pushes = _now() + BUDGET, [self._nothing()]
         while (self._bench.due or not self._bench.reached(target)) and self.broken is None and _now() < self._ends:
             before, at = self._bench.time, _now()
@@ -80,7 +80,7 @@ class Stint:
         return joined(pushes)
 
     def to(self, until: float, points: float) -> Push:
-        """Let it go on to a time [s] at a stretch; what it cannot is told in `broken`."""
+        """Advance it to a time [s] at a stretch; what it cannot is noted in `broken`."""
         self._stands = _now() + PATIENCE
         try:
             return self._bench.advance(until, points)
@@ -169,7 +169,7 @@ class Pace:
         self.begin(now=now, bench=bench)
 
     def run(self, running: bool, *, now: float, bench: float) -> None:
-        """Go on, or stand still."""
+        """Run, or stand still."""
         self.running = running
         self.begin(now=now, bench=bench)
 
@@ -185,7 +185,7 @@ class Pace:
         return self._from[1] + self.speed * (now - self._from[0]) if math.isfinite(self.speed) else math.inf
 
     def went(self, *, now: float, bench: float) -> None:
-        """Take note of how far bench time has come; a debt that is too large is dropped, and told."""
+        """Take note of how far bench time has come; a debt that is too large is dropped, and reported."""
         if math.isfinite(self.speed) and self.target(now=now, bench=bench) - bench > LATE * self.speed:
             self._from, self._late_until = (now, bench), now + OVER
         self._went.append((now, bench))
@@ -224,7 +224,7 @@ def snapshot_of(bench: LiveBench) -> Snapshot:
 
 
 def state_of(seen: Snapshot) -> dict[str, Any]:
-    """Return what a page has to know of a bench.
+    """Return what a page needs of a bench.
 
     Examples
     --------
@@ -244,7 +244,7 @@ def state_of(seen: Snapshot) -> dict[str, Any]:
 
 
 def servo_facts(seen: Snapshot, servo: int) -> dict[str, Any]:
-    """Return what a page knows of a servo; of a mystery not what is hidden."""
+    """Return what a page gets of a servo; of a mystery not what is hidden."""
     facts = facts_of(seen.models[servo], seen.scene, seen.registers[servo])
     if seen.scene.servos[servo].mystery is not None:
         facts["parameters"] = [one for one in facts["parameters"] if not is_hidden(one["name"])]
@@ -252,7 +252,7 @@ def servo_facts(seen: Snapshot, servo: int) -> dict[str, Any]:
 
 
 def changes_of(seen: Snapshot, servos: list[int]) -> dict[str, Any]:
-    """Return what a page has to know of servos whose numbers were changed."""
+    """Return what a page needs of servos whose numbers were changed."""
     return {"changed": [servo_facts(seen, k) for k in servos], "loads": load_facts(seen.scene, seen.load_numbers)}
 
 
@@ -270,9 +270,9 @@ class _StoppedError(BaseException):
 
 
 async def aside(what: str, work: Callable[[], Found], seconds: float | None = None) -> Found:
-    """Return what a function returns, while the benches go on; it ends when nobody waits for it any more.
+    """Return what a function returns, while the benches continue; it ends when nobody waits for it any more.
 
-    The interpreter goes on within a function of Python at any time, so it can be stopped at any time: what it does is
+    The interpreter proceeds within a function of Python at any time, so it can be stopped at any time: what it does is
     to have no effect but what it returns.
 
     Parameters
@@ -323,7 +323,7 @@ def _tell(found: asyncio.Future[Found], tell: Callable[[], object]) -> None:
         tell()
 
 
-# --- A room: a bench that goes on in real time, and the browsers that look at it --------------------------------------
+# --- A room: a bench that runs in real time, and the browsers that look at it -----------------------------------------
 
 RATE = 60.0
 """Pushes a second."""
@@ -339,7 +339,7 @@ _MOST_LOOKS = 3  # at a bench that changes while its state is put together
 
 
 class Room:
-    """A bench that goes on in real time, and the browsers that look at it.
+    """A bench that runs in real time, and the browsers that look at it.
 
     Parameters
     ----------
@@ -349,8 +349,8 @@ class Room:
     def __init__(self, scene: Scene) -> None:
         self.outboxes: list[Outbox] = []
         self.pace = Pace(_now())
-        self._version = 0  # of all that a page is told but once
-        self._told: tuple[int, str] = (-1, "")  # of which version a page is told what
+        self._version = 0  # of all that a page is sent but once
+        self._told: tuple[int, str] = (-1, "")  # of which version a page is sent what
         self._telling = asyncio.Lock()
         self._tasks: set[asyncio.Task[None]] = set()
         self._install(LiveBench(replace(scene, end=0.0)), scene.end)
@@ -368,7 +368,7 @@ class Room:
         self._begin(*_built(scene, self._speed()))
 
     async def begin(self, what: str, make: Callable[[], Scene]) -> None:
-        """Begin with the bench of a scene that is made, read and built while the present one goes on.
+        """Begin with the bench of a scene that is made, read and built while the present one runs.
 
         Raises
         ------
@@ -423,7 +423,7 @@ class Room:
         return action.time
 
     def run(self, running: bool) -> None:
-        """Let time go on, or stand still."""
+        """Let time advance, or stand still."""
         if running and self._stint.broken is not None:
             raise InputError("bench", got=self._stint.broken, allowed="a new beginning")
         self.pace.run(running, now=_now(), bench=self.bench.time)
@@ -436,7 +436,7 @@ class Room:
         self._version += 1
 
     def step(self) -> None:
-        """Go on by one frame, or by a tick of a bus servo, and stand."""
+        """Advance by one frame, or by a tick of a bus servo, and stand."""
         if self.replaying or self._stint.broken is not None:
             raise InputError("single frame", got=self._stint.broken or "a bench that is being repeated",
                              allowed="one that stands")
@@ -461,7 +461,7 @@ class Room:
     # --- time ---------------------------------------------------------------------------------------------------------
 
     async def live(self) -> None:
-        """Go on for ever: push what shows, and let others have their turn."""
+        """Run for ever: push what shows, and let others have their turn."""
         due = _now()
         while True:
             self.turn()
@@ -474,7 +474,7 @@ class Room:
             await asyncio.sleep(max(due - _now(), 0.0))
 
     def turn(self) -> None:
-        """Go on as far as time on the wall, or the budget of a turn, allows; push what shows."""
+        """Advance as far as time on the wall, or the budget of a turn, allows; push what shows."""
         bench, pace = self.bench, self.pace
         if self.replaying:
             if all(box.free for box in self.outboxes):
@@ -495,7 +495,7 @@ class Room:
             self.say({"said": f"the bench stands: {self._stint.broken}"})
             self.show()
 
-    # --- what is told -------------------------------------------------------------------------------------------------
+    # --- what is sent -------------------------------------------------------------------------------------------------
 
     def say(self, message: dict[str, Any]) -> None:
         """Tell all who look at it."""
@@ -563,7 +563,7 @@ class Room:
 
 
 def _built(scene: Scene, speed: float | str) -> tuple[LiveBench, float, str]:
-    """Return a bench at its beginning, when what was done at it ends [s], and what a page is told of it."""
+    """Return a bench at its beginning, when what was done at it ends [s], and what a page is sent of it."""
     bench = LiveBench(replace(scene, end=0.0))
     return bench, scene.end, _message(snapshot_of(bench), scene.end == 0.0, speed, scene.end)
 

@@ -1,4 +1,4 @@
-"""One browser: what it says is done in its room, and what it may not do is told in a line."""
+"""One browser: what it says is done in its room, and what it may not do is answered in a line."""
 
 from __future__ import annotations
 
@@ -187,7 +187,7 @@ WORDS: dict[str, Callable[[Visitor, dict[str, Any]], Awaitable[Answer]]] = {
 """Messages of a page."""
 
 
-# --- One browser: what it says is done in its room, and what it may not do is told in a line --------------------------
+# --- One browser: what it says is done in its room, and what it may not do is answered in a line ----------------------
 
 _RATE, _BURST = 240.0, 480.0  # messages
 _TOO_MANY = 4008

@@ -98,7 +98,7 @@ DEAR = 3.0  # times a simulation of closed form
 _ROUNDS = 4  # of search and noise
 _COPY = 4.0  # s of one lane: about what a log takes that is made ready to be simulated once
 _LEAST = 2e-3  # of the cost: what a step has to gain
-_FINER = 0.7  # of the noise: then a search goes on with less
+_FINER = 0.7  # of the noise: then a search continues with less
 _FELT, _FORETOLD = 0.02, 0.02  # of the root of what is left, and of its cost: what an effect has to reach to be tried
 _SOON = 4  # steps of a search that show whether it gains
 _REACH = 0.5  # of a searched number: how far the others are moved before a trial is searched
@@ -309,7 +309,7 @@ class TrialBench:
         return self.task.loss.cost(np.concatenate(kept) / self.noise)
 
     def _run(self, forecast: Watched, start: Point) -> Point:
-        """Search, and search on in the noise of what is left; a search that may not go on ends at its best so far.
+        """Search, and search on in the noise of what is left; a search that may not continue ends at its best so far.
 
         Raises
         ------
@@ -406,7 +406,7 @@ class TrialBench:
 
 
 def _finer(forecast: Watched, point: Point) -> bool:
-    """Take the noise of what is left, and tell whether it is so much less that a search would go on."""
+    """Take the noise of what is left, and tell whether it is so much less that a search would continue."""
     left: dict[str, list[Array]] = {}
     for k, part in enumerate(forecast.at(point, derivatives=False)):
         for name, residual in by_sensor(forecast, k, part).items():

@@ -33,7 +33,7 @@ from servotwin.models import DigitalServo
 Array = NDArray[np.float64]
 VOLTAGE, RESISTANCE = "supply.open_circuit_voltage", "motor.armature_resistance"
 _STRETCHES = 16  # of a log
-_STEP = 0.02  # of the number: its effect is told from
+_STEP = 0.02  # of the number: the step from which its effect is computed
 _DROPS = tuple(k / 16.0 for k in range(1, 16))  # of a log, where it may drop
 _MOST = 0.8  # of the number, that it changes by
 _ROUNDS = 4
@@ -124,7 +124,7 @@ class _Drift:
         self.alone = not names
 
     def best(self, kinds: Sequence[Sequence[_Shape]]) -> tuple[float, tuple[Array, ...]] | None:
-        """Return by which share the number changes, and the residuals with it; None if it is not told.
+        """Return by which share the number changes, and the residuals with it; None if it is not determined.
 
         Of each kind of shapes the one that promises most is tried.
         """
@@ -163,7 +163,7 @@ class _Drift:
         return cost, step
 
     def _on_residuals(self, k: int, x: NDArray[Any]) -> NDArray[Any]:
-        """Return what is told at the instants of a log at its residuals: sensor by sensor."""
+        """Return what is given at the instants of a log at its residuals: sensor by sensor."""
         return np.concatenate([x[place] for place in self.bench.cases[k].places.values()])
 
     def _searched(self, slope: list[Array], step: Array,

@@ -504,7 +504,7 @@ class _Effect(NamedTuple):
 
 
 def _effect(bench: TrialBench, name: str, setting: Setting, r: Array, J: Array) -> _Effect | None:
-    """Return what a candidate would do; None if that cannot be told."""
+    """Return what a candidate would do; None if that cannot be determined."""
     try:
         d = _residuals(bench, setting) - r
     except ServotwinError:
@@ -550,7 +550,7 @@ Try = Callable[[TrialBench], Told | None]
 _LOGS = 4  # that are tried
 _EXPLAINED = 1.2  # times the sensor's noise: then nothing else is tried
 _ALIKE = 1.05  # times the least error: then the simpler is named first
-_MOST = 5  # causes that are told
+_MOST = 5  # causes that are reported
 _SHARES = 2.0  # of what is left for a group: what one trial may take
 _KINDS = {"stamps": ("stamps", "stamps that run at another rate than the servo", 'mend=("stamps",)'),
           "rows": ("dropped samples", "rows that are missing", 'mend=("rows",)'),
@@ -591,7 +591,7 @@ def diagnose(task: Task, point: Point, traces: Sequence[Trace], verdict: Verdict
     half : mapping of str to float
         Half widths of the intervals, on the scale of the search.
     tell : callable
-        Told the share done, and what is tried.
+        Called with the share done, and what is tried.
     """
     noise = verdict.noise[sensor]
     purse = Purse(budget)

@@ -408,7 +408,7 @@ def make_case(log: Log, model: Model, space: Space, sensors: Sequence[str], *, d
 def case_like(case: Case, log: Log, model: Model) -> Case:
     """Return a log with other commands or times than that of a case, and the same samples: it starts as that does.
 
-    Its command is to be told by pulses; else it is that of the log.
+    Its command is to be given by pulses; else it is that of the log.
     """
     used = {name: _usable(log, model, name) for name in case.places}
     if case.times[0] > 0.0:
@@ -510,7 +510,7 @@ def _period(log: Log, model: Model) -> float:
 
 
 def command_of(log: Log, model: Model, known: dict[tuple[Any, ...], Signal]) -> Signal:
-    """Return the command as a model takes it; only one with pulses knows missing ones."""
+    """Return the command as a model takes it; only one with pulses has missing ones."""
     period = _period(log, model)
     which = (log.time.tobytes(), log.command.tobytes(), log.command_kind, log.command_hold, log.sent.tobytes(), period)
     if which not in known:

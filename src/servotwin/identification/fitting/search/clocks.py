@@ -189,7 +189,7 @@ _ROUNDS = 2  # of assignment and search
 _MOST_ROUNDS, _FALLS = 6, 0.95  # of pulses of another period, while the cost falls to less than that share
 _PERIOD_LOGS = 4  # that a far period is sought on
 _EXPLAINS = 0.75  # of the cost: a period that is nearly right leaves less
-_FIRST_STEPS = 5  # of searches of which the best goes on
+_FIRST_STEPS = 5  # of searches of which the best continues
 _TICKS_PAY = 1.0  # of the cost
 _HELD_PAYS = 3.0  # of the cost: an odds ratio of 20
 _NEAR_PAYS = 4.0  # of the cost, for each independent residual: what one more number has to gain, a chance of 0.5 %
@@ -203,7 +203,7 @@ def with_clocks(task: Task, starts: Sequence[Point], tell: Told, began: float) -
     Parameters
     ----------
     task : Task
-        Goes on with another forecast where the logs want another clock, and says so in its remarks.
+        Continues with another forecast where the logs want another clock, and says so in its remarks.
     starts : sequence of Point
         One for each valley: which is the deepest is seen where pulses come when they do.
     tell : callable

@@ -403,7 +403,7 @@ class LogLanes:
             speed = signals["output_speed"][0, :k]
             rate = speed
             if name == "output_angle":
-                # Before the command of the first sample acts, the servo goes on as it began
+                # Before the command of the first sample acts, the servo continues as it began
                 values = values + self.speed[:, None] * early + self.offset
                 if "sag" in signals:
                     values = values + self.sag * signals["sag"][:, :k]

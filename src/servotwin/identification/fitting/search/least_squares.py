@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from servotwin.identification.fitting.search.case import STEP, LogPart, Point, robust_deviation
 from servotwin.identification.fitting.search.forecast import Forecast
 
-# --- How far residuals scatter, told so that a few outliers change it little ------------------------------------------
+# --- How far residuals scatter, measured so that a few outliers change it little --------------------------------------
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -231,7 +231,7 @@ Found = TypeVar("Found")
 
 def together(forecast: Forecast, cases: Sequence[int], searches: Sequence[Generator[Ask, list[LogPart], Found]],
              noises: Sequence[Mapping[str, float]] | None = None) -> list[Found]:
-    """Run searches side by side, and return their ends: what all have to know next is simulated in one batch.
+    """Run searches side by side, and return their ends: what all need next is simulated in one batch.
 
     Each takes the steps that it would take alone, to the last bit.
 
@@ -354,7 +354,7 @@ class Search:
 
     def run(self, start: Point, *, most: int = 60, tell: Tell | None = None,
             least_gain: float | None = None) -> Outcome:
-        """Search from a point; the best so far is told after each step."""
+        """Search from a point; the best so far is reported after each step."""
         return together(self.forecast, self.cases, [self.steps(start, most=most, tell=tell, least_gain=least_gain)])[0]
 
     def steps(self, start: Point, *, most: int = 60, tell: Tell | None = None, least_gain: float | None = None,

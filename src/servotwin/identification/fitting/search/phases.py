@@ -4,7 +4,7 @@ The cost is smooth in everything else, so it is scanned here and fitted there. A
 its pulses come is corrected to first order, by what a delay would change.
 
 A command acts from the first tick on that follows its pulse. Where ticks and pulses lie to each other is no more than
-that to a log: between two ends of pulses, later ticks cannot be told from earlier pulses.
+that to a log: between two ends of pulses, later ticks cannot be distinguished from earlier pulses.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How far a fit is, told by the work that it measured, and what stops it: Ctrl-C, or the time that it was given."""
+"""How far a fit is, judged by the work that it measured, and what stops it: Ctrl-C, or the time that it was given."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _SEARCH = 16.0  # times the rough searches: when pulses come may have to be foun
 _INTERVALS = (5.0, 0.6)  # times the rough searches, and the search
 _PRIORS, _ERRORS, _BESIDE = 0.02, 0.04, 0.03  # of all before; the last for each simpler model
 _TRIALS = 0.9  # of all before
-_AT_LEAST = 0.4  # of what a stage has taken, that it may go on for
+_AT_LEAST = 0.4  # of what a stage has taken, for which it may continue
 _FROM = 1.0  # s: what is said earlier says nothing
 _RISES = 1.1  # times the least that was said
 
@@ -32,7 +32,7 @@ _RISES = 1.1  # times the least that was said
 class TimeLeft:
     """The time that a fit has left, by its measured stages.
 
-    Stages whose length nobody knows before, such as the search, count with the long side of what is usual, and causes
+    Stages whose length is not known before, such as the search, count with the long side of what is usual, and causes
     that may have to be tried count until they need not be.
 
     Parameters
@@ -54,10 +54,10 @@ class TimeLeft:
     def __init__(self, *, intervals: bool, beside: int, trials: bool) -> None:
         self._intervals, self._errors, self._trials = intervals, _ERRORS + _BESIDE * beside, _TRIALS * trials
         self._begun = [math.inf] * len(STAGES)
-        self._inner_begun = math.inf  # when the last search told its first step [s]
+        self._inner_begun = math.inf  # when the last search reported its first step [s]
         self._least = math.inf
         self.longer = False
-        """Whether this stage takes longer than anybody could know, so that what was said last is too little."""
+        """Whether this stage takes longer than could be foreseen, so that what was said last is too little."""
 
     def at(self, share: float, now: float) -> float:
         """Return what is left [s] at a time since the fit began [s]; stages say which share of theirs is done."""
@@ -102,11 +102,11 @@ class TimeLeft:
 _ROUNDING = 1e-3  # s
 
 
-# --- How far a fit is, told by the work that it measured, and what stops it -------------------------------------------
+# --- How far a fit is, judged by the work that it measured, and what stops it -----------------------------------------
 
 Show = Callable[[float, str], None]
 LONGER = ", longer than usual"
-_OFTEN = 0.2  # s, between two times that the same is told
+_OFTEN = 0.2  # s, between two times that the same is reported
 
 
 class Within:
@@ -115,7 +115,7 @@ class Within:
     Parameters
     ----------
     seconds : float or Within, optional
-        As much as it likes unless given; one that has begun goes on.
+        As much as it likes unless given; one that has begun continues.
 
     Raises
     ------
@@ -152,7 +152,7 @@ class Stops:
 
     def __init__(self, within: Within) -> None:
         self.within = within
-        self.show: Show = lambda share, text: None  # told that share; may raise KeyboardInterrupt, which stops the fit
+        self.show: Show = lambda share, text: None  # gets that share; may raise KeyboardInterrupt, which stops the fit
         self.stopped = False
         self._noted = False
         self._told, self._share, self._begun = (0.0, ""), 0.0, False
@@ -171,7 +171,7 @@ class Stops:
         self.look()
 
     def _of_all(self, share: float, text: str) -> tuple[float, str]:
-        """Return the share of all work that is done, and what goes on."""
+        """Return the share of all work that is done, and the work in progress."""
         return max(share, self._told[0]), text
 
     def look(self) -> None:
@@ -216,7 +216,7 @@ class Stops:
 
 
 class Course(Stops):
-    """The way of a fit: stages say which share of theirs is done, and it is told which share of its time is gone.
+    """The way of a fit: stages say which share of theirs is done, and it is given which share of its time is gone.
 
     Parameters
     ----------

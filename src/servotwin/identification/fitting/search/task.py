@@ -91,7 +91,7 @@ class Task:
         self.doubted = False  # whether registers are likely not what the caller says: what is bent then is no motor
         self.unsure: tuple[str, ...] = ()  # of which commands it is not sure which pulse carries them
         self.stamps_off: dict[int, float] = {}  # by how much the beat that replaced a log's stamps may lie off [s]
-        self._best: Outcome | None = None  # of the search that goes on
+        self._best: Outcome | None = None  # of the search in progress
         self._ended: list[Outcome] = []  # where rough searches ended, each in its own noise
 
     @property
@@ -116,7 +116,7 @@ class Task:
                      self.begin.own or tuple(self.forecast.own_start(case) for case in self.forecast.cases))
 
     def search(self, tell: Told) -> tuple[Outcome, list[Outcome]]:
-        """Return the best point, and where the search from each start ended; the way is told after each step."""
+        """Return the best point, and where the search from each start ended; the way is reported after each step."""
         self.forecast.nearly = self.forecast.bent
         nominal = at_likely_delay(self, self.nominal())
         self._set_noise(self.forecast.at(nominal, derivatives=False, cases=self.fitted), self.fitted)
@@ -196,7 +196,7 @@ class Task:
             search.steps(start, most=most, tell=keep, least_gain=least) for start in starts])
 
     def exactly(self, point: Point) -> None:
-        """Go on by the engine itself from a point, in the noise that it leaves there."""
+        """Continue by the engine itself from a point, in the noise that it leaves there."""
         self.forecast.nearly = False
         self.measure(point)
 
@@ -239,7 +239,7 @@ class Task:
                      np.append(np.full(len(self.forecast.space), 1.0 / _ABOUT), np.zeros(rest)))
 
     def become(self, other: Task, remark: str) -> None:
-        """Go on with the forecast of another search, and say why."""
+        """Continue with the forecast of another search, and say why."""
         other.forecast.work += self.forecast.work
         self.forecast, self.lower, self.upper, self.prior = other.forecast, other.lower, other.upper, other.prior
         self.remarks.append(remark)
@@ -296,7 +296,7 @@ class Task:
         return replace(best, cost=search.costs([best.point])[0])
 
     def _as_long_as_it_pays(self, found: Outcome, tell: Told) -> Outcome:
-        """Return where a search ends that goes on in some steps at a time, until these gain no more than chance does.
+        """Return where a search ends that continues by some steps at a time, until these gain no more than chance does.
 
         Among kinks no step tells whether the next one gains.
         """

@@ -54,7 +54,7 @@ _MORE = 0.1  # s after an event, until the motion is as commanded
 
 
 def not_followed(looks: Sequence[Look]) -> list[Finding]:
-    """Return the logs with stretches in which the shaft did not do what it was told, which are left out."""
+    """Return the logs with stretches in which the shaft did not follow its command, which are left out."""
     return [finding for one in looks for finding in _not_followed(one)]
 
 
@@ -110,7 +110,7 @@ def _joined(windows: Sequence[tuple[float, float]]) -> list[tuple[float, float]]
     return found
 
 
-# ---------------------------------------------------------------- against the drive, told from the log's own habits
+# ---------------------------------------------------------------- against the drive, judged by the log's own habits
 @dataclass(frozen=True)
 class _Habit:
     """How the speed of a log follows from speed, angle and commands before: residuals of a robust line."""
@@ -522,7 +522,7 @@ def _beyond(one: Look) -> list[Finding]:
 TURN = 2.0 * math.pi
 _WRAP_TOO_FAST = 4.0  # times the speed without load: what no motion explains, whatever the sheet is worth
 _NOISE = 6.0  # standard errors
-_WRAP_FEWEST = 3  # jumps, by which a modulus that nobody knows beforehand is told from outliers
+_WRAP_FEWEST = 3  # jumps, which distinguish a modulus that is not known beforehand from outliers
 _STAYS = 3  # samples on either side of a jump: an outlier comes back at once
 _NEAR_TURN = 0.5  # rad, how far offsets of two logs of one rig may differ
 

@@ -103,7 +103,7 @@ class Look:
 
 
 def look(log: Log, model: Model) -> Look | None:
-    """Return a log in angles; None where the model cannot follow its command, which is told elsewhere."""
+    """Return a log in angles; None where the model cannot follow its command, which is reported elsewhere."""
     own = {name: value for name, value in log.parameters.items() if name in (*model.requires, *model.optional)}
     try:
         with warnings.catch_warnings():  # of two calibrations that differ: it was said of the servo itself
@@ -366,7 +366,7 @@ def _votes(one: Look, beat: Beat) -> _Votes:
 
 
 def missing_rows(looks: Sequence[Look]) -> list[Finding]:
-    """Return the logs in which a command changed while rows are missing: nobody knows when."""
+    """Return the logs in which a command changed while rows are missing: it is unknown when."""
     return [finding for one in looks for finding in _missing(one)]
 
 

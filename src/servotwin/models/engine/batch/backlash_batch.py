@@ -1,6 +1,6 @@
 """How lanes with play in the gear go through a phase: lane by lane, for hardly two of them have the same legs.
 
-Of a servo that warms up, how a leg would end if nothing warmed is told outright; how it does, from there by a search
+Of a servo that warms up, how a leg would end if nothing warmed is given outright; how it does, from there by a search
 next to it.
 """
 
@@ -34,7 +34,7 @@ _SAME = 1e-14  # of a time
 
 
 class Trail(NamedTuple):
-    """A leg as it has been followed for a time [s]: how it goes on from there is known nearby."""
+    """A leg as it has been followed for a time [s]: how it continues from there is known nearby."""
 
     time: float
     start: Vector
@@ -43,7 +43,7 @@ class Trail(NamedTuple):
 
 
 class End(NamedTuple):
-    """When a leg ends [s], after the time that it has been followed for, and by which guard; 0: not told there."""
+    """When a leg ends [s], after the time that it has been followed for, and by which guard; 0: not known there."""
 
     on: float
     kind: int  # −1: with its time
@@ -166,7 +166,7 @@ def _value(numbers: Numbers, mode: Mode, kind: int, torque: float, u: float, tra
 
 def rested(numbers: Numbers, mode: Mode, torque: float, u: float, y: Vector, time: float,
            tolerance: float) -> tuple[Vector, float]:
-    """Return the state of bodies at rest after a time [s], and 1, or 0 where it is not told, as if one may start."""
+    """Return the state of bodies at rest after a time [s], and 1, or 0 where it is not known, as if one may start."""
     now = warm(numbers, y)
     if u == 0.0:
         T_w, T_h = cooled(numbers, y.T_w, y.T_h, time)

@@ -60,7 +60,7 @@ def _drive_or_rest(tile: Any, plan: Any, j: int) -> None:
 
 
 def _move(power: float, rate: float, per_rate: float, start: float, tile: Any, plan: Any, j: int) -> None:
-    """Slide to the end, or stop on the way and go on from rest: w + λ (q − q0) − f t is constant while it slides."""
+    """Slide to the end, or stop on the way and continue from rest: w + λ (q − q0) − f t is constant while it slides."""
     time, q, w = plan.time[j], tile.servo.q[j], tile.servo.w[j]
     forward, backward = tile.arc.friction_forward[j], tile.arc.friction_backward[j]
     lower, upper = tile.arc.lower[j], tile.arc.upper[j]

@@ -191,7 +191,7 @@ def fading(body: Body, per_volt: float) -> float:
 
 def enter(lanes: Lanes, curve: Floats, torque: Floats, k: int, lane: int, duration: float, times: Floats,
            output: int, memories: Memories, tile: Any, j: int) -> bool:
-    """Put a lane into a tile; return whether it goes on there at all."""
+    """Put a lane into a tile; return whether it runs there at all."""
     numbers, inputs = numbers_of(lanes, lane), inputs_of(lanes, curve, torque, lane)
     if not possible(numbers, inputs):
         return False
@@ -289,7 +289,7 @@ def await_output(times: Floats, tile: Any, j: int) -> None:
 
 def leave(lanes: Lanes, durations: Floats, first_output: Indices, memories: Memories, status: Indices, tile: Any,
           size: int) -> None:
-    """Put all lanes of a tile where `runs` goes on from."""
+    """Put all lanes of a tile to where `runs` continues."""
     for j in range(size):
         k, lane = tile.place.k[j], tile.place.lane[j]
         firmware, firm = lanes.firmware[lane], memories.firms[k]
@@ -336,7 +336,7 @@ def any_senses(tile: Any, size: int) -> bool:
 
 
 def asked(tile: Any, size: int) -> tuple[int, int, int]:
-    """Return how many lanes go on, of how many a command may have come, and of how many the goal moves."""
+    """Return how many lanes continue, of how many a command may have come, and of how many the goal moves."""
     going = news = following = 0
     for j in range(size):
         going += 1 if tile.clock.left[j] > 0.0 else 0
@@ -526,10 +526,10 @@ def tick_over(tile: Any, size: int) -> None:
 def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, torque_count: Indices,
           which: Indices, durations: Floats, times: Floats, first_output: Indices, outputs: Floats, memories: Memories,
           status: Indices, room: Any) -> None:
-    """Let the lanes named in `which` go on side by side, as far as that leads; `runs.go_on` finishes them all.
+    """Advance the lanes named in `which` side by side, as far as that leads; `runs.go_on` finishes them all.
 
     The arguments are those of `runs.go_on`, and room for a tile. Durations [s] and outputs that are left to do, and
-    the status of lanes that have gone on, are noted for it.
+    the status of lanes that have advanced, are noted for it.
     """
     tile, size = room[0], 0
     for k in range(which.size):
@@ -546,7 +546,7 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
 
 def _through(lanes: Lanes, curve: Floats, times: Floats, outputs: Floats, memories: Memories, tile: Any,
              size: int) -> None:
-    """Let all lanes of a tile go on from tick to tick."""
+    """Advance all lanes of a tile from tick to tick."""
     senses = any_senses(tile, size)
     going, news, following = asked(tile, size)
     while going > 0:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def go(lanes: Lanes, which: Indices, duration: Floats, status: Any, rows: Any, done: Indices) -> int:
-    """Let those go on for a time [s] that are through it without an event, and mark them; return how many are left."""
+    """Advance those by a time [s] that are through it without an event, and mark them; return how many are left."""
     left = 0
     for k in range(which.size):
         done[k] = 0

@@ -230,7 +230,7 @@ def _by_law(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
 def begin(listed: Floats, size: int, own: bool, tile: Any, plan: Any, before: Any) -> int:
     """Begin a window of every lane that has time left; return how many, and in `plan` which are at an edge.
 
-    `listed` are the edges of lanes that bring their own; `own` is whether there are any. The clocks go on to the end
+    `listed` are the edges of lanes that bring their own; `own` is whether there are any. The clocks advance to the end
     of the window, and `before` has what they showed.
     """
     clock, count = tile.clock, tile.count
@@ -410,7 +410,7 @@ def _divide(second: float, due: float, sign: float, duration: float, decided: fl
 
 
 def give_up(size: int, form: int, tile: Any, plan: Any, before: Any) -> int:
-    """Put lanes that cannot go on side by side back to where the window began; return how many there are."""
+    """Put lanes that cannot continue side by side back to where the window began; return how many there are."""
     servo, clock, count = tile.servo, tile.clock, tile.count
     lost = 0
     for j in range(size):

@@ -1,4 +1,4 @@
-"""Kernels that look at lanes as they stand, one by one or side by side, under what they are told now."""
+"""Kernels that look at lanes as they stand, one by one or side by side, under their present inputs."""
 
 from __future__ import annotations
 

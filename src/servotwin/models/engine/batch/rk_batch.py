@@ -62,7 +62,7 @@ def seen(slack: bool, power: float, time: float, q: float, w: float, wiper: floa
          j: int) -> tuple[State, float, float]:
     """Return the state, and the angle of the potentiometer, so much time [s] after a lane has been there and so.
 
-    The third is 1, or 0 where they cannot be told.
+    The third is 1, or 0 where they cannot be determined.
     """
     servo, after, q_after, w_after = tile.servo, tiles.more_at(tile.servo, j), tile.servo.q[j], tile.servo.w[j]
     wiper_after, lost = servo.wiper[j], plan.lost[j]
@@ -166,7 +166,7 @@ def _enter(tile: Any, plan: Any, slots: Any, k: int, j: int) -> None:
 
 
 def _idle(slots: Any, k: int) -> None:
-    """Leave a slot empty: what was in it last goes on without effect."""
+    """Leave a slot empty: what was in it last continues without effect."""
     slots.busy.lane[k], slots.busy.tries[k] = NOBODY, 1
     slots.stride.reach[k] = slots.stride.rise[k] = 0.0
 

@@ -160,7 +160,7 @@ def aimed(numbers: Numbers, mode: Mode, u: float, tau: float, state: State, leng
 
 
 def first_span(numbers: Numbers) -> float:
-    """Return by how much the root of the speed may go on at first [√(rad/s)]."""
+    """Return by how much the root of the speed may advance at first [√(rad/s)]."""
     return 0.5 * math.sqrt(creeping_speed(numbers.friction)) if fades(numbers.friction) else math.inf
 
 
@@ -228,7 +228,7 @@ def first_met(numbers: Numbers, mode: Mode, u: float, tau: float, before: State,
 def calm(numbers: Numbers, mode: Mode, u: float, tau: float, after: State, gain: float) -> bool:
     """Tell that a sliding shaft has met nothing in a stride by time: what `judged` and `first_met` would find.
 
-    Its speed was to gain so much over the stride. Where this is not told, they have to look.
+    Its speed was to gain so much over the stride. Where this is not found, they have to look.
     """
     warmed = warm(numbers, vector_of(after))
     low, high = currents.zone_limits(warmed, mode.zone, u)
@@ -293,7 +293,7 @@ def free_mode(zone: int, contact: int, share: int) -> Mode:
 # --- Slots ------------------------------------------------------------------------------------------------------------
 
 SLOTS = 8
-_WIDTH = 5  # what goes on in a stride: a state, and its time
+_WIDTH = 5  # what advances in a stride: a state, and its time
 NOBODY = -1
 
 
@@ -334,7 +334,7 @@ class Busy(NamedTuple):
     contact: int
     share: int
     tries: int  # of this stride: its aim is known
-    idle: int  # strides in which no time has gone on
+    idle: int  # strides in which no time has passed
 
 
 @cache

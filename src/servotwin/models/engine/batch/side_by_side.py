@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def go_on(pieces: Floats, listed: Floats, form: int, slack: bool, which: Indices, duration: float, times: Floats,
           outputs: Outputs, tile_rows: Any, plans: Any) -> int:
-    """Let all lanes go on for a duration [s], all of them in one form; return how many were given up.
+    """Advance all lanes by a duration [s], all of them in one form; return how many were given up.
 
     `tile_rows` are the tiles with the lanes `which`, and `plans` has room for one.
     """
@@ -48,7 +48,7 @@ def refit(lanes: Lanes, form: int, which: Indices, places: Indices, tile_rows: A
 
 def advance(which: Indices, form: int, slack: bool, first: int, last: int, duration: float, widths: Floats,
             torques: Floats, loads_change: bool, tile_rows: Any, plans: Any) -> int:
-    """Let the lanes `which` of the tiles from `first` to before `last` go on under constant pulses [s] and torques.
+    """Advance the lanes `which` of the tiles from `first` to before `last` under constant pulses [s] and torques.
 
     The torques [N m] are read where `loads_change`. Return how many lanes were given up.
     """
@@ -173,7 +173,7 @@ def _write(which: Indices, form: int, slack: bool, times: Floats, outputs: Outpu
 
 
 def _write_one(lane: int, o: int, j: int, form: int, slack: bool, outputs: Outputs, tile: Any, plan: Any) -> None:
-    """Write one output; a lane of which it cannot be told is given up."""
+    """Write one output; a lane of which it cannot be determined is given up."""
     x = plan.time[j]
     phase = _phase_at(x, plan, j)
     after = plan.end1[j] if phase == 1 else plan.end2[j] if phase == 2 else plan.end3[j]

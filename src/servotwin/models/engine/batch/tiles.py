@@ -88,7 +88,7 @@ class Clock(NamedTuple):
     period: float
     edge: float  # when its frame began, since its start
     since: float  # the time since then
-    length: float  # of the frame; at its end the next pulse rises, when time goes on
+    length: float  # of the frame; at its end the next pulse rises, when time advances
     remaining: float  # of the call
     owed: float  # of a call that the general way has to finish
     piece_end: float  # when the command's piece is over or its value changes

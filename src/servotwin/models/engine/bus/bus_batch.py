@@ -1,4 +1,4 @@
-"""Kernels that let buses of servos go on, and look at them as they stand: their memories are records and arrays."""
+"""Kernels that advance buses of servos, and look at them as they stand: their memories are records and arrays."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class Buses(NamedTuple):
 
 def go_on(lanes: Lanes, tables: Tables, buses: Buses, begin: int, end: int, duration: float, until: float, seats: Any,
           mates: Any, units: Any, common: Any, written: Tape) -> int:
-    """Let the buses from `begin` to before `end` go on for a duration, or to a time since their start [s].
+    """Advance the buses from `begin` to before `end` by a duration, or to a time since their start [s].
 
     `until` is inf where the duration counts. A lane with a status is not on its bus. Seats there have to be for every
     servo of a bus, as many units, and twice as many mates. Return the status of the last bus: where it is `bus.PAUSED`
@@ -87,7 +87,7 @@ def go_on(lanes: Lanes, tables: Tables, buses: Buses, begin: int, end: int, dura
 
 def _go_on(told: Told, buses: Buses, k: int, count: int, duration: float, until: float, seats: Any, mates: Any,
            units: Any, common: Any, written: Tape) -> int:
-    """Let the servos of a bus go on that have their seats; return a status."""
+    """Advance the servos of a bus that have their seats; return a status."""
     firms, paused = buses.memories.firms, firmware.present(told.lanes.firmware[0]) and until == math.inf
     for n in range(count):
         seat = seats[n]
@@ -110,7 +110,7 @@ def _go_on(told: Told, buses: Buses, k: int, count: int, duration: float, until:
 
 
 def _from_tick_to_tick(told: Told, firms: Any, count: int, shared: Any, seats: Any, units: Any, common: Any) -> None:
-    """Let servos with programs go on from tick to tick as far as that leads."""
+    """Advance servos with programs from tick to tick as far as that leads."""
     for n in range(count):
         if not coupled_ticks.possible(numbers_of(seats[n].numbers), inputs_at(told, seats[n])):
             return
@@ -134,7 +134,7 @@ def _from_tick_to_tick(told: Told, firms: Any, count: int, shared: Any, seats: A
 
 
 def _sit(inputs: Any, memory: Memory, seat: Any, unit: Any) -> None:
-    """Put a servo where it goes on from tick to tick."""
+    """Put a servo where it advances from tick to tick."""
     if due(memory):
         seat.until -= FRAMES * memory.beat
         memory = counted_anew(memory)
@@ -144,7 +144,7 @@ def _sit(inputs: Any, memory: Memory, seat: Any, unit: Any) -> None:
 
 
 def _got_up(seat: Any, unit: Any) -> bool:
-    """Put a servo's record where it has gone from tick to tick; return whether it only has to count anew to go on.
+    """Put a servo's record where it has gone from tick to tick; return whether it only has to count anew to continue.
 
     Its motion begins anew, also where no time has gone by: its program may have worked.
     """

@@ -1,4 +1,4 @@
-"""A servo on a bus while it goes on: where it stands, and what it does when left alone.
+"""A servo on a bus while it runs: where it stands, and what it does when left alone.
 
 Each has a clock of its own, by which its frames come; the bus has that of the first. The end of a run, or of a
 servo's present inputs, is the same instant by both clocks, however their difference is rounded. The functions take
@@ -211,7 +211,7 @@ def wiper_of(seat: Any, q: float) -> float:
 
 
 def move(seat: Any, unit: int, shared: Any, mates: Any, point: Point, event: int, written: Tape) -> None:
-    """Let a servo go on its present motion to a point, where an event may be."""
+    """Advance a servo on its present motion to a point, where an event may be."""
     if bus_records.runs(written) and point.time > seat.point.time:
         if seat.joined >= 0:
             bus_records.write_together(written, unit, seat, point.time, shared, mates[seat.joined])
@@ -224,7 +224,7 @@ def move(seat: Any, unit: int, shared: Any, mates: Any, point: Point, event: int
 
 
 def bring(seat: Any, unit: int, shared: Any, mates: Any, time: float, written: Tape) -> None:
-    """Let a servo go on its present motion to where it stands now."""
+    """Advance a servo on its present motion to where it stands now."""
     if seat.clock > seat.point.time:
         move(seat, unit, shared, mates, point_now(seat, shared, mates, time), -1, written)
 

@@ -53,7 +53,7 @@ def at_start(source: Source) -> Shared:
 def begin(shared: Any, mates: Any, time: float, limit: float, same: bool) -> None:
     """Begin a common motion at `time`, to `limit` at the latest [s]; its length is below 0 if it cannot be followed.
 
-    The `same` mates go on after an event of theirs that has already told zones and source.
+    The `same` mates continue after an event of theirs that has already determined zones and source.
     """
     source, count = source_of(shared.source), shared.members
     _look_at_start(mates, count)
@@ -303,7 +303,7 @@ def look(shared: Any, mates: Any, s: float) -> None:
 
 
 def lowest_between(lowest: Lowest, shared: Any, mates: Any, origin: float, a: float, b: float) -> Lowest:
-    """Return the least voltage of the bus after a common motion has gone on, from a to b [s] after its beginning.
+    """Return the least voltage of the bus after a common motion has advanced, from a to b [s] after its beginning.
 
     Its times are those since `origin` [s].
     """

@@ -62,7 +62,7 @@ _LONGEST = 1.0  # s, of a common motion: it may be one of constant speed without
 
 
 def through(told: Any, firms: Any, count: int, shared: Any, seats: Any, mates: Any, written: Tape) -> tuple[int, float]:
-    """Go on until servos have gone as far as their seats say; return a status, and when since the start.
+    """Advance until servos have gone as far as their seats say; return a status, and when since the start.
 
     The first `count` seats are taken, by servos that remember where they stand; seats and `shared` are kept up to date.
     Their inputs in `told` are found by `told.inputs_at`, the states of their programs in `firms`, which have the next
@@ -88,7 +88,7 @@ def through(told: Any, firms: Any, count: int, shared: Any, seats: Any, mates: A
 
 
 def be_ready(inputs: Inputs, seat: Any, firms: Any, shared: Any, first: bool) -> None:
-    """Let a servo be ready to go on, and its clock count from later on where that is due; the bus has the first's."""
+    """Make a servo ready to continue, and its clock count from later on where that is due; the bus has the first's."""
     memory = resumed(True, inputs, bus_unit.memory_in(seat, firms), False)
     while due(memory):
         shift = FRAMES * memory.beat
@@ -100,7 +100,7 @@ def be_ready(inputs: Inputs, seat: Any, firms: Any, shared: Any, first: bool) ->
 
 
 def run(told: Any, firms: Any, count: int, shared: Any, seats: Any, mates: Any, written: Tape) -> tuple[int, float]:
-    """Go on to the end of the run, or until the tape is full; return a status and when, by the clock of the bus [s]."""
+    """Advance to the end of the run, or until the tape is full; return a status and when, by the bus's clock [s]."""
     idle, status = 0, COMPLETED
     time, until = seats[0].clock, seats[0].end
     take_up(count, shared, seats, mates)
@@ -133,7 +133,7 @@ def run(told: Any, firms: Any, count: int, shared: Any, seats: Any, mates: Any, 
 
 
 def take_up(count: int, shared: Any, seats: Any, mates: Any) -> None:
-    """Take up the common motion that those who have joined are in, if they are told the same as then."""
+    """Take up the common motion that those who have joined are in, if their inputs are the same as then."""
     for j in range(count):
         if seats[j].joined >= 0 and seats[j].point.anchor_time == math.inf:
             shared.phase = APART
@@ -155,7 +155,7 @@ def next_time(count: int, shared: Any, seats: Any, until: float) -> float:
 
 
 def lowest_until(count: int, shared: Any, seats: Any, mates: Any, time: float, following: float) -> Lowest:
-    """Return the least voltage of the bus after it has gone on from a time to the following, by its clock [s]."""
+    """Return the least voltage of the bus after it has advanced from a time to the following, by its clock [s]."""
     lowest, origin, connected = lowest_of(shared.lowest), seats[0].origin, -1
     if shared.phase == TOGETHER:
         return coupled_motion.lowest_between(lowest, shared, mates, origin + shared.begin, time - shared.begin,

@@ -184,7 +184,7 @@ def output_acceleration(numbers: Numbers, contact: int, against: float, w: float
 
 
 def pressing(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> float:
-    """Return how motor and output in contact would close in [rad/s²] if each went on alone; below 0 they part."""
+    """Return how motor and output in contact would close in [rad/s²] if each continued alone; below 0 they part."""
     w = y.w
     if w != 0.0:
         return pressing_along(numbers, mode, u, tau, y)

@@ -199,7 +199,7 @@ def _dry(numbers: Numbers, contact: int, share: int, w: float, tau_m: float, tau
 
 
 def rebound(numbers: Numbers, mode: Mode, upper: bool, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:
-    """Return mode and state after the output has hit a stop; what is at the other end of the spring goes on."""
+    """Return mode and state after the output has hit a stop; what is at the other end of the spring continues."""
     q = numbers.stops.upper if upper else numbers.stops.lower
     w = rebound_speed(y.w, numbers.stops.restitution)
     after = moving(y, q, w, y.w_m)

@@ -54,7 +54,7 @@ from servotwin.models.terms import elastic, heat, play, source
 from servotwin.models.terms.friction import creeping_speed, smoothed
 from servotwin.models.terms.numbers import Numbers, warm
 
-# --- The mode after the end of another: how it goes on, and where a guard has reached zero ----------------------------
+# --- The mode after the end of another: how it continues, and where a guard has reached zero --------------------------
 
 def cross(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:
     """Return mode and state just after the guard `kind` of `mode` has reached zero."""

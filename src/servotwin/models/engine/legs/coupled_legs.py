@@ -440,7 +440,7 @@ def is_plain(units: Any, count: int, common: Any, V: float, at_end: bool) -> boo
 
 
 def go(units: Any, count: int, common: Any, time: float) -> float:
-    """Let all servos go on for a time [s], leg by leg; return how long they have: less where they are left."""
+    """Advance all servos by a time [s], leg by leg; return how long they have: less where they are left."""
     left = time
     for _ in range(MOST_LEGS):
         if settle(units, count, common) == LEFT or not is_plain(units, count, common, common.now, False):
@@ -572,7 +572,7 @@ def _by_torque(unit: Any, x0: float, x: float, bend: float) -> int:
 
 
 def _keeps_way(contact: int, speed: Any, w: float, after: float, bend: float, length: float) -> bool:
-    """Tell whether a body surely goes on the way on which it slides: its speed is monotone, or far from zero."""
+    """Tell whether a body surely stays on the way on which it slides: its speed is monotone, or far from zero."""
     way = 1.0 if contact == FORWARD else -1.0 if contact == BACKWARD else math.copysign(1.0, after)
     if not (way * after > 0.0 and way * w >= 0.0):
         return False

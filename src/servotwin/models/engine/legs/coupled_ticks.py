@@ -49,7 +49,7 @@ def way_of(numbers: Numbers, inputs: Inputs, left: float) -> int:
 
 def alone(told: Any, inputs: Inputs, memory: Memory, firms: Any, until: float, times: Floats, done: int,
           outputs: Floats, units: Any, common: Any) -> Gone:
-    """Let the one servo of `units` go on as far as this way leads, and at most to `until` [s]; write its outputs.
+    """Advance the one servo of `units` as far as this way leads, and at most to `until` [s]; write its outputs.
 
     Both `units` and `common` have room for a second one.
     """
@@ -90,7 +90,7 @@ def put_source(common: Any, source: Source) -> None:
 
 
 def sit(unit: Any, inputs: Inputs, memory: Memory, until: float) -> None:
-    """Put a servo where its memory says, to go on to `until` by its own clock [s], or to where times count anew."""
+    """Put a servo where its memory says, to continue to `until` by its own clock [s], or to where times count anew."""
     program, mode = inputs.firmware[0], unit.mode
     unit.frames, unit.origin, unit.time = memory.frames, origin_of(memory), memory.point.time
     unit.last = min(until, FRAMES * memory.beat)
@@ -101,7 +101,7 @@ def sit(unit: Any, inputs: Inputs, memory: Memory, until: float) -> None:
 
 
 def go(told: Any, firms: Any, count: int, units: Any, common: Any) -> None:
-    """Let servos go on as far as this way leads; where they are, and when, is in their records."""
+    """Advance servos as far as this way leads; where they are, and when, is in their records."""
     begin(told, firms, count, units)
     while is_underway(units, count):
         if serve(told, firms, count, units, common) == LEFT:
@@ -111,7 +111,7 @@ def go(told: Any, firms: Any, count: int, units: Any, common: Any) -> None:
 
 
 def begin(told: Any, firms: Any, count: int, units: Any) -> None:
-    """Let servos have the duties of their programs, and know when these do something next."""
+    """Give servos the duties of their programs, and the time at which these do something next."""
     for k in range(count):
         unit = units[k]
         unit.due = controller.next_due(inputs_at(told, unit).firmware[0], firms[unit.place], unit.frames)
@@ -129,7 +129,7 @@ def move(units: Any, count: int, common: Any, time: float) -> int:
 
 
 def is_underway(units: Any, count: int) -> bool:
-    """Tell whether all have to go on."""
+    """Tell whether all have to continue."""
     for k in range(count):
         if units[k].time >= units[k].last:
             return False

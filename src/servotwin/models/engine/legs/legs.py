@@ -1,7 +1,7 @@
-"""Legs: how a servo goes on under constant inputs where each of its bodies moves by ẇ = f − λ w.
+"""Legs: how a servo moves under constant inputs where each of its bodies moves by ẇ = f − λ w.
 
 Behind a bridge, without inductance, heat, spring, pendulum and friction that fades, motor and output move so: as one
-body, or inside the play of the gear as two. All that ends a leg is told in closed form, by the laws of the general
+body, or inside the play of the gear as two. All that ends a leg is computed in closed form, by the laws of the general
 engine. A leg is a handful of numbers; no motion is kept.
 """
 
@@ -46,7 +46,7 @@ class Ending(NamedTuple):
 
 
 def mode_from(numbers: Numbers, torque: float, u: float, y: Vector, mesh: int) -> Mode:
-    """Return the mode in which a servo goes on, under a voltage behind the bridge and an external torque [N m]."""
+    """Return the mode in which a servo continues, under a voltage behind the bridge and an external torque [N m]."""
     zone = currents.zone_of(numbers, u, 0.0, y.q, y.w_m, 0.0)
     return contacts.settled(numbers, zone, u, torque, y, mesh, False)
 

@@ -36,7 +36,7 @@ NO_LAW = Law(_NOTHING, Mode(0, 0, 0, 0, 0), False, 0.0, 0.0)
 
 
 def mode_from(numbers: Numbers, torque: float, u: float, y: Vector, mesh: int) -> Mode:
-    """Return the mode in which a servo goes on, under a voltage behind the bridge and an external torque [N m]."""
+    """Return the mode in which a servo continues, under a voltage behind the bridge and an external torque [N m]."""
     zone = currents.zone_of(numbers, u, 0.0, y.q, turning(numbers.elastic, y), y.i)
     return spring_contact.settled(numbers, zone, u, torque, y, mesh)
 

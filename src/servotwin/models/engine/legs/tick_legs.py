@@ -55,7 +55,7 @@ class Fade(NamedTuple):
 
 
 class Way(NamedTuple):
-    """How a servo goes on at a duty: its numbers at that, the voltage behind the bridge, its mode and its laws."""
+    """How a servo continues at a duty: its numbers at that, the voltage behind the bridge, its mode and its laws."""
 
     duty: float
     numbers: Numbers
@@ -68,7 +68,7 @@ class Way(NamedTuple):
 class Gone(NamedTuple):
     """Until when a servo has gone [s], its state and mesh there, how many outputs are done.
 
-    And whether what moves it may be another than its memory has: it went on, or its program worked.
+    And whether what moves it may be another than its memory has: it advanced, or its program worked.
     """
 
     time: float
@@ -97,13 +97,13 @@ def way_of(numbers: Numbers, inputs: Inputs, left: float, nearly: bool) -> int:
 
 def go_stiff(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Floats, done: int,
              outputs: Floats) -> Gone:
-    """Go on as `go` does without a spring between motor and output: compiled, without what only those need."""
+    """Advance as `go` does without a spring between motor and output: compiled, without what only those need."""
     return go(numbers, inputs, memory, until, times, done, outputs)
 
 
 def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Floats, done: int,
        outputs: Floats) -> Gone:
-    """Go on from tick to tick, as far as this way leads and at most to `until` [s].
+    """Advance from tick to tick, as far as this way leads and at most to `until` [s].
 
     The arguments are those of `runs.run`.
     """
@@ -161,7 +161,7 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
 
 
 def as_gone(memory: Memory, gone: Gone) -> Memory:
-    """Return the memory of a servo that has gone on so."""
+    """Return the memory of a servo that has advanced so."""
     if not gone.anew:
         return memory
     point = Point(gone.time, gone.y, Mode(0, 0, gone.mesh, 0, 0), math.inf, gone.y, memory.point.step, gone.y.q)
@@ -183,7 +183,7 @@ def frozen(numbers: Numbers, now: float, tau: float, y: Vector) -> Numbers:
 
 
 def at_duty(numbers: Numbers, now: float, tau: float, y: Vector, before: Way) -> Way:
-    """Return how a servo goes on from a state at another duty than before, under an external torque [N m]."""
+    """Return how a servo continues from a state at another duty than before, under an external torque [N m]."""
     at = duty.at_duty(numbers, now)
     u, mesh = duty.voltage(at.source, now), before.mode.mesh
     if elastic.present(numbers.elastic):
@@ -194,7 +194,7 @@ def at_duty(numbers: Numbers, now: float, tau: float, y: Vector, before: Way) ->
 
 
 def in_mode(way: Way, mode: Mode, tau: float) -> Way:
-    """Return how a servo goes on at the same duty in a mode that it may have been in."""
+    """Return how a servo continues at the same duty in a mode that it may have been in."""
     if mode == way.mode:
         return way
     return with_laws(Way(way.duty, way.numbers, way.u, mode, way.laws, way.law), tau)

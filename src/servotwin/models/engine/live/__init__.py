@@ -1,1 +1,1 @@
-"""Servos at a bench that is looked at while it goes on; one text for Python and WebAssembly."""
+"""Servos at a bench that is looked at while it runs; one text for Python and WebAssembly."""

@@ -1,4 +1,4 @@
-"""Servos at a bench go on together under one transmitter: the kernel that a page calls."""
+"""Servos at a bench advance together under one transmitter: the kernel that a page calls."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def heed(posts: Any, k: int, told: Told, circuits: Any, time: float, sag: float)
 
 
 def change(posts: Any, k: int, memories: Memories) -> None:
-    """Let a servo go on with the numbers that its record has by now."""
+    """Let a servo continue with the numbers that its record has by now."""
     those.change(posts, k, memories)
 
 
@@ -96,7 +96,7 @@ def next_edge(sender: Any) -> float:
 
 def advance(posts: Any, told: Told, programs: Any, memories: Memories, sender: Any, log: Log, until: float, rate: float,
             switches: int, rows: Any, events: Any, pulses: Any, used: Any) -> int:
-    """Go on to a time [s], each servo on its own supply; return a status.
+    """Advance to a time [s], each servo on its own supply; return a status.
 
     The log has room for `stretch.AT_ONCE` motions and a few events more.
     Each servo has tables `rows`, `events` and `pulses` for what shows; how much of these is `used` stands as in
@@ -123,7 +123,7 @@ def advance(posts: Any, told: Told, programs: Any, memories: Memories, sender: A
 def advance_together(posts: Any, told: Told, programs: Any, memories: Memories, sender: Any, lanes: Lanes,
                      tables: Tables, shared: Any, seats: Any, mates: Any, tape: Tape, until: float, rate: float,
                      switches: int, rows: Any, events: Any, pulses: Any, used: Any) -> int:
-    """Go on to a time [s], all servos on one supply; return a status.
+    """Advance to a time [s], all servos on one supply; return a status.
 
     Pieces and edges of the lanes are those of `told`; there are twice as many mates as servos.
     """
@@ -171,7 +171,7 @@ def _end_of_part(now: Any, until: float, rate: float, room: int) -> float:
 
 
 def _take_seats(posts: Any, told: Told, memories: Memories, lanes: Lanes, on_bus: Any, shared: Any, seats: Any) -> None:
-    """Let all servos take their seats on the bus, told what they are told now."""
+    """Let all servos take their seats on the bus, with their present inputs."""
     others = False
     for n in range(len(posts)):
         post = posts[n]
@@ -202,7 +202,7 @@ def _take_seats(posts: Any, told: Told, memories: Memories, lanes: Lanes, on_bus
 
 def _advance_one(post: Any, k: int, servos: int, told: Told, programs: Any, memories: Memories, looks: Looks,
                  log: Log, screen: Screen) -> int:
-    """Let one servo go on by itself; return a status."""
+    """Advance one servo by itself; return a status."""
     memory, was, low, status = stretch.go_on(
         those.numbers_of(post.numbers), those.chip_of(post.chip), those.inputs_of(post, k, servos, told, programs),
         memory_at(memories, k), post.changed == 1, those.was_of(post.was), those.low_of(post.low), looks,

@@ -191,7 +191,7 @@ def asked(post: Any, told: Told, time: float) -> float:
 
 
 def next_width(post: Any, told: Told, edge: float) -> float:
-    """Return what a servo is told at an edge [s]: the width that a circuit sends, or what its command asks for."""
+    """Return the command of a servo at an edge [s]: the width that a circuit sends, or what its command asks for."""
     return float(post.sent) if post.sent > 0.0 else asked(post, told, edge)
 
 
@@ -235,7 +235,7 @@ def _stand(posts: Any, k: int, memories: Memories, angle: float) -> None:
 
 
 def change(posts: Any, k: int, memories: Memories) -> None:
-    """Let a servo go on with the numbers that its record has by now."""
+    """Let a servo continue with the numbers that its record has by now."""
     post = posts[k]
     memory = with_bodies(memory_at(memories, k), post.numbers.play.half, post.numbers.elastic.k > 0.0)
     put_memory(memories.rows[k], memory)
@@ -291,7 +291,7 @@ def pieces_of(post: Any, k: int, servos: int, told: Told) -> tuple[int, int]:
 
 
 def inputs_of(post: Any, k: int, servos: int, told: Told, programs: Any) -> Inputs:
-    """Return what a servo is told now."""
+    """Return the present inputs of a servo."""
     curve = told.curves[post.curve_first:post.curve_first + post.curve_count]
     first, count = pieces_of(post, k, servos, told)
     at = train_of(told, servos, k)[0]

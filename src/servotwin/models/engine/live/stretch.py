@@ -1,4 +1,4 @@
-"""A servo on its own goes on for a stretch of time, and is looked at on the way: what shows follows from its log."""
+"""A servo on its own runs for a stretch of time, and is looked at on the way: what shows follows from its log."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Stood(NamedTuple):
 
 def go_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, changed: bool, was: Switch, low: Low,
           looks: Looks, lines: Lines, screen: Screen, log: Log) -> tuple[Memory, Switch, Low, int]:
-    """Go on to `looks.until`; return the memory, how the bridge drives there, the supply's `low`, and a status.
+    """Advance to `looks.until`; return the memory, how the bridge drives there, the supply's `low`, and a status.
 
     `changed` is whether the servo is another one than before, `was` how its bridge drove at the end of the stretch
     before, and `low` how low its supply was since the latest look. After a status that is not `COMPLETED` the memory is
@@ -172,7 +172,7 @@ def _share(row: Row, m: Motion) -> float:
 
 def _lowered(screen: Screen, lines: Lines, inputs: Inputs, row: Row, m: Motion, start: float, end: float,
              low: Low) -> tuple[Motion, Low]:
-    """Return a motion and the least voltage after it has gone on between two times [s]; a row of it is written."""
+    """Return a motion and the least voltage after it has advanced between two times [s]; a row of it is written."""
     if not end > start:
         return m, low
     m, begun = motion.prepared(m), row.origin + m.t0

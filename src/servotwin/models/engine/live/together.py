@@ -1,4 +1,4 @@
-"""Servos on one supply go on for a stretch of time, and are looked at on the way: what shows follows from their log."""
+"""Servos on one supply run for a stretch of time, and are looked at on the way: what shows follows from their log."""
 
 from __future__ import annotations
 
@@ -47,9 +47,9 @@ _LATE = 1.0 + 1e-12  # of an instant: so much before a tick it is the tick
 
 def go_on(told: Any, posts: Any, firms: Any, shared: Any, seats: Any, mates: Any, looks: Looks, written: Tape,
           rows: Any, events: Any, used: Any) -> int:
-    """Go on to `looks.until`; return a status.
+    """Advance to `looks.until`; return a status.
 
-    Servos have their seats and remember where they stand; what they are `told` is found by `inputs_at`. The tape has
+    Servos have their seats and remember where they stand; their inputs in `told` are found by `inputs_at`. The tape has
     room for what servos do at once.
     """
     k, status, low = looks.next, event_queue.PAUSED, low_of(posts[0].low)
@@ -128,7 +128,7 @@ def _show(told: Any, posts: Any, shared: Any, seats: Any, mates: Any, looks: Loo
 
 def _lowered(told: Any, posts: Any, shared: Any, seats: Any, mates: Any, written: Tape, a: float, b: float, low: Low,
              rows: Any, events: Any, used: Any) -> Low:
-    """Return the least voltage after all have gone on between two times [s]; rows of it are written.
+    """Return the least voltage after all have advanced between two times [s]; rows of it are written.
 
     It lies between them where it falls at the first and rises at the other.
     """
@@ -161,7 +161,7 @@ def _lowered(told: Any, posts: Any, shared: Any, seats: Any, mates: Any, written
 
 def _taken_up(posts: Any, shared: Any, seats: Any, mates: Any, written: Tape, time: float, earlier: bool, low: Low,
               rows: Any, events: Any, used: Any) -> Low:
-    """Count the rows of the least voltage where it is below that of a look at a time [s]; return how it goes on."""
+    """Count the rows of the least voltage where it is below that of a look at a time [s]; return how it continues."""
     voltage = _voltage(posts, shared, seats, mates, written, time, earlier)
     for j in range(len(posts)):
         taken_up(Screen(rows[j], events[j], used[USED * j:USED * j + USED]), low, voltage)
@@ -268,7 +268,7 @@ def _see_all(told: Any, posts: Any, shared: Any, seats: Any, mates: Any, written
 
 
 def _note_all(written: Tape, events: Any, rows: Any, used: Any) -> None:
-    """Note what has happened that people are told of."""
+    """Note what has happened that is reported."""
     for n in range(written.used[1]):
         j, time, kind = int(written.events[n, 0]), written.events[n, 1], int(written.events[n, 2])
         code = crossings.NO_EVENT

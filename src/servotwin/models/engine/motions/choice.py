@@ -263,7 +263,7 @@ def _long_step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y:
 
 def _creep(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float, limit: float,
            accuracy: float) -> Motion:
-    """Return a creep, or a motion that is none where its end cannot be told."""
+    """Return a creep, or a motion that is none where its end cannot be determined."""
     time, q, w, ends_by, done = stribeck.creep(numbers, mode, u.value, tau.value, y, limit, FINE * accuracy)
     none = closed(IMPOSSIBLE, numbers, mode, u, tau, t0, y, NO_COEFFICIENTS, (0.0, 0.0), step)
     if done == 0.0 or (t0 + time == t0 and ends_by < 0):

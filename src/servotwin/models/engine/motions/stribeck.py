@@ -2,10 +2,10 @@
 
 There its acceleration depends on its speed alone, and in no straight line. So the time that it takes from one speed to
 another is an integral over the speed, t = ∫ dw/ẇ, and the angle q = ∫ w dw/ẇ. It is taken panel by panel. A panel is
-told from the straight line through two points of the law: along it the speed is a known exponential v(ϑ) of a time ϑ,
+given by the straight line through two points of the law: along it the speed is a known exponential v(ϑ) of a time ϑ,
 and t = ∫ (v̇/ẇ) dϑ, which is smooth from rest to the final speed, where both accelerations come to nothing together.
 With ϑ in steps of √w it is smooth at rest too, for every exponent. A panel is cut where a torque or a share changes its
-sign, and halved until two Gauss-Kronrod rules agree. Where a time is given, the panel that this straight line has told
+sign, and halved until two Gauss-Kronrod rules agree. Where a time is given, the panel that this straight line has given
 misses it by little: what is left is the next panel, forth or back, and so on until nothing is.
 
 Coefficients: R. Piessens et al., "QUADPACK", Springer 1983, rules of 21 points (qk21) and of 7.
@@ -83,7 +83,7 @@ IN_FLOATS = {"_NEAR": 1e-3, "_SHORT": 2.4e-7, "_ROUNDING": 1e-6}
 
 
 class Crept(NamedTuple):
-    """Where a creep has led after a time [s]: angle and speed, what ended it, and 1, or 0 where it cannot be told."""
+    """Where a creep has led after a time [s]: angle and speed, what ended it, and 1, or 0 where it cannot be found."""
 
     time: float
     q: float
@@ -107,9 +107,9 @@ class _Panel(NamedTuple):
     """A range of speeds, and how a shaft would go through it if its law were a straight line."""
 
     span: float  # that time [s]; 0 where it stays as fast as it is
-    rate: float  # 1/s, at least 0: the law is told from the end at which it speeds up or slows down more
+    rate: float  # 1/s, at least 0: the law is computed from the end at which it speeds up or slows down more
     anchor: float  # this end [rad/s]
-    pull: float  # how the speed leaves it, as time goes on or back [rad/s²]
+    pull: float  # how the speed leaves it, as time goes forth or back [rad/s²]
     other: float  # the other end
     there: float  # the one that is reached
     way: float  # the angle that it would turn [rad]
@@ -131,7 +131,7 @@ class _Line(NamedTuple):
 
 
 class _Between(NamedTuple):
-    """Time [s] and angle [rad] through a panel, and an error; inf where it cannot be told."""
+    """Time [s] and angle [rad] through a panel, and an error; inf where it cannot be found."""
 
     time: float
     way: float
@@ -139,7 +139,7 @@ class _Between(NamedTuple):
 
 
 class _Went(NamedTuple):
-    """Where the way on has led: time [s], angle [rad], speed, whether to the bound; 1, or 0 where it cannot be told."""
+    """Where the way on has led: time [s], angle [rad], speed, whether to the bound; 1, or 0 where it is not found."""
 
     time: float
     way: float
@@ -213,7 +213,7 @@ def at_time(numbers: Numbers, mode: Mode, u: float, tau: float, start: Vector, e
 
 def _onward(numbers: Numbers, course: _Course, begin: float, gain: float, bound: float, limit: float,
             tolerance: float) -> _Went:
-    """Go on from a speed until another is reached, or for a time: panel by panel, back where one has led too far."""
+    """Creep from a speed until another is reached, or for a time: panel by panel, back where one has led too far."""
     x, left, way, longest = begin, limit, 0.0, limit
     for _ in range(_PANELS):
         sense = 1.0 if left > 0.0 else -1.0
@@ -280,7 +280,7 @@ def _panel(numbers: Numbers, course: _Course, x: float, bound: float, sense: flo
 
 
 def _speeding(x: float, bound: float, on: float, v: float, rate: float, span: float, near: float) -> _Panel:
-    """Return the same where the acceleration grows on the way: told from the end of the panel."""
+    """Return the same where the acceleration grows on the way: computed from the end of the panel."""
     most, per_rate = abs(bound - x), 1.0 / rate
     gone = v * exp(rate * span) * decay(rate, per_rate, span)[0]
     arrives = gone >= most
@@ -376,7 +376,7 @@ def _close(numbers: Numbers, course: _Course, panel: _Panel, sign: float) -> _Be
 
 
 def _line(panel: _Panel, sign: float) -> _Line:
-    """Return what nodes of a panel are told by."""
+    """Return what nodes of a panel are computed by."""
     begin, end, rate = math.sqrt(panel.anchor), math.sqrt(panel.other), panel.rate
     return _Line(panel.anchor, panel.pull, rate, 1.0 / rate if rate > 0.0 else 0.0, sign * abs(panel.pull), begin,
                  end - begin, panel.span / (begin + end))

@@ -1,8 +1,8 @@
-"""Heating: how one body goes on while the current that turns it warms the winding, and law and current follow.
+"""Heating: how one body moves while the current that turns it warms the winding, and law and current follow.
 
 At the temperatures of its start a body moves by ẇ = f − λ w, which is solved exactly. How far warming leads off that is
 small: it is found from the temperatures at Gauss's five points, these from the speeds there, and both once more, with
-an error estimated by what the second time has changed. Of a body that no current turns temperatures alone go on.
+an error estimated by what the second time has changed. Of a body that no current turns temperatures alone change.
 
 Coefficients: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II", 2nd edition, Springer 1996, section
 IV.5.

@@ -1,4 +1,4 @@
-"""A servo alone, as a program in C has it: made of what is given of it, it goes on, and tells of itself."""
+"""A servo alone, as a program in C has it: made of what is given of it, it advances, and gives its signals."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def answer(servo: Alone, command: float, torque: float) -> int:
 
 
 def advance(servo: Alone, inputs: Inputs, memories: Memories, until: float, command: float, log: Log) -> int:
-    """Go on to a time [s]; return a status, and leave the memory as it was unless that is `READY`.
+    """Advance to a time [s]; return a status, and leave the memory as it was unless that is `READY`.
 
     Events are written into the log, as far as that has room for them, and counted.
     """
@@ -103,7 +103,7 @@ def advance(servo: Alone, inputs: Inputs, memories: Memories, until: float, comm
 
 
 def observe(servo: Alone, inputs: Inputs, memories: Memories) -> Seen:
-    """Return all signals of a servo as it stands, under what it is told now."""
+    """Return all signals of a servo as it stands, under its present inputs."""
     memory = memory_at(memories, 0)
     point, now, time = memory.point, memory.chip, time_of(memory)
     u, tau = told(servo.plant, pulsed_chip(servo.chip), inputs, memory)

@@ -29,7 +29,7 @@ def lower(lowest: Lowest, voltage: float, time: float) -> Lowest:
 
 
 def followed(lowest: Lowest, m: Motion, share: float, origin: float, start: float, end: float) -> Lowest:
-    """Return the least voltage after a servo alone on its supply has gone on a motion.
+    """Return the least voltage after a servo alone on its supply has followed a motion.
 
     Parameters
     ----------

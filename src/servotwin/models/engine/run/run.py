@@ -1,4 +1,4 @@
-"""The one loop over `step`: a servo goes on to a time, and its log says by which motions and what has happened."""
+"""The one loop over `step`: a servo advances to a time, and its log says by which motions and what has happened."""
 
 from __future__ import annotations
 
@@ -88,21 +88,21 @@ plant_of = record_reader("plant_of", Plant)
 
 def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, until: float, changed: bool, begins: bool,
         log: Log) -> tuple[Memory, int]:
-    """Go on to a time since the start [s], from event to event; return the memory and a status.
+    """Advance to a time since the start [s], from event to event; return the memory and a status.
 
     After a status other than `COMPLETED` and `PAUSED` the memory is that of before what went wrong.
 
     Parameters
     ----------
     numbers, chip, inputs
-        Servo and load, and what they are told.
+        Servo and load, and their inputs.
     memory : Memory
     until : float
         Not before the memory's time [s].
     changed : bool
         Whether the servo is another one than before.
     begins : bool
-        False where the run was `PAUSED` and goes on.
+        False where the run was `PAUSED` and continues.
     log : Log
         Motions and events are written into it as far as it has room for any.
     """
@@ -120,7 +120,7 @@ def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, until: flo
 
 def from_step_to_step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, end: float, log: Log,
                       readings: Readings) -> tuple[Memory, int]:
-    """Go on to a time since the memory's origin [s], as `run` does; by legs wherever these lead on under readings."""
+    """Advance to a time since the memory's origin [s], as `run` does; by legs wherever these lead on under readings."""
     pulsed, origin = pulsed_chip(chip), origin_of(memory)
     m = motion.nothing(numbers, memory.u, memory.tau)
     trip = 0
@@ -182,7 +182,7 @@ def _tried(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, m: Moti
 
 
 def go_on(plants: Any, inputs: Inputs, memories: Memories, until: float, changed: bool, begins: bool, log: Log) -> int:
-    """Let the servo of a record go on whose memory is one, as `run` does; return a status."""
+    """Advance the servo of a record whose memory is one, as `run` does; return a status."""
     plant = plant_of(plants[0])
     memory, status = run(plant.numbers, plant.chip, inputs, memory_at(memories, 0), until, changed, begins, log)
     put_memory(memories.rows[0], memory)
@@ -239,7 +239,7 @@ def write_readings(numbers: Numbers, inputs: Inputs, before: Memory, memory: Mem
 
 
 def stands(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, end: float) -> bool:
-    """Tell whether a servo stands still until `end`, and nothing is decided before: then time alone goes on."""
+    """Tell whether a servo stands still until `end`, and nothing is decided before: then time alone advances."""
     point, now = memory.point, memory.chip
     if not at_rest(point.mode.contact) or point.mode.mesh != RIGID or point.anchor_time == math.inf:
         return False

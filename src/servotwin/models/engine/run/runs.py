@@ -50,7 +50,7 @@ def start(lanes: Lanes, which: Indices, memories: Memories) -> None:
 def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, torque_count: Indices,
           which: Indices, durations: Floats, times: Floats, first_output: Indices, outputs: Floats, memories: Memories,
           status: Indices, nearly: bool, ended: Floats, counts: Indices, units: Any, common: Any) -> None:
-    """Let the lanes named in `which`, whose memories are given, go on for durations of their own [s].
+    """Advance the lanes named in `which`, whose memories are given, by durations of their own [s].
 
     `outputs` has the shape (n, 18, T), a table of `Readings` for each, and gets what stands at `times` from the one
     numbered `first_output` on, `nearly` as those have it; `counts` are those of a log, and `units` and `common` room
@@ -81,9 +81,9 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
 
 
 def ready(lanes: Indices, lane_status: Any, now: Floats, done: Indices, durations: Floats, status: Indices) -> int:
-    """Let all lanes be about to go on for the time in `now` [s], but for those that have failed or are `done` (1).
+    """Make all lanes ready to advance by the time in `now` [s], but for those that have failed or are `done` (1).
 
-    Return how many go on.
+    Return how many advance.
     """
     left = 0
     for k in range(lanes.size):
@@ -96,7 +96,7 @@ def ready(lanes: Indices, lane_status: Any, now: Floats, done: Indices, duration
 def to_first_ticks(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, torque_count: Indices,
                    which: Indices, durations: Floats, times: Floats, first_output: Indices, outputs: Floats,
                    memories: Memories, status: Indices, counts: Indices) -> None:
-    """Let digital servos that begin before their first tick go on to it: from there on they go side by side.
+    """Advance digital servos that begin before their first tick to it: from there on they go side by side.
 
     The arguments are those of `go_on`. Durations and outputs that are left are noted; a lane that fails stays.
     """
@@ -129,9 +129,9 @@ def note_failures(lanes: Indices, how: Indices, at: Floats, records: Any, status
 
 
 def ready_to(inputs: Inputs, memory: Memory, pulsed: bool, duration: float, underway: bool) -> tuple[Memory, float]:
-    """Return a memory that can go on for a duration [s], and to when by its own clock [s].
+    """Return a memory that can advance by a duration [s], and to when by its own clock [s].
 
-    `underway` is whether a program knows its next tick and pulse.
+    `underway` is whether a program has its next tick and pulse.
     """
     memory = resumed(pulsed, inputs, memory, False)
     if firmware.present(inputs.firmware[0]) and not underway:
@@ -155,7 +155,7 @@ def way_of(numbers: Numbers, inputs: Inputs, memory: Memory, left: float, nearly
 
 def by_series(told: Told, numbers: Numbers, inputs: Inputs, memory: Memory, firms: Any, end: float, readings: Readings,
               counts: Indices, units: Any, common: Any) -> tuple[Memory, float]:
-    """Go on by power series as far as these lead; return the memory, and the end [s] by its clock."""
+    """Advance by power series as far as these lead; return the memory, and the end [s] by its clock."""
     put_unit_numbers(units[0].given, numbers)
     coupled_ticks.put_source(common[0], numbers.source)
     goes = True

@@ -64,7 +64,7 @@ class Rewriting(ast.NodeTransformer):
         return node
 
     def _by_place(self, arguments: ast.arguments) -> None:
-        """Let arguments that have to be named be named or not, for C knows no others."""
+        """Let arguments that have to be named be named or not, for C has no others."""
         named = list(zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True))
         for argument, default in sorted(named, key=lambda pair: pair[1] is not None):
             arguments.args.append(argument)

@@ -1,4 +1,4 @@
-"""Kinds of values that a kernel may work with: what the translator to C knows of them."""
+"""Kinds of values that a kernel may work with: what the translator to C has of them."""
 
 from __future__ import annotations
 

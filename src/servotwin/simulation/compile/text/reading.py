@@ -1,10 +1,10 @@
-"""Which numbers of the terms a recipe's kernels do not know, told by which of their functions read them.
+"""Which numbers of the terms a recipe's kernels do not cover, found by which of their functions read them.
 
-Parts of Python unknown to them would be as if they were not there. They know a number that a function of their own
+Numbers that they do not cover would be as if they were not there. They cover a number that a function of their own
 reads, which the general form has not. Else all functions that read it in the general form have to be among them, and no
 function of their own may read what these read beside it: it would be another form of their law; and it may not belong
-to a term that is left out. Of a number whose term says where it acts, less is asked: they know it where they read it at
-all, and need not where they follow nothing of that.
+to a term that is left out. Of a number whose term says where it acts, less is asked: they cover it where they read
+it at all, and need not where they follow nothing of that.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _COPYING = flat_name(records.__name__, "")  # functions that only take records o
 
 
 def unread_numbers(recipe: Recipe, of: tuple[str, ...]) -> Iterator[str]:
-    """Return the numbers that the general form reads and a recipe's kernels do not know, as `unread` keeps them."""
+    """Return the numbers that the general form reads and a recipe's kernels do not cover, as `unread` keeps them."""
     never = {*in_general(recipe).never, *WITH_ROWS}
     general = _readers(replace(recipe, entries=_RUNS, vector=False, single=False, never=tuple(sorted(never))))
     own = _readers(recipe, of)
@@ -78,5 +78,5 @@ def _read_in(own: Specialised) -> Iterator[_Number]:
 
 
 def _fields(kind: Kind | None) -> tuple[str, ...]:
-    """Return by what records are told apart: the names of their fields."""
+    """Return by what records are distinguished: the names of their fields."""
     return kind.fields if isinstance(kind, Tuple) else kind.dtype.names or () if isinstance(kind, Record) else ()

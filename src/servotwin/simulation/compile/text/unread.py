@@ -1,4 +1,4 @@
-"""Which numbers of the terms a recipe's kernels do not know, as `reading` finds it: kept beside the kernels."""
+"""Which numbers of the terms a recipe's kernels do not cover, as `reading` finds it: kept beside the kernels."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from servotwin.simulation.compile.recipe import Recipe
 from servotwin.simulation.compile.storage import is_there, kept_folder, key_of, write
 
 IN_GENERAL = "_in_general"
-FROM_TICK_TO_TICK = ("LEGS", "SPRING_LEGS", "POWER_SERIES")  # ways of going on that a program may take
+FROM_TICK_TO_TICK = ("LEGS", "SPRING_LEGS", "POWER_SERIES")  # ways to advance that a program may take
 
 
 @cache
 def in_general(recipe: Recipe) -> Recipe:
-    """Return a recipe in which no way of going on is chosen by the numbers that it knows."""
+    """Return a recipe in which no way to advance is chosen by the numbers that it covers."""
     return replace(recipe, name=recipe.name + IN_GENERAL, knows=-1, always=0, parts=(),
                    never=(*recipe.never, *FROM_TICK_TO_TICK))
 
 
 @cache
 def unread(recipe: Recipe, of: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """Return the numbers that the general form reads and a recipe's kernels do not know ("friction.K_m", "chip.beta").
+    """Return the numbers that the general form reads and a recipe's kernels do not cover ("friction.K_m", "chip.beta").
 
     With `of`, "module:function", it is asked of what these call alone. The answer is kept beside the kernels.
     """

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from servotwin.web.server.session import Room
 
 
-# --- Fits of one visitor: begun, told how far, ended, and taken over to the bench -------------------------------------
+# --- Fits of one visitor: begun, reported on, ended, and taken over to the bench --------------------------------------
 
 LONGEST = 600.0
 """How long a fit may take [s]."""
@@ -74,12 +74,12 @@ class Fits:
                 "free": [_free_facts(start, name) for name in names]}
 
     def begin(self, asked: dict[str, Any]) -> None:
-        """Begin a fit; the page is told how far it is and what comes of it.
+        """Begin a fit; the page gets how far it is and what comes of it.
 
         Raises
         ------
         InputError
-            If another fit goes on, or this one is not possible.
+            If another fit runs, or this one is not possible.
         """
         desk = self._of.desk
         if desk.fitting is not None:
@@ -102,7 +102,7 @@ class Fits:
         task.add_done_callback(self.tasks.discard)
 
     def cancel(self) -> None:
-        """End the fit that goes on, if it is of this visitor."""
+        """End the fit that runs, if it is of this visitor."""
         if self._work is not None:
             self._work.end()
 
@@ -304,7 +304,7 @@ class Brought:
             raise InputError("log", got="one after another, faster than they are read", allowed="a moment later")
 
     async def take(self, raw: bytes, label: str) -> dict[str, Any]:
-        """Read a log that was brought, in place of the one before; return what is told of it.
+        """Read a log that was brought, in place of the one before; return what is reported of it.
 
         Raises
         ------
@@ -315,7 +315,7 @@ class Brought:
         return await self._read({"raw": raw, "packed": False, "label": label, "columns": "", "mend": ""})
 
     def read_again(self, columns: object, mend: object) -> None:
-        """Begin to read the log once more with words for its columns; the page is told what comes of it.
+        """Begin to read the log once more with words for its columns; the page gets what comes of it.
 
         Raises
         ------
@@ -337,7 +337,7 @@ class Brought:
         self._begin(reading())
 
     def compare(self, asked: dict[str, Any]) -> None:
-        """Begin to lay the log over a servo of the bench; the page is told what comes of it.
+        """Begin to lay the log over a servo of the bench; the page gets what comes of it.
 
         Raises
         ------

@@ -62,7 +62,7 @@ def work(given: dict[str, Any], tell: Tell) -> tuple[dict[str, Any], list[bytes]
 
 
 def facts_of(fit: Fit, notes: list[str]) -> dict[str, Any]:
-    """Return a fit as the page shows it; errors in the unit that is told."""
+    """Return a fit as the page shows it; errors in the unit that is stated."""
     factor, unit = error_shown(fit.traces)
     table = fit.training or fit.holdout
     verdict = fit.verdict

@@ -29,7 +29,7 @@ _ENDINGS = (".csv", ".tsv", ".txt", ".json")
 _COMPUTED = ("motor_torque", "error_time", "drive")
 """Signals that a simulation writes and no sensor measures."""
 UNITS = {"pulse_width": ("us", 1e6), "angle": ("deg", 180.0 / np.pi), "voltage": ("V", 1.0)}
-"""In which unit a bench is told a command of each kind, and how many of it an SI unit has."""
+"""In which unit a bench takes a command of each kind, and how many of it an SI unit has."""
 MOST_PLAYED = 20_000
 """Changes of a command that a bench can play."""
 DIGITS = 9  # of a command that is played
@@ -38,7 +38,7 @@ _MOST_RUNS = 1000
 
 
 def work(given: dict[str, Any], tell: Tell) -> tuple[dict[str, Any], list[bytes]]:
-    """Return what is told of a log, and as bytes: the file, the logs, and the commands that can be played.
+    """Return what is reported of a log, and as bytes: the file, the logs, and the commands that can be played.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def _plain(line: str, label: str) -> str:
 
 
 def log_facts(logs: list[Log], label: str, more: list[str]) -> dict[str, Any]:
-    """Return what a page is told of logs: how their columns were read, and what each run holds."""
+    """Return what a page gets of logs: how their columns were read, and what each run holds."""
     groups = reading_facts(logs)
     first: Reading | None = logs[0].reading
     remarks = dict.fromkeys([*more, *(remark for group in groups for remark in group["remarks"])])
@@ -112,7 +112,7 @@ def log_facts(logs: list[Log], label: str, more: list[str]) -> dict[str, Any]:
 
 
 def is_computed(log: Log) -> bool:
-    """Tell whether a log holds what only a simulation knows."""
+    """Tell whether a log holds what only a simulation has."""
     return any(name in log.measured for name in _COMPUTED)
 
 

@@ -1,4 +1,4 @@
-"""A piece of work in a process of its own: it may take long or fail, and the benches go on meanwhile."""
+"""A piece of work in a process of its own: it may take long or fail, and the benches continue meanwhile."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Work:
     nice : int
         How far it stands behind the benches.
     told : callable, optional
-        Is told the share that is done, and what goes on.
+        Called with the share that is done, and the work in progress.
     """
 
     def __init__(self, kind: str, given: dict[str, Any], *, limit: float, nice: int, told: Told | None = None) -> None:

@@ -38,7 +38,7 @@ class Slid(NamedTuple):
 
 
 class Landed(NamedTuple):
-    """Where a leg has led: state, time [s], whether it met its end; 1, 0 if it is to be shorter, −1: not told."""
+    """Where a leg has led: state, time [s], whether it met its end; 1, 0 if it is to be shorter, −1: not known."""
 
     state: State
     time: float
@@ -151,7 +151,7 @@ def landed(numbers: Numbers, band: Band, torque: float, u: float, zone: int, sha
 
 def rested(numbers: Numbers, warm: Numbers, torque: float, u: float, state: State, time: float,
            tolerance: float) -> tuple[State, float]:
-    """Return the state of a shaft at rest after a time [s], and 1, or 0 where it is not told, as if it may start."""
+    """Return the state of a shaft at rest after a time [s], and 1, or 0 where it is not known, as if it may start."""
     zone = currents.zone_of(warm, u, 0.0, 0.0, 0.0, 0.0)
     if u == 0.0:
         T_w, T_h = cooled(numbers, state.T_w, state.T_h, time)
