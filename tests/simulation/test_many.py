@@ -227,6 +227,18 @@ def test_only_what_the_outputs_read_is_computed(monkeypatch):
                      ("angle", "speed", "contact", "drive")]
 
 
+@pytest.mark.parametrize(("name", "column"), [
+    ("gear.backlash", [0.0, 0.01]), ("potentiometer.backlash", [0.0, 0.01]),
+    ("electronics.silence_state", ["brake", "coast"])])
+def test_outputs_read_what_any_lane_needs(name, column):  # a fit's trial of play had no speed of the motor
+    servo = SERVO.replace({"gear.output_inertia": 1e-4})
+    how = {"duration": 0.2, "load": loads.Inertia(1e-3), "output_step": 0.02}
+    alone = st.simulate(st.PulseServo(servo.replace({name: column[1]})), STEP, **how)
+    for output in st.PulseServo(servo).available:
+        batch = st.simulate_many(st.PulseServo(servo), STEP, parameters={name: column}, outputs=(output,), **how)
+        agree(batch[output][1], alone[output], output)
+
+
 def test_a_failed_lane_harms_no_other():
     resistance = SERVO.motor.armature_resistance * np.array([1.0, 1e-300, 1.1])
     options = {"duration": 0.3, "output_step": 0.01, "outputs": ("output_angle", "command_angle")}

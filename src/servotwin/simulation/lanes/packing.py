@@ -249,14 +249,16 @@ class Chunk:
         return Packed(LAWS[type(self.model)], lanes, curve, torque)
 
     def fields(self, asked: Asked) -> tuple[str, ...]:
-        """Return the raw fields that the outputs read: those that they look at when they are computed for one lane."""
+        """Return the raw fields that the outputs read: those that they look at when they are computed for all lanes.
+
+        A lane alone would not do: the motor of a lane with play turns otherwise than the output, that of the next not.
+        """
         probe = _Probe(asked.times[:1])
         probe.seen.update(FIELDS_OF[name] for name in asked.outputs if name in FIELDS_OF)
         computed = [name for name in asked.outputs if name not in FIELDS_OF]
-        one = Chunk(self.lanes, self.commands, self.which[:1])
         with np.errstate(all="ignore"):
             for name in computed:
-                one.model.output(name, cast("Samples", probe), cast("Any", one.drive), one.load)
+                self.model.output(name, cast("Samples", probe), cast("Any", self.drive), self.load)
         return tuple(field for field in (*FIELDS, *MORE_FIELDS) if field in probe.seen) or FIELDS[:1]
 
     def outputs(self, asked: Asked, raw: Raw) -> dict[str, Array]:
