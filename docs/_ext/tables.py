@@ -18,9 +18,12 @@ from servotwin.models.outputs import SIGNALS
 from servotwin.parameters import GROUPS, catalog_names, load_servo
 from servotwin.parameters.registers.listing import listed_model, listed_models, rows_of, wire_rows
 from servotwin.parameters.servo import AT_OUTPUT, plausible_range
+from servotwin.physics.nomenclature import ARGUMENTS
 from servotwin.units import DIMENSIONS, si_unit
 
-_GREEK = ("alpha", "beta", "tau")
+_GREEK = ("alpha", "beta", "delta", "Delta", "kappa", "tau")
+_LATEX = {"q̇": r"\dot q", "q̈": r"\ddot q", "τ": r"\tau", "η": r"\eta", "ω": r"\omega", "δ": r"\delta",
+          "⁺": "^+", "⁻": "^-"}
 _UNITS = {"ohm": "Ω", "mohm": "mΩ", "us": "µs", "us/V": "µs/V", "mV/us": "mV/µs", "uH": "µH", "deg": "deg"}
 _RULES = {"a positive number": "> 0", "a number of at least 0": "≥ 0", "a finite number": "any",
           "a number of at least 1": "≥ 1", "a number from 0 to 1": "0 to 1", "table": "list"}
@@ -39,6 +42,8 @@ def symbol(text: str) -> str:
     latex = re.sub(r"_(\w+)", r"_{\1}", text)
     for name in _GREEK:
         latex = re.sub(rf"\b{name}(?![a-z])", rf"\\{name}", latex)
+    for sign, command in _LATEX.items():
+        latex = latex.replace(sign, command)
     return f"${latex}$"
 
 
@@ -186,6 +191,24 @@ def api(module: str) -> str:
     return markdown(("name", "what it is"), rows)
 
 
+def nomenclature() -> str:
+    """Arguments of the laws: symbol, unit and meaning; numbers of a servo file are those of their group."""
+    rows = [(f"`{name}`", symbol(one.symbol), unit(one.unit), one.meaning)
+            for name, one in ARGUMENTS.items()]
+    for group, kind in GROUPS.items():
+        rows += [(f"`{f.name}`", symbol(f.metadata["symbol"]), unit(si_unit(f.metadata["dimension"])),
+                  f"{_formulas(f.metadata['meaning'])} (`{group}`)")
+                 for f in fields(kind) if f.metadata["symbol"] and f.metadata["dimension"] != "word"
+                 and f.name in arguments_of_laws()]
+    return markdown(("argument", "symbol", "unit", "meaning"), sorted(rows, key=lambda row: row[0].strip("`")))
+
+
+def arguments_of_laws() -> set[str]:
+    """Return the names of the arguments of the functions of `servotwin.physics`."""
+    laws = [law for law in vars(st.physics).values() if inspect.isfunction(law)]
+    return {name for law in laws for name in inspect.signature(law).parameters}
+
+
 def protocol_messages() -> str:
     """The messages of the bench's wire."""
     rows = [(f"`{kind.name}`", f"0x{kind.number:02x}", kind.sender, f"`{kind.answer}`" if kind.answer else "",
@@ -259,7 +282,7 @@ def _is_own(module, name: str) -> bool:
 
 TABLES = {"parameters": parameters, "models": models, "model-list": model_list, "signals": signals,
           "units": units, "catalog": catalog, "log-formats": log_formats,
-          "bam-actuators": bam_actuators, "top-level": top_level, "api": api,
+          "bam-actuators": bam_actuators, "top-level": top_level, "api": api, "nomenclature": nomenclature,
           "register-models": register_models, "registers": registers, "wire-registers": wire_registers,
           "protocol-messages": protocol_messages, "protocol-fields": protocol_fields,
           "protocol-numbers": protocol_numbers, "protocol-words": protocol_words, "recipes": recipes}

@@ -281,7 +281,7 @@ def forward_acceleration(
     load_viscous_friction : float or array
         B_L, at least 0 [N m s/rad].
     external_torque : float or array
-        τ_ext, positive where it pushes the shaft towards −q [N m].
+        τ_ext [N m].
     armature_resistance : float or array
         R_a [Ω].
     torque_constant : float or array

@@ -17,7 +17,7 @@ def feedback_error(command: float, feedback_voltage: float) -> float:
     command : float or array
         Control voltage v_c [V].
     feedback_voltage : float or array
-        v_o of the potentiometer [V].
+        v_o [V].
 
     Returns
     -------
@@ -130,7 +130,7 @@ def unbounded_armature_voltage(
     control_voltage : float or array
         v_c, the command as the comparator gets it, offset included [V].
     feedback_voltage : float or array
-        v_o of the potentiometer, offset included [V].
+        v_o [V].
     bridge_gain : float or array
         A [V/V].
     comparator_gain : float or array
@@ -199,11 +199,11 @@ def control_voltage_from_voltage(
     command_voltage : float or array
         v_i [V].
     voltage_to_pulse_gain : float or array
-        k_p1 of the transmitter [s/V].
+        k_p1 [s/V].
     pulse_to_voltage_gain : float or array
-        k_p2 of the servo's board [V/s].
+        k_p2 [V/s].
     command_offset : float or array
-        b_i, the control voltage at v_i = 0 [V].
+        b_i [V].
 
     Returns
     -------
@@ -231,7 +231,7 @@ def control_voltage_from_pulse(pulse_width: float, one_shot_slope: float, one_sh
     pulse_width : float or array
         t_a of the command [s].
     one_shot_slope : float or array
-        1/s_r, growth of the chip's own pulse with the feedback voltage, not 0 [s/V].
+        1/s_r, not 0 [s/V].
     one_shot_offset : float or array
         T_0, its length at 0 V; it may be negative [s].
 
@@ -293,9 +293,9 @@ def control_voltage_from_paper_pulse(pulse_width: float, pulse_to_voltage_gain: 
     pulse_to_voltage_gain : float or array
         k_p2 [V/s].
     command_pulse_offset : float or array
-        t_0, the pulse width at v_i = 0 [s].
+        t_0 [s].
     command_offset : float or array
-        b_i, the control voltage at v_i = 0 [V].
+        b_i [V].
 
     Returns
     -------
@@ -322,7 +322,7 @@ def pulse_width_from_voltage(
     voltage_to_pulse_gain : float or array
         k_p1 [s/V].
     command_pulse_offset : float or array
-        t_0, the pulse width at v_i = 0; it may be negative [s].
+        t_0; it may be negative [s].
 
     Returns
     -------
@@ -350,15 +350,15 @@ def averaged_bridge_gain(
     Parameters
     ----------
     supply_voltage : float or array
-        V_oc, open circuit [V].
+        V [V].
     bridge_drop_voltage : float or array
         V_ce0 of the conducting pair, at least 0 [V].
     stretcher_gain : float or array
-        K, drive time per error time [1].
+        K [1].
     frame_period : float or array
         T_f, positive [s].
     one_shot_slope : float or array
-        1/s_r, growth of the chip's own pulse with the feedback voltage [s/V].
+        1/s_r [s/V].
 
     Returns
     -------

@@ -22,7 +22,7 @@ def smoothed_coulomb_torque(
     Parameters
     ----------
     motor_speed : float or array
-        w, speed of the motor shaft [rad/s].
+        w [rad/s].
     coulomb_torque_forward : float or array
         F_ec1, at least 0 [N m].
     coulomb_torque_backward : float or array
@@ -87,7 +87,7 @@ def coulomb_torque(motor_speed: float, coulomb_torque_forward: float, coulomb_to
     Parameters
     ----------
     motor_speed : float or array
-        w, speed of the motor shaft [rad/s].
+        w [rad/s].
     coulomb_torque_forward : float or array
         F_ec1, at least 0 [N m].
     coulomb_torque_backward : float or array
@@ -120,7 +120,7 @@ def breakaway_torque(coulomb_torque: float, breakaway_ratio: float) -> float:
     coulomb_torque : float or array
         F_c of one direction [N m].
     breakaway_ratio : float or array
-        r = F_s/F_c, static over sliding friction, at least 1 [1].
+        r = F_s/F_c, at least 1 [1].
 
     Returns
     -------
@@ -149,7 +149,7 @@ def sticks(
     coulomb_torque_backward : float or array
         F_ec2, at least 0 [N m].
     breakaway_ratio : float or array
-        r = F_s/F_c, static over sliding friction, at least 1 [1].
+        r = F_s/F_c, at least 1 [1].
 
     Returns
     -------

@@ -68,9 +68,9 @@ def reflected_inertia(rotor_inertia: float, load_inertia: float, gear_reduction:
     Parameters
     ----------
     rotor_inertia : float or array
-        J_m, at the motor shaft [kg m²].
+        J_m [kg m²].
     load_inertia : float or array
-        J_L, at the output shaft [kg m²].
+        J_L [kg m²].
     gear_reduction : float or array
         N = 1/n, positive [1].
 
@@ -100,9 +100,9 @@ def reflected_viscous_friction(
     Parameters
     ----------
     motor_viscous_friction : float or array
-        B_m, at the motor shaft [N m s/rad].
+        B_m [N m s/rad].
     load_viscous_friction : float or array
-        B_L, at the output shaft [N m s/rad].
+        B_L [N m s/rad].
     gear_reduction : float or array
         N = 1/n, positive [1].
 
@@ -130,9 +130,9 @@ def output_inertia(rotor_inertia: float, load_inertia: float, gear_reduction: fl
     Parameters
     ----------
     rotor_inertia : float or array
-        J_m, at the motor shaft [kg m²].
+        J_m [kg m²].
     load_inertia : float or array
-        J_L, at the output shaft [kg m²].
+        J_L [kg m²].
     gear_reduction : float or array
         N = 1/n, positive [1].
 
@@ -162,9 +162,9 @@ def output_viscous_friction(
     Parameters
     ----------
     motor_viscous_friction : float or array
-        B_m, at the motor shaft [N m s/rad].
+        B_m [N m s/rad].
     load_viscous_friction : float or array
-        B_L, at the output shaft [N m s/rad].
+        B_L [N m s/rad].
     gear_reduction : float or array
         N = 1/n, positive [1].
 

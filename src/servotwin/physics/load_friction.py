@@ -55,7 +55,7 @@ def torque_on_gear(external_torque: float, output_speed: float, load_viscous_fri
     Parameters
     ----------
     external_torque : float or array
-        τ_ext, positive where it pushes towards −q [N m].
+        τ_ext [N m].
     output_speed : float or array
         q̇ [rad/s].
     load_viscous_friction : float or array
@@ -103,9 +103,9 @@ def torque_share(motor_torque: float, external_torque_on_gear: float, motor_shar
     Parameters
     ----------
     motor_torque : float or array
-        τ_m, at the output shaft [N m].
+        τ_m [N m].
     external_torque_on_gear : float or array
-        τ_e, what acts on the gear from outside, towards +q [N m].
+        τ_e [N m].
     motor_share, external_share : float or array
         K_m and K_e of sliding, or K_ms and K_es of static friction [1].
 
@@ -133,9 +133,9 @@ def quadratic_gear_friction(motor_torque: float, external_torque_on_gear: float,
     Parameters
     ----------
     motor_torque : float or array
-        τ_m = N k_a i_a, at the output shaft [N m].
+        τ_m = N k_a i_a [N m].
     external_torque_on_gear : float or array
-        τ_e = −τ_ext − B_L q̇, what acts on the gear from outside, towards +q [N m].
+        τ_e = −τ_ext − B_L q̇ [N m].
     load_friction_motor_quad, load_friction_external_quad : float or array
         K_mq and K_eq, at least 0 [1/(N m)].
 
@@ -169,7 +169,7 @@ def sliding_gear_friction(motor_torque: float, external_torque_on_gear: float, c
     Parameters
     ----------
     motor_torque, external_torque_on_gear : float or array
-        τ_m and τ_e, at the output shaft, towards +q [N m].
+        τ_m and τ_e [N m].
     coulomb_torque : float or array
         N F_c of the direction in question [N m].
     load_friction_motor, load_friction_external : float or array
@@ -202,7 +202,7 @@ def static_gear_friction(motor_torque: float, external_torque_on_gear: float, co
     Parameters
     ----------
     motor_torque, external_torque_on_gear : float or array
-        τ_m and τ_e, at the output shaft, towards +q [N m].
+        τ_m and τ_e [N m].
     coulomb_torque : float or array
         N F_c of the direction in question [N m].
     breakaway_ratio : float or array
@@ -247,9 +247,9 @@ def gear_friction_budget(
     output_speed : float or array
         w = q̇ [rad/s].
     motor_torque : float or array
-        τ_m = N k_a i_a, at the output shaft [N m].
+        τ_m = N k_a i_a [N m].
     external_torque_on_gear : float or array
-        τ_e = −τ_ext − B_L q̇, what acts on the gear from outside, towards +q [N m].
+        τ_e = −τ_ext − B_L q̇ [N m].
     coulomb_torque : float or array
         N F_c,d of the direction in question: N F_ec1 forward, N F_ec2 backward [N m].
     breakaway_ratio : float or array
@@ -303,9 +303,9 @@ def gear_sticks(
     Parameters
     ----------
     motor_torque : float or array
-        τ_m = N k_a i_a, at the output shaft [N m].
+        τ_m = N k_a i_a [N m].
     external_torque_on_gear : float or array
-        τ_e = −τ_ext, what acts on the gear from outside, towards +q [N m].
+        τ_e = −τ_ext [N m].
     coulomb_torque_forward, coulomb_torque_backward : float or array
         N F_ec1 and N F_ec2 [N m].
     load_coulomb_torque : float or array

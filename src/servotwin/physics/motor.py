@@ -41,7 +41,7 @@ def back_emf(motor_speed: float, back_emf_constant: float) -> float:
     Parameters
     ----------
     motor_speed : float or array
-        Speed of the motor shaft [rad/s].
+        w [rad/s].
     back_emf_constant : float or array
         k_b, positive [V s/rad].
 
@@ -76,11 +76,11 @@ def armature_current_rate(
     Parameters
     ----------
     armature_voltage : float or array
-        v_a at the motor's terminals [V].
+        v_a [V].
     armature_current : float or array
         i_a [A].
     motor_speed : float or array
-        Speed of the motor shaft [rad/s].
+        w [rad/s].
     armature_resistance : float or array
         R_a, positive [Ω].
     armature_inductance : float or array
@@ -115,9 +115,9 @@ def steady_armature_current(
     Parameters
     ----------
     armature_voltage : float or array
-        v_a at the motor's terminals [V].
+        v_a [V].
     motor_speed : float or array
-        Speed of the motor shaft [rad/s].
+        w [rad/s].
     armature_resistance : float or array
         R_a, positive [Ω].
     back_emf_constant : float or array
@@ -202,7 +202,7 @@ def required_motor_torque(
     motor_acceleration : float or array
         Acceleration of the motor shaft [rad/s²].
     motor_speed : float or array
-        Speed of the motor shaft [rad/s].
+        w [rad/s].
     rotor_inertia : float or array
         J_m, positive [kg m²].
     motor_viscous_friction : float or array

@@ -19,11 +19,11 @@ def feedback_voltage(output_angle: float, feedback_gain: float, feedback_offset:
     Parameters
     ----------
     output_angle : float or array
-        q, from the angle that the servo file calls zero [rad].
+        q [rad].
     feedback_gain : float or array
         p [V/rad].
     feedback_offset : float or array
-        b_o, the voltage at q = 0 [V].
+        b_o [V].
 
     Returns
     -------
@@ -53,7 +53,7 @@ def angle_from_voltage(feedback_voltage: float, feedback_gain: float, feedback_o
     feedback_gain : float or array
         p, not 0 [V/rad].
     feedback_offset : float or array
-        b_o, the voltage at q = 0 [V].
+        b_o [V].
 
     Returns
     -------
@@ -166,7 +166,7 @@ def sensed_voltage(wiper_angle: Real, feedback_gain: Real, feedback_offset: Real
     feedback_gain : float or array
         p [V/rad].
     feedback_offset : float or array
-        b_o, the voltage at q = 0 [V].
+        b_o [V].
     angles, errors : array_like, shape (n,)
         Table of `linearity_error`; a straight line without it [rad, V].
     quantisation : float or array, optional
@@ -198,7 +198,7 @@ def angle_from_sensed_voltage(sensed_voltage: Real, feedback_gain: Real, feedbac
     feedback_gain : float or array
         p, positive [V/rad].
     feedback_offset : float or array
-        b_o, the voltage at q = 0 [V].
+        b_o [V].
     angles, errors : array_like, shape (n,)
         Table of `linearity_error`; a straight line without it [rad, V].
 

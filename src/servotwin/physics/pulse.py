@@ -38,7 +38,7 @@ def effective_voltage(feedback_voltage: float, noise: float, motor_voltage: floa
     Parameters
     ----------
     feedback_voltage : float or array
-        v_o of the potentiometer [V].
+        v_o [V].
     noise : float or array
         Added at this frame [V].
     motor_voltage : float or array
@@ -69,7 +69,7 @@ def error_time(pulse_width: float, one_shot_width: float) -> float:
     pulse_width : float or array
         t_in of the command [s].
     one_shot_width : float or array
-        T_os of the chip's own pulse [s].
+        T_os [s].
 
     Returns
     -------
@@ -92,7 +92,7 @@ def decision_delay(pulse_width: float, one_shot_width: float) -> float:
     pulse_width : float or array
         t_in of the command [s].
     one_shot_width : float or array
-        T_os of the chip's own pulse [s].
+        T_os [s].
 
     Returns
     -------

@@ -18,7 +18,7 @@ def shaft_acceleration(driving_torque: float, speed: float, dry_friction: float,
     dry_friction : float or array
         f, against +q [N m].
     external_torque : float or array
-        τ_ext, positive where it pushes towards −q [N m].
+        τ_ext [N m].
     viscous_friction : float or array
         b at this shaft [N m s/rad].
     inertia : float or array
@@ -54,7 +54,7 @@ def load_torque(acceleration: float, speed: float, dry_friction: float, external
     dry_friction : float or array
         Of the load, against +q [N m].
     external_torque : float or array
-        τ_ext, positive where it pushes towards −q [N m].
+        τ_ext [N m].
     load_viscous_friction : float or array
         B_L [N m s/rad].
     load_inertia : float or array

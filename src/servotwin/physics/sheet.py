@@ -69,13 +69,13 @@ def motor_from_sheet(*, supply_voltage: float, stall_torque: float, no_load_spee
     no_load_speed : float
         ω_0 [rad/s].
     no_load_current : float
-        I_0, running without load [A].
+        I_0 [A].
     stall_current : float, optional
         I_s [A].
     drop_voltage : float
         V_d, assumed 0.4 (0 to 0.4) [V].
     gear_efficiency : float
-        η_g, assumed 0.8 (0.7 to 0.9), used where no stall current is given.
+        η_g, assumed 0.8 (0.7 to 0.9), used where no stall current is given [1].
 
     Raises
     ------
@@ -155,7 +155,7 @@ def sheet_torque_constant(supply_voltage: Real, no_load_speed: Real, no_load_cur
     no_load_current : float or array
         I_0 [A].
     resistance : float or array
-        R [ohm].
+        R [Ω].
     drop_voltage : float or array
         V_d [V].
 
@@ -187,7 +187,7 @@ def sheet_stall_torque(output_torque_constant: Real, stall_current: Real, no_loa
     gear_efficiency : float or array
         η_g [1].
     viscous_share : float or array
-        s, what of the friction at the no-load speed grows with the speed, and is not there at stall [1].
+        s; that friction is not there at stall [1].
 
     Returns
     -------
@@ -211,7 +211,7 @@ def no_load_current_of(supply_voltage: Real, resistance: Real, output_torque_con
     supply_voltage : float or array
         V [V].
     resistance : float or array
-        R [ohm].
+        R [Ω].
     output_torque_constant : float or array
         K_out [N m/A].
     coulomb_torque : float or array
@@ -360,7 +360,7 @@ def stall_current_for(supply_voltage: Real, stall_torque: Real, no_load_speed: R
     drop_voltage : float or array
         V_d [V].
     viscous_share : float or array
-        s, what of the friction at the no-load speed grows with the speed [1].
+        s [1].
 
     Returns
     -------

@@ -194,7 +194,7 @@ def steady_temperatures(power: float, *, winding_to_housing: float, housing_to_a
     Parameters
     ----------
     power : float or array
-        P, heat of the winding [W].
+        P [W].
     winding_to_housing, housing_to_ambient : float or array
         R_wh and R_ha [K/W].
     ambient : float or array
@@ -227,7 +227,7 @@ def two_mass_temperatures(
     time : float or array
         t, since the start [s].
     power : float or array
-        P, heat of the winding; it does not follow the resistance here [W].
+        P; it does not follow the resistance here [W].
     winding_start, housing_start : float or array
         T_w and T_h at t = 0 [K].
     winding_capacity, housing_capacity : float or array
