@@ -198,8 +198,7 @@ def nomenclature() -> str:
     for group, kind in GROUPS.items():
         rows += [(f"`{f.name}`", symbol(f.metadata["symbol"]), unit(si_unit(f.metadata["dimension"])),
                   f"{_formulas(f.metadata['meaning'])} (`{group}`)")
-                 for f in fields(kind) if f.metadata["symbol"] and f.metadata["dimension"] != "word"
-                 and f.name in arguments_of_laws()]
+                 for f in fields(kind) if f.metadata["dimension"] != "word" and f.name in arguments_of_laws()]
     return markdown(("argument", "symbol", "unit", "meaning"), sorted(rows, key=lambda row: row[0].strip("`")))
 
 

@@ -64,6 +64,12 @@ def test_laws_give_its_unit(laws):
             for law, text in texts.items() for unit in units([text]) if unit != wanted[name]} == set()
 
 
+def test_laws_give_its_symbol(laws):
+    assert [f"{law}({name}): {text}" for name, one in ARGUMENTS.items() if "a law names" not in one.meaning
+            for law, text in laws[name].items()
+            if not text.startswith(("As ", "Of ")) and not re.search(rf"(?<!\w){one.symbol}(?!\w)", text)] == []
+
+
 def test_no_law_says_the_meaning_again(laws):
     assert [f"{law}({name})" for name, one in ARGUMENTS.items() for law, text in laws[name].items()
             if one.meaning in text] == []

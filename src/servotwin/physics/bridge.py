@@ -13,7 +13,7 @@ def driving_voltage(source_voltage: float, direction: float, voltage_drop: float
     Parameters
     ----------
     source_voltage : float or array
-        s V_bus while the bridge drives with the sign s; 0 while it brakes or coasts [V].
+        s V_bus [V].
     direction : float or array
         sgn(i): +1 or −1, or 0 where nothing drops [1].
     voltage_drop : float or array
@@ -65,12 +65,12 @@ def bridge_current(source_voltage: float, back_emf: float, voltage_drop: float, 
     Parameters
     ----------
     source_voltage : float or array
-        s V_oc while the bridge drives with the sign s; 0 while it brakes or coasts [V].
+        s V_oc [V].
     back_emf : float or array
         v_b = k_b q̇_m [V].
     voltage_drop : float or array
-        Voltage that has to be overcome before a current flows: V_ce0 + V_br while driving, V_br while braking,
-        V_oc + V_ce0 + V_br through the diodes while coasting [V].
+        D, overcome before a current flows: V_ce0 + V_br while driving, V_br while braking, V_oc + V_ce0 + V_br
+        through the diodes while coasting [V].
     resistance : float or array
         Of the whole circuit: R_a + r_c + R_b while driving, R_a while braking, R_a + R_b while coasting [Ω].
 

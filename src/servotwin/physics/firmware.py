@@ -201,13 +201,13 @@ def duty_for_motor_current(armature_current: float, back_emf: float, resistance:
     Parameters
     ----------
     armature_current : float or array
-        [A]
+        i_a [A].
     back_emf : float or array
-        K_out q̇ [V].
+        v_b = K_out q̇ [V].
     resistance : float or array
         R_a + r_c [Ω].
     bus_voltage : float or array
-        [V]
+        V_bus [V].
 
     Returns
     -------

@@ -12,7 +12,7 @@ def one_shot_width(feedback_voltage: float, one_shot_slope: float, one_shot_offs
     Parameters
     ----------
     feedback_voltage : float or array
-        Voltage of the potentiometer at the one-shot, at the rising edge of the pulse [V].
+        v_o at the one-shot, at the rising edge of the pulse [V].
     one_shot_slope : float or array
         1/s_r [s/V].
     one_shot_offset : float or array
@@ -67,7 +67,7 @@ def error_time(pulse_width: float, one_shot_width: float) -> float:
     Parameters
     ----------
     pulse_width : float or array
-        t_in of the command [s].
+        t_a = t_in of the command [s].
     one_shot_width : float or array
         T_os [s].
 
@@ -90,7 +90,7 @@ def decision_delay(pulse_width: float, one_shot_width: float) -> float:
     Parameters
     ----------
     pulse_width : float or array
-        t_in of the command [s].
+        t_a = t_in of the command [s].
     one_shot_width : float or array
         T_os [s].
 

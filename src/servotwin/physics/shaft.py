@@ -181,7 +181,7 @@ def twist_torque(twist: float, twist_rate: float, stiffness: float, damping: flo
     Parameters
     ----------
     twist : float or array
-        x, by how much the first body is ahead of the second, play apart [rad].
+        x, δ less the play [rad].
     twist_rate : float or array
         δ̇, the speed of the first body less that of the second [rad/s].
     stiffness : float or array
@@ -208,7 +208,7 @@ def stretch_beyond_play(twist: float, half_play: float) -> float:
     Parameters
     ----------
     twist : float or array
-        δ, by how much the first body is ahead of the second [rad].
+        δ [rad].
     half_play : float or array
         b/2, at least 0 [rad].
 

@@ -203,7 +203,7 @@ def sheet_stall_torque(output_torque_constant: Real, stall_current: Real, no_loa
 
 
 def no_load_current_of(supply_voltage: Real, resistance: Real, output_torque_constant: Real, coulomb_torque: Real,
-                       viscous_friction: Real = 0.0, motor_share: Real = 1.0, drop_voltage: Real = 0.0) -> Real:
+                       viscous_friction: Real = 0.0, gear_share: Real = 1.0, drop_voltage: Real = 0.0) -> Real:
     """Return the current of a servo that turns without load, from its parameters.
 
     Parameters
@@ -218,8 +218,8 @@ def no_load_current_of(supply_voltage: Real, resistance: Real, output_torque_con
         τ_c at the output [N m].
     viscous_friction : float or array
         b = N² B_m at the output [N m s/rad].
-    motor_share : float or array
-        1 − μ_m, what the gear leaves of the motor's torque [1].
+    gear_share : float or array
+        1 − μ_m, share of the motor's torque that the gear passes on [1].
     drop_voltage : float or array
         V_d [V].
 
@@ -234,7 +234,7 @@ def no_load_current_of(supply_voltage: Real, resistance: Real, output_torque_con
     0.285
     """
     R, K, b, U = resistance, output_torque_constant, viscous_friction, supply_voltage - drop_voltage
-    return (coulomb_torque + b * U / K) / (motor_share * K + b * R / K)
+    return (coulomb_torque + b * U / K) / (gear_share * K + b * R / K)
 
 
 @overload
