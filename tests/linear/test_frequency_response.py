@@ -80,7 +80,7 @@ def follows_its_transfer_function(name):
     assert gain_errors(st.BoundedServo(servo), [0.1, 0.4, 0.7, 1.0, 2.0, 5.0], math.radians(1.0)) < 1e-4
 
 
-@pytest.mark.parametrize("name", ["hitec-hs-755hb", "gobilda-2000-67"])  # the issue's own, and the fastest
+@pytest.mark.parametrize("name", ["hitec-hs-755hb", "gobilda-2000-67"])  # the paper's servo, and the fastest
 def test_sines_of_one_degree_follow_the_transfer_function(name):
     follows_its_transfer_function(name)
 
