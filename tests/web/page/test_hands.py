@@ -1,5 +1,6 @@
 """What hands do at the page: push, turn, type, choose, and shapes that go on by themselves."""
 
+import math
 import re
 
 import pytest
@@ -21,12 +22,13 @@ def test_a_horn_gives_way_to_the_mouse_and_says_the_force(page):
     page.mouse.move(x - reach, y, steps=8)  # a quarter turn, towards larger angles
     go_on(page, 0.4)
     come_to_rest(page)
-    said = page.locator(".force").inner_text()
-    pushed = angle(page)
-    assert pushed > before + 5.0
-    torque = 1e-3 * float(re.search(r"pushes with ([\d.]+) mN m towards larger", said).group(1))
-    turn = 1.5708 - (pushed - before) / 57.2958  # what the hand is still ahead of the horn [rad]
-    assert torque == pytest.approx(2.0 * turn, abs=0.15)
+    # text and angle of one moment: on a busy machine the text comes a frame after the angle, and the horn swings
+    page.wait_for_function("""(before) => {
+        const said = /pushes with ([\\d.]+) mN m towards larger/.exec(document.querySelector('.force').textContent);
+        const moved = bench.history[0].latest('output_angle') - before;
+        const ahead = Math.PI / 2 - moved; // of the horn, where the hand is [rad]
+        return said && moved > 0.09 && Math.abs(1e-3 * Number(said[1]) - 2.0 * ahead) < 0.15;
+    }""", arg=math.radians(before))
     assert page.locator("svg.servo0 .hand").get_attribute("d").startswith("M")
     page.mouse.up()
     page.wait_for_function("document.querySelector('.force').textContent.startsWith('Turn')")
