@@ -3,7 +3,8 @@
 C libraries and processors differ in the last digits of theirs. Methods and coefficients are those of fdlibm (Sun
 Microsystems, 1993, "Freely distributable LIBM"); `power` sums a logarithm of 64 bits as there. Errors are at most two
 units in the last place (`tests/physics/test_elementary.py`, against 60 digits). A result beyond the range of numbers is
-inf or 0, one without a value nan. In float32 kernels have the functions of C's library instead, arrays have NumPy's.
+inf or 0, one without a value nan. C of floats has the same text with the constants of `IN_FLOATS`, by which π and the
+logarithm of 2 come in parts that floats hold exactly. Lanes in float32 have C's library instead, arrays have NumPy's.
 """
 
 from __future__ import annotations
@@ -15,14 +16,26 @@ _HALF_LN2 = 0.34657359027997264
 _MOST, _LEAST = 709.782712893384, -745.1332191019412  # beyond, exp is inf or 0
 _NOTHING = 5.6e-17  # less than half a unit of 1
 _ROOT_HALF = 0.7071067811865476
-_SUBNORMAL, _NORMAL = 2.2250738585072014e-308, 18014398509481984.0  # the smallest number with all digits; 2^54
+_SUBNORMAL = 2.2250738585072014e-308  # the smallest number with all digits
+_NORMAL, _LIFTED = 18014398509481984.0, 54.0  # 2^54
 _EASY, _TOO_FAR = 1.6e6, 1.7e12  # rad: quarter turns have 20 bits; of more than 40 bits no digit of the sine is known
 _QUARTERS, _PIO4 = 0.6366197723675814, 0.7853981633974483
 _PIO2_1, _PIO2_1T = 1.5707963267341256, 6.077100506506192e-11  # the first 33 bits of π/2, and the rest
 _PIO2_2, _PIO2_2T = 6.077100506303966e-11, 2.0222662487959506e-21
 _PIO2_3, _PIO2_3T = 2.0222662487111665e-21, 8.4784276603689e-32
 _PI, _PI_LOW, _PIO2 = 3.141592653589793, 1.2246467991473532e-16, 1.5707963267948966
+_NEAR, _NEARER = 65536.0, 562949953421312.0  # so many times beyond what is left of an angle more digits of π/2 count
+_PART = 1048576.0  # 2^20: by which a number of quarters of up to 40 bits comes in halves
+_ROUNDING = 6755399441055744.0  # 1.5 · 2^52: added and taken away, it leaves the nearest whole number
 _SPLITTER = 134217729.0  # 2^27 + 1
+_LN15, _LN15_LOW = 0.4054651079932228, 1.1494160890290935e-10  # ln 1.5 in two parts
+IN_FLOATS = {
+    "_LN2_HIGH": 0.693145751953125, "_LN2_LOW": 1.4286068203094e-06, "_MOST": 88.72283172607422,
+    "_LEAST": -103.97207641601562, "_NOTHING": 2.9e-08, "_SUBNORMAL": 1.1754943508222875e-38, "_NORMAL": 33554432.0,
+    "_LIFTED": 25.0, "_EASY": 200.0, "_TOO_FAR": 2.5e4, "_PIO2_1": 1.5707855224609375, "_PIO2_1T": 1.0804333959119e-05,
+    "_PIO2_2": 1.0804273188114e-05, "_PIO2_2T": 6.0771005065062e-11, "_PIO2_3": 6.0770943832722e-11,
+    "_PIO2_3T": 6.1232339957368e-17, "_PI_LOW": -8.7422780003725e-08, "_NEAR": 256.0, "_NEARER": 33554432.0,
+    "_PART": 128.0, "_ROUNDING": 12582912.0, "_SPLITTER": 4097.0, "_LN15": 0.4054718017578125, "_LN15_LOW": -6.6936496481e-06}
 
 
 def scaled(x: float, k: float) -> float:
@@ -61,7 +74,7 @@ def exp(x: float) -> float:
     if -_HALF_LN2 < x < _HALF_LN2:
         k, high, low, r = 0.0, x, 0.0, x
     else:
-        k = (x * _PER_LN2 + 6755399441055744.0) - 6755399441055744.0  # the nearest whole number
+        k = (x * _PER_LN2 + _ROUNDING) - _ROUNDING  # the nearest whole number
         high, low = x - k * _LN2_HIGH, k * _LN2_LOW
         r = high - low
     t = r * r
@@ -86,7 +99,7 @@ def expm1(x: float) -> float:
     if -_HALF_LN2 < x < _HALF_LN2:
         k, c, r = 0.0, 0.0, x
     else:
-        k = (x * _PER_LN2 + 6755399441055744.0) - 6755399441055744.0
+        k = (x * _PER_LN2 + _ROUNDING) - _ROUNDING
         high, low = x - k * _LN2_HIGH, k * _LN2_LOW
         r = high - low
         c = (high - r) - low
@@ -123,7 +136,7 @@ def log(x: float) -> float:
         return -math.inf if x == 0.0 else x if x > 0.0 else math.nan
     lifted = 0.0
     if x < _SUBNORMAL:
-        x, lifted = x * _NORMAL, 54.0
+        x, lifted = x * _NORMAL, _LIFTED
     k = binary_exponent(x)
     return _log_of(k - lifted, scaled(x, -k) - 1.0, 0.0)
 
@@ -213,19 +226,19 @@ def _quarter(x: float) -> tuple[float, float, float]:
     """Return the quarter turn (0 to 3) that is next to x, and what is left of x in two parts."""
     if not abs(x) < _TOO_FAR:
         return 0.0, math.nan, 0.0
-    n = (x * _QUARTERS + 6755399441055744.0) - 6755399441055744.0
+    n = (x * _QUARTERS + _ROUNDING) - _ROUNDING
     turn = n - 4.0 * math.floor(0.25 * n)
     if not abs(x) < _EASY:
         r, low = _far(x, n)
         return turn, r, low
     rest, lost = x - n * _PIO2_1, n * _PIO2_1T
     r = rest - lost
-    if abs(r) * 65536.0 < abs(x):  # next to a quarter: more digits of π/2 count
+    if abs(r) * _NEAR < abs(x):  # next to a quarter: more digits of π/2 count
         before, lost = rest, n * _PIO2_2
         rest = before - lost
         lost = n * _PIO2_2T - ((before - rest) - lost)
         r = rest - lost
-        if abs(r) * 562949953421312.0 < abs(x):
+        if abs(r) * _NEARER < abs(x):
             before, lost = rest, n * _PIO2_3
             rest = before - lost
             lost = n * _PIO2_3T - ((before - rest) - lost)
@@ -235,7 +248,7 @@ def _quarter(x: float) -> tuple[float, float, float]:
 
 def _far(x: float, n: float) -> tuple[float, float]:
     """Return x − n π/2 in two parts, for an n of up to 40 bits: each half of it by each part of π/2 is exact."""
-    above = math.floor(n / 1048576.0) * 1048576.0
+    above = math.floor(n / _PART) * _PART
     below = n - above
     a = (x - above * _PIO2_1) - below * _PIO2_1
     b = a - above * _PIO2_2
@@ -338,7 +351,7 @@ def power(x: float, y: float) -> float:
         return math.nan if not x >= 0.0 or y != y else 0.0 if (x == 0.0) == (y > 0.0) else math.inf
     lifted = 0.0
     if x < _SUBNORMAL:
-        x, lifted = x * _NORMAL, 54.0
+        x, lifted = x * _NORMAL, _LIFTED
     k = binary_exponent(x)
     m = scaled(x, -k)
     if m < 0.8660254037844386:
@@ -354,7 +367,7 @@ def power(x: float, y: float) -> float:
         2.222222222222222e-01 + z * (1.818181818181818e-01 + z * (1.538461538461538e-01 + z * (
             1.333333333333333e-01 + z * 1.176470588235294e-01)))))))
     k -= lifted
-    table_high, table_low = (0.4054651079932228, 1.1494160890290935e-10) if near == 1.5 else (0.0, 0.0)
+    table_high, table_low = (_LN15, _LN15_LOW) if near == 1.5 else (0.0, 0.0)
     parts = (k * _LN2_LOW + table_low) + (2.0 * s_low + cubes)
     leading = k * _LN2_HIGH + table_high
     high = leading + 2.0 * s_high

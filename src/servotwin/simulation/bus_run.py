@@ -35,7 +35,7 @@ from servotwin.models.engine.live import together
 from servotwin.models.engine.live.posts import put_low
 from servotwin.models.engine.live.screen import NEXT, NO_LOW, USED, Looks
 from servotwin.models.engine.log import Row
-from servotwin.models.engine.memory import Memories, Memory, forgotten, resumed
+from servotwin.models.engine.memory import Memories, Memory, forgotten, resumed, time_of
 from servotwin.models.engine.step import COMPLETED, DIVERGED
 from servotwin.models.state.modes import Mode
 from servotwin.models.state.records import TILE, numbers_in, object_of, put_fields, record_of, room, rows_of
@@ -431,7 +431,7 @@ class BusSteps:
         found = []
         for plan, state, memory in zip(plans, states, way.memories, strict=True):
             if plan.digital:
-                controller.pause(plan.inputs, memory)
+                controller.pause(plan.inputs, controller.of(memory), time_of(memory))
                 memory = memory._replace(firm=(control.frozen(memory.firm[0]),))
             found.append(State(until, state.places, memory, plan.numbers, state.changes))
         return found

@@ -36,16 +36,20 @@ def next_due(firmware: Firmware, firm: Any, frames: int) -> float:
     return min(tick, change)
 
 
-def serve(numbers: Numbers, inputs: Inputs, memory: Memory) -> None:
-    """Do all that is due now; what the program remembers changes in place."""
-    firmware, firm, point = inputs.firmware[0], of(memory), memory.point
-    latest = point.time + SAME * firmware.T_c
-    apply(firmware, firm, memory.frames, latest)
-    if not is_due(firmware, firm, memory.frames, latest):
+def serve(numbers: Numbers, inputs: Inputs, firm: Any, frames: int, time: float, y: Vector, wiper: float,
+          origin: float) -> None:
+    """Do all that is due at a time [s] after so many frames, which began at `origin` [s since the start].
+
+    What the program remembers changes in place.
+    """
+    firmware = inputs.firmware[0]
+    latest = time + SAME * firmware.T_c
+    apply(firmware, firm, frames, latest)
+    if not is_due(firmware, firm, frames, latest):
         return
-    sensed = sensed_by(numbers, firm, point.y) if control.senses(firmware) else NOTHING_SENSED
-    work(inputs, numbers.sensor, firm, point.y.q, point.wiper, sensed, origin_of(memory) + point.time)
-    apply(firmware, firm, memory.frames, latest)
+    sensed = sensed_by(numbers, firm, y) if control.senses(firmware) else NOTHING_SENSED
+    work(inputs, numbers.sensor, firm, y.q, wiper, sensed, origin + time)
+    apply(firmware, firm, frames, latest)
 
 
 def work(inputs: Inputs, sensor: Sensor, firm: Any, q: float, wiper: float, sensed: Sensed, now: float) -> None:
@@ -197,9 +201,9 @@ def resume(inputs: Inputs, memory: Memory) -> None:
         firm.frame = next_frame(inputs, memory, memory.point.time - SAME * firmware.T_c)
 
 
-def pause(inputs: Inputs, memory: Memory) -> None:
+def pause(inputs: Inputs, firm: Any, time: float) -> None:
     """Let what is on its way stay what it is, whatever is commanded from now on: risen pulses, written goals."""
-    firm, time, firmware = of(memory), origin_of(memory) + memory.point.time, inputs.firmware[0]
+    firmware = inputs.firmware[0]
     slack = SAME * firmware.T_c
     if firmware.goals > 0.0:
         first = firmware.t_phi + firm.tick * firmware.T_c - firmware.latency

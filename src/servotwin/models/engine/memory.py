@@ -15,7 +15,7 @@ from servotwin.models.state.records import record_reader, record_writer
 from servotwin.models.terms import control, firmware, frame
 from servotwin.models.terms.control import Firm, Programs
 from servotwin.models.terms.firmware import Firmware
-from servotwin.models.terms.frame import Decision, Frame
+from servotwin.models.terms.frame import Frame
 from servotwin.physics.pieces import Piece
 
 if TYPE_CHECKING:
@@ -217,16 +217,10 @@ def counted_anew(memory: Memory) -> Memory:
 
 def shifted(memory: Memory, frames: int, beat: float, shift: float) -> Memory:
     """Return a memory whose times count from an instant that is later by `shift` [s]."""
-    p, c = memory.point, memory.chip
+    p = memory.point
     point = p._replace(time=p.time - shift, anchor_time=p.anchor_time - shift)
-    chip = Frame(c.number, c.draws, c.drive, c.drive_end - shift, c.clock - shift, c.silent, c.error,
-                 _later(c.pending, shift), _later(c.later, shift))
-    return memory._replace(frames=frames, beat=beat, point=point, chip=chip, u_end=memory.u_end - shift,
-                           tau_end=memory.tau_end - shift)
-
-
-def _later(decision: Decision, shift: float) -> Decision:
-    return Decision(decision.time - shift, decision.sign, decision.duration, decision.error)
+    return memory._replace(frames=frames, beat=beat, point=point, chip=frame.shifted(memory.chip, shift),
+                           u_end=memory.u_end - shift, tau_end=memory.tau_end - shift)
 
 
 def forgotten(memory: Memory) -> Memory:

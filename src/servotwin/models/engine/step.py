@@ -8,6 +8,7 @@ nor on how a run is split.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from servotwin.models.engine import controller
 from servotwin.models.engine.dynamics import currents, guards
@@ -26,6 +27,12 @@ from servotwin.models.terms.motor import inductive
 from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.models.terms.sensor import sensed_voltage, wiper_at
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
 
 MOST_IDLE = 200  # events without time advancing
 _MOST_OSCILLATIONS = 1e7  # within one motion
@@ -50,7 +57,7 @@ def step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, m: Motion
     if firmware.present(inputs.firmware[0]):
         program = firm[0]
         before = program.duty
-        controller.serve(numbers, inputs, memory)
+        controller.serve(numbers, inputs, program, frames, t, point.y, point.wiper, origin)
         u_end = controller.next_due(inputs.firmware[0], program, frames)
         numbers = duty.at_duty(numbers, program.duty)
         V = duty.voltage(numbers.source, program.duty)
@@ -63,7 +70,8 @@ def step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, m: Motion
         edge = edge_of(inputs, memory, now.number)
         if edge <= t:
             met = at_pulses(numbers, now.silent) if heeds else numbers
-            now = measured(met, chip, inputs, now, point, pulse_width(inputs, memory))
+            width = pulse_width(inputs, memory)
+            now = measured(met, chip, inputs.curve, inputs.seed, now, t, point.y, point.wiper, width)
             if now.number == frame.CROWDED:
                 return memory, m, -1, CROWDED
             edge = edge_of(inputs, memory, now.number)
@@ -191,8 +199,8 @@ def circuit(numbers: Numbers, u: float, y: Vector) -> tuple[float, float, float]
     return i, bridge.terminal_voltage(numbers.bridge, numbers.source, numbers.motor, u, w, i, V_bus), V_bus
 
 
-def measured(numbers: Numbers, chip: Chip, inputs: Inputs, now: Frame, point: Point, t_in: float) -> Frame:
-    """Return the frame state after the edge of a pulse of the width t_in that meets the servo at a point."""
-    _, v_m, V_bus = circuit(numbers, now.drive * numbers.source.V, point.y)
-    v_o = sensed_voltage(numbers.sensor, inputs.curve, point.wiper)
-    return frame.edge(chip, now, point.time, t_in, v_o, v_m, V_bus, inputs.seed)
+def measured(numbers: Numbers, chip: Chip, curve: Sequence[Sequence[float]] | NDArray[np.float64], seed: int,
+             now: Frame, time: float, y: Vector, wiper: float, t_in: float) -> Frame:
+    """Return the frame state after the edge of a pulse of the width t_in that meets the servo in a state."""
+    _, v_m, V_bus = circuit(numbers, now.drive * numbers.source.V, y)
+    return frame.edge(chip, now, time, t_in, sensed_voltage(numbers.sensor, curve, wiper), v_m, V_bus, seed)

@@ -174,6 +174,16 @@ def numbered(frame: Frame, number: int, silent: int) -> Frame:
                  frame.later)
 
 
+def shifted(frame: Frame, shift: float) -> Frame:
+    """Return the frame state by times that count from an instant that is later by `shift` [s]."""
+    return Frame(frame.number, frame.draws, frame.drive, frame.drive_end - shift, frame.clock - shift, frame.silent,
+                 frame.error, _later(frame.pending, shift), _later(frame.later, shift))
+
+
+def _later(decision: Decision, shift: float) -> Decision:
+    return Decision(decision.time - shift, decision.sign, decision.duration, decision.error)
+
+
 def next_switch(frame: Frame, heeds_silence: bool) -> float:
     """Return when the bridge switches next, edges apart; `heeds_silence` where it does so as pulses stay away."""
     if frame.drive != 0.0:

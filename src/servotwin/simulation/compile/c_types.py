@@ -45,7 +45,7 @@ PRIMITIVES = {
     "fma": Primitive("FMA{s}({0}, {1}, {2})"), "two_power": Primitive("two_power{s}({0})"),
     "binary_exponent": Primitive("binary_exponent{s}({0})"), "scaled": Primitive("scaled({0}, {1})"),
     "nearest": Primitive("NEAREST{s}({0})"),
-    "floor": Primitive("FLOOR{s}({0})"),
+    "floor": Primitive("FLOOR{s}({0})"), "anew": Primitive("ANEW({0})"),
     "words": Primitive("words({0}, {1})", Array(INT64, 1)),
     "numbers": Primitive("numbers({0}, {1})", Array(FLOAT64, 1)),
     "rows": Primitive("rows({0}, {1}, {2})", Array(FLOAT64, 2)),
@@ -77,7 +77,7 @@ _TAKEN = frozenset(
     "long main register restrict return short signed sizeof static struct switch true typedef union unsigned void "
     "volatile while int8_t int32_t int64_t uint32_t uint64_t size_t intptr_t INT64_C UINT64_C INT64_MIN INT64_MAX NAN "
     "INFINITY NULL EXPORTED SMALL INLINED ASIDE PACKED FMA FMAf NEAREST NEARESTf FLOOR FLOORf CEIL CEILf AS_TEXT "
-    "PRAGMA SUM_IN_ANY_ORDER CHECKED_SIZE TOLD told_1 told_2 told_3 told_4 told_5 told_6 told_7 floor_div floor_mod "
+    "PRAGMA ANEW SUM_IN_ANY_ORDER CHECKED_SIZE TOLD told_1 told_2 told_3 told_4 told_5 told_6 told_7 floor_div floor_mod "
     "mod_float floor_div_float whole_power moved_left moved_right whole clamped words numbers rows bytes_at halves "
     "copied activate active active_word float_of word_of two_power two_powerf binary_exponent binary_exponentf scaled "
     "isfinite isnan isinf floor fabs fabsf llabs memcpy memmove".split()) | {

@@ -37,8 +37,8 @@ class Recipe:
     by_numbers : bool
         Whether C calls the entries with their whole numbers, instead of with words.
     in_floats : bool
-        Whether the text made of it will be C of floats throughout: what is compared with rounding is that of
-        `IN_FLOATS` of its module, and exponentials and angles are those of C's library.
+        Whether the text made of it will be C of floats throughout: what is compared with rounding, and what
+        exponentials and angles are made of, are those of `IN_FLOATS` of its module.
     parts : tuple of Recipe
         Of functions that are derived by recipes of their own, with all that they call: wherever one is called, what
         that recipe says is so.
@@ -76,7 +76,7 @@ class Recipe:
 
 _FUNCTIONS = re.compile(rf"\b({'|'.join((*MATH, 'fabs', 'floor', 'ceil', 'rint'))})\(")
 _LITERALS = re.compile(r"(?<![\w.])(\d+\.\d*(?:e[+-]?\d+)?|\d+e[+-]?\d+)(?![\w.])")
-_OWN = re.compile(r"\b(two_power|binary_exponent)f\b")
+_OWN = re.compile(r"\b(two_power|binary_exponent|scaled)f\b")
 
 
 def in_floats(text: str) -> str:

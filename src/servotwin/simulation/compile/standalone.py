@@ -25,6 +25,7 @@ _ONCE = frozenset({  # called at one place, with structs of a kilobyte that woul
     "run_alone__advance", "run_run__run", "run_run__from_step_to_step", "engine_memory__resumed",
     "engine_step__step", "engine_step__onward", "engine_step__follow", "motions_choice__begin",
     "motions_motion__nothing", "motions_motion__closed"})
+_WHOLE, _INCLUDE = re.compile(r"\bint64_t\b(?! seed\b)"), re.compile(r"^#include .*\n", re.MULTILINE)
 _SIZES = re.compile(r"\nCHECKED_SIZE\(.*?\);")
 
 
@@ -45,6 +46,7 @@ class Standalone:
         for name, kind in public.items():
             self.types.call(kind, name)
         self._public = len(self.types.structs)
+        self._results: dict[str, Kind | None] = {}
 
     @property
     def types(self) -> Types:
@@ -61,8 +63,16 @@ class Standalone:
         """
         derived = derive(recipe)
         module = Module(derived)
-        return {entry: self._printer.name_of(module.specialised(derived.entries[entry], tuple(kinds)))
-                for entry, kinds in signatures.items()}
+        names = {}
+        for entry, kinds in signatures.items():
+            function = module.specialised(derived.entries[entry], tuple(kinds))
+            names[entry] = self._printer.name_of(function)
+            self._results[entry] = function.result
+        return names
+
+    def result_of(self, entry: str) -> str:
+        """Return the type in C of what an entry returns."""
+        return self.types.of(self._results[entry])
 
     @property
     def public(self) -> list[str]:
@@ -72,6 +82,16 @@ class Standalone:
     def typed(self, text: str) -> str:
         """Return C of doubles as C of what numbers are here."""
         return in_floats(text) if self._floats else text
+
+    @property
+    def narrow(self) -> str:
+        """The same as `private` with whole numbers of 32 bits, but for seeds and what draws noise by them; no header."""
+        types, functions = self.types, self._printer.functions
+        for part in (types.structs, types.tables, types.helpers):
+            part[:] = [_WHOLE.sub("int32_t", _SIZES.sub("", each)) for each in part]
+        functions[:] = [each if "state_noise__" in each.split("(")[0] else _WHOLE.sub("int32_t", each)
+                        for each in functions]
+        return _INCLUDE.sub("", self.private)
 
     @property
     def private(self) -> str:

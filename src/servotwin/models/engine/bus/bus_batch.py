@@ -40,6 +40,7 @@ from servotwin.models.engine.memory import (
     resumed,
     silent_now,
     since,
+    time_of,
 )
 from servotwin.models.engine.observe import observed, on_bus, told_by
 from servotwin.models.engine.run.lowest import asked
@@ -101,7 +102,7 @@ def _go_on(told: Told, buses: Buses, k: int, count: int, duration: float, until:
         seat = seats[n]
         memory, j = bus_unit.memory_in(seat, firms), seat.place
         if paused:
-            controller.pause(inputs_at(told, seat), memory)
+            controller.pause(inputs_at(told, seat), controller.of(memory), time_of(memory))
         put_memory(buses.memories.rows[j], memory)
         buses.joined[j], buses.ended[j] = seat.joined, when
         if status != COMPLETED and status != event_queue.PAUSED:

@@ -15,7 +15,7 @@ from servotwin.models.engine.live import stretch, together
 from servotwin.models.engine.live.posts import Told
 from servotwin.models.engine.live.screen import NEXT, NO_LOW, USED, Looks, Screen, first_look
 from servotwin.models.engine.log import Log
-from servotwin.models.engine.memory import Memories, memory_at, put_memory, resumed
+from servotwin.models.engine.memory import Memories, memory_at, put_memory, resumed, time_of
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.state.noise import drawn
 from servotwin.models.terms import duty
@@ -141,7 +141,7 @@ def advance_together(posts: Any, told: Told, programs: Any, memories: Memories, 
         for n in range(len(posts)):
             memory = bus_unit.memory_in(seats[n], memories.firms)
             if duty.present(posts[n].numbers.bridge):
-                controller.pause(inputs_at(ToldAll(lanes, tables), seats[n]), memory)
+                controller.pause(inputs_at(ToldAll(lanes, tables), seats[n]), controller.of(memory), time_of(memory))
             put_memory(memories.rows[n], memory)
         if status == COMPLETED:
             now.time = end

@@ -168,7 +168,7 @@ def from_step_to_step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memo
             if has_rows(log.counts[KEEPS]) and held != 0:
                 write_event(log, time_of(memory), crossings.HELD, memory.point.y.q)
     if firmware.present(inputs.firmware[0]):
-        controller.pause(inputs, memory)
+        controller.pause(inputs, controller.of(memory), time_of(memory))
     return memory, COMPLETED
 
 

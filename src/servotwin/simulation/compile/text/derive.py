@@ -239,7 +239,7 @@ class Rewriting(ast.NodeTransformer):
             in_double, recipe = self._module in DOUBLE, self._work.recipe
             if recipe.vector and name in _REPLACED and not in_double:
                 return self._of_vectors(name, node)
-            if (recipe.in_floats or (recipe.single and not in_double)) and name not in _PRIMITIVE:
+            if recipe.single and not in_double and name not in _PRIMITIVE:
                 return ast.parse(f"math.{_OF_C.get(name, name)}", mode="eval").body
         return ast.copy_location(ast.Name(self._work.value(*_home(self._module, name, value)), node.ctx), node)
 
@@ -496,7 +496,7 @@ class Derivation:
             flat = flat_name(value.__module__, value.__name__)
             self.imports[flat] = (value.__module__, value.__name__)
         elif name == "SINGLE":
-            self.constants[flat] = repr(self.recipe.single)
+            self.constants[flat] = repr(self.recipe.single or self.recipe.in_floats)
         elif self.recipe.excluded.issuperset(getattr(import_module(module), "ONLY_FOR", {}).get(name, ("",))):
             flat += self.part  # where all is known it may be needed
             self.constants[flat] = "()"

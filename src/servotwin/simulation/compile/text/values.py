@@ -335,6 +335,8 @@ class Values:
         self.writes = self.writes or function.writes
         if function.result is not None:
             return function.result
+        if len(kinds) == 1 and isinstance(kinds[0], Record):
+            return kinds[0]
         return None if name in c_types.VOID else self._widest(kinds)
 
     def _widest(self, kinds: Sequence[Kind | None]) -> Kind:

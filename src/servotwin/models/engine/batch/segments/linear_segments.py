@@ -98,6 +98,13 @@ def loading(inertia: float, pull: float, hold_forward: float, hold_backward: flo
         starting(hold_forward, hold_backward, -pull - torque), starting(hold_forward, hold_backward, -torque))
 
 
+def under(numbers: ArcNumbers, torque: float) -> ArcNumbers:
+    """Return the same under another constant external torque [N m]."""
+    load = loading(numbers.inertia, numbers.pull, numbers.hold_forward, numbers.hold_backward, torque)
+    return numbers._replace(against=load.against, start_forward=load.start_forward,
+                            start_backward=load.start_backward, start_off=load.start_off)
+
+
 def _torque(numbers: Numbers, voltage: float, R: float) -> float:
     """Return the motor's torque [N m] by a voltage [V] at a standstill, in a circuit of R [Ω]."""
     i = motor.steady_armature_current(voltage, 0.0, R, numbers.motor.K_b)

@@ -1,0 +1,125 @@
+"""One lane by itself from call to call, by legs: analog servos from pulse to pulse, digital ones from tick to tick.
+
+Between two switches of its bridge a servo moves by legs, or by arcs where it has neither play nor friction by torque.
+No motion is kept, so a lane is a handful of numbers. Times count from the latest edge or tick, and whole ones are
+counted, so that floats have digits for them however long a servo runs.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from servotwin.models.engine import controller
+from servotwin.models.engine.batch.segments import linear_segments
+from servotwin.models.engine.batch.segments.linear_segments import ArcNumbers
+from servotwin.models.engine.lanes import chip_at, numbers_at
+from servotwin.models.engine.legs import legs
+from servotwin.models.engine.memory import SAME, Inputs
+from servotwin.models.engine.motions.elementary import anew
+from servotwin.models.engine.step import COMPLETED, CROWDED, DIVERGED, at_pulses, measured
+from servotwin.models.state.modes import Vector, one_body
+from servotwin.models.state.records import reader
+from servotwin.models.terms import bridge, duty, frame
+from servotwin.models.terms.frame import Frame
+from servotwin.models.terms.sensor import wiper_at
+
+if TYPE_CHECKING:
+    from servotwin.models.engine.lanes import Floats
+
+BY_ARCS, BY_LEGS = range(2)
+arc_at = reader("arc_at", ArcNumbers)
+LEFT = -1  # by arcs, which end where a stop is met: the lane is left to legs
+
+
+class Stand(NamedTuple):
+    """Where a servo stands between two calls."""
+
+    y: Vector
+    mesh: int
+    wiper: float  # angle of the potentiometer, which may lag behind the shaft
+    frames: int  # frames of pulses, or ticks, that are over
+    time: float  # since the latest edge or tick [s]
+
+
+class Gone(NamedTuple):
+    """Where a servo stands after a call, what its chip remembers, and a status."""
+
+    stand: Stand
+    chip: Frame
+    status: int
+
+
+def pulses(by: int, numbers: Any, arcs: Any, chips: Any, j: int, curve: Floats, seed: int, width: float, torque: float,
+           stand: Stand, now: Frame, duration: float) -> Gone:
+    """Advance an analog servo by a time [s] under pulses of one width [s] and an external torque [N m].
+
+    Its numbers, those of its arcs and its chip are lane `j` of tiles, and are read where they are needed. A servo that
+    needs more legs than `legs.MOST_LEGS` has `DIVERGED`.
+    """
+    y, mesh, wiper, frames, t = stand
+    T_f, status = chips.frame_period[j], COMPLETED
+    left, rest = whole(t + duration, T_f)
+    while status == COMPLETED and (left > 0 or t < rest):
+        heeds = by == BY_LEGS and bridge.heeds_silence(numbers_at(anew(numbers), j).bridge)
+        if frame.next_switch(now, heeds) <= t:
+            now = frame.switched(now, t)
+        if now.number <= frames:
+            met = numbers_at(anew(numbers), j)
+            met = at_pulses(met, now.silent) if heeds else met
+            now = measured(met, chip_at(anew(chips), j), curve, seed, now, t, y, wiper, width)
+        end = min(frame.next_switch(now, heeds), T_f if left > 0 else rest)
+        if by == BY_ARCS:
+            arc = linear_segments.under(arc_at(anew(arcs), j), torque)
+            q, w, turned, done = linear_segments.slide(arc, now.drive, y.q, y.w, end - t)
+            sensor = numbers_at(anew(numbers), j).sensor
+            y, wiper = one_body(q, w, y), wiper_at(sensor, wiper_at(sensor, wiper, turned), q)
+            status = COMPLETED if done > 0.0 else LEFT
+        else:
+            own = numbers_at(anew(numbers), j)
+            own, u = at_pulses(own, now.silent) if heeds else own, now.drive * own.source.V
+            gone = legs.go(own, torque, u, y, legs.mode_from(own, torque, u, y, mesh), wiper, end - t)
+            y, mesh, wiper = gone.y, gone.mode.mesh, gone.wiper
+            status = COMPLETED if gone.done > 0.0 else DIVERGED
+        if now.number == frame.CROWDED:
+            status = CROWDED
+        t = end
+        if left > 0 and t >= T_f:
+            left, frames, t, now = left - 1, frames + 1, 0.0, frame.shifted(now, T_f)
+    return Gone(Stand(y, mesh, wiper, frames, t), now, status)
+
+
+def ticks(numbers: Any, j: int, inputs: Inputs, firm: Any, stand: Stand, duration: float) -> tuple[Stand, int]:
+    """Advance a digital servo by a time [s]; what its program remembers changes in place.
+
+    Its numbers are lane `j` of a tile. All times of a program that takes goals count from the beginning of the call.
+    """
+    y, mesh, wiper, before, t = stand
+    firmware = inputs.firmware[0]
+    T_c, first, torque = firmware.T_c, 0 if firmware.goals > 0.0 else before, inputs.constant_torque
+    left, rest = whole(t + duration, T_c)
+    frames, status = first, COMPLETED
+    firm.hears = -math.inf  # the command may be another one
+    while status == COMPLETED and (left > 0 or t < rest):
+        own = numbers_at(anew(numbers), j)
+        controller.serve(own, inputs, firm, frames, t, y, wiper, frames * T_c)
+        end = min(controller.next_due(firmware, firm, frames), T_c if left > 0 else rest)
+        own = duty.at_duty(own, firm.duty)
+        u = duty.voltage(own.source, firm.duty)
+        gone = legs.go(own, torque, u, y, legs.mode_from(own, torque, u, y, mesh), wiper, end - t)
+        y, mesh, wiper, t = gone.y, gone.mode.mesh, gone.wiper, end
+        status = COMPLETED if gone.done > 0.0 else DIVERGED
+        if left > 0 and t >= T_c:
+            left, frames, t = left - 1, frames + 1, 0.0
+    passed = frames * T_c
+    controller.pause(inputs, firm, passed + t)
+    if firmware.goals > 0.0:
+        firm.tick, firm.heard, firm.hears = firm.tick - frames, firm.heard - passed, firm.hears - passed
+    return Stand(y, mesh, wiper, before + frames - first, t), status
+
+
+def whole(time: float, period: float) -> tuple[int, float]:
+    """Return how many periods end within a time [s] from the beginning of one, and what is left of it after them."""
+    left = math.floor(time / period + SAME)
+    rest = time - left * period
+    return left, rest if rest > SAME * period else 0.0
