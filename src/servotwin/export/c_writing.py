@@ -18,7 +18,6 @@ import numpy as np
 from servotwin import __version__
 from servotwin.errors import OutputError, OutputExistsError
 from servotwin.models import AveragedServo, AveragedServoInductive, BoundedServo, DigitalServo
-from servotwin.models.engine.demands import demanded
 from servotwin.models.engine.events.crossings import NAMES
 from servotwin.models.engine.log import COUNTS, EVENTS, LEFT, Happened, Log, Row
 from servotwin.models.engine.memory import BEAT, Inputs, Lowest, Memories, Memory, Point
@@ -29,35 +28,27 @@ from servotwin.models.state.records import numbers_in, record_of
 from servotwin.models.terms import wiring
 from servotwin.models.terms.control import Firm
 from servotwin.models.terms.dependence import (
-    AT_COMMANDS,
-    AT_STOPS,
-    BEYOND,
     BY_SHARE,
     CURVED_Q,
     DROPS,
-    DRY,
     FADING,
     ON_HEAT,
     ON_I,
-    ONE_WAY,
     PLAY,
     PROGRAM,
     PULSES,
     PWM,
     REGULATED,
-    SHOWN,
     SLACK,
     SPRING,
     STEEP_W,
     STEPS,
-    STRAIGHT,
     TABLE,
 )
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
-from servotwin.models.terms.firmware import present as programmed
 from servotwin.models.terms.frame import NO_CHIP, Chip, Decision, Frame
 from servotwin.models.terms.given import Given, Hung, hung_of
-from servotwin.models.terms.numbers import ACTS, NOTHING, Numbers
+from servotwin.models.terms.numbers import NOTHING, Numbers
 from servotwin.models.terms.sensor import table_of
 from servotwin.models.terms.wiring import Wiring
 from servotwin.physics.pieces import Piece
@@ -66,6 +57,7 @@ from servotwin.simulation.compile.c_types import identifier
 from servotwin.simulation.compile.signatures import named
 from servotwin.simulation.compile.standalone import Standalone
 from servotwin.simulation.compile.text.kinds import FLOAT64, INT64, Array, Kind, Record, Tuple
+from servotwin.simulation.lanes.forms import APART, Terms
 from servotwin.text import c_comment
 
 if TYPE_CHECKING:
@@ -318,22 +310,6 @@ $passing    } while (status == 0 && left > longest);
 # --- The kernels that the code of a servo needs -----------------------------------------------------------------------
 
 ENTRIES = ("start", "advance", "answer", "observe")
-APART = ("heat.T_amb",)  # stands apart too, for where nothing gets warm
-_ALWAYS = STRAIGHT | DRY | AT_STOPS | SHOWN
-
-
-def features_of(numbers: Numbers, chip: Chip, program: Firmware, table: bool) -> int:
-    """Return all that a servo asks of the code that follows it: flags of `terms.dependence`."""
-    flags = _ALWAYS | demanded(numbers, chip, program, Piece()) | (TABLE if table else 0)
-    if programmed(program):
-        flags |= BEYOND | AT_COMMANDS | ONE_WAY
-    rooms = numbers._asdict() | {"chip": chip, "firmware": program}
-    for path, acts in ACTS.items():
-        room, *fields = path.split(".")
-        if path not in APART and room in rooms and not acts & flags and reduce(getattr, fields, rooms[room]) != reduce(
-                getattr, fields, NOTHING[room]):
-            flags |= acts
-    return flags
 
 
 def recipe_of(flags: int) -> Recipe:
@@ -614,8 +590,8 @@ def signals_of_model(model: Any, load: Load) -> list[tuple[str, str, str]]:
 
 def features_of_model(model: Any, load: Load) -> int:
     """Return what the code of a servo has to follow: flags of `terms.dependence`."""
-    return features_of(model.pack(load), model.chip() or NO_CHIP, model.firmware() or NO_FIRMWARE,
-                       len(table_of(model.curve())) > 0)
+    table = TABLE if len(table_of(model.curve())) > 0 else 0
+    return Terms(model.pack(load), model.chip() or NO_CHIP, model.firmware() or NO_FIRMWARE, inputs=table).followed
 
 
 def wiring_of(model: Any) -> Wiring:

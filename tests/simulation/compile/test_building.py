@@ -22,7 +22,7 @@ RECIPE = Recipe("noise", ("servotwin.models.state.noise:gaussian",))
 SCRIPT = """
 import sys
 from servotwin.simulation.compile import Recipe, backend, building, kernels
-building._LONGEST = float(sys.argv[1])
+building.LONGEST = float(sys.argv[1])
 kernel = kernels(Recipe("noise", ("servotwin.models.state.noise:gaussian",)))
 print(kernel.gaussian(3, 7), "plain" if backend.is_plain() else "compiled")
 """
@@ -184,7 +184,7 @@ def here(folder, monkeypatch):
     monkeypatch.setenv("SERVOTWIN_CACHE_DIR", str(folder))
     for module in (building, finding):
         monkeypatch.setattr(module, "compilers", lambda: tuple(filter(None, [finding._program("cc")])))
-    building._tell.cache_clear()
+    building.tell.cache_clear()
     return folder
 
 

@@ -31,7 +31,7 @@ from servotwin.simulation.compile.storage import is_there, key_of, writable_fold
 from servotwin.simulation.compile.text.derive import derive
 from servotwin.simulation.compile.text.translate import Translation, translated
 
-_LONGEST = 600.0  # s that a compiler may take
+LONGEST = 600.0  # s that a compiler may take
 
 
 def made(recipe: Recipe, useless: set[Path]) -> Iterator[Built]:
@@ -58,9 +58,9 @@ def _made(recipe: Recipe, folder: Path, useless: set[Path]) -> Built | None:
     for compiler in compilers():
         path = folder / library_name(recipe, text, compiler)
         try:
-            with _alone(path):
+            with alone(path):
                 there = path not in useless and is_there(path)
-                problem = None if there else _compiled(recipe, translation.text, compiler, path)
+                problem = None if there else compiled(recipe, translation.text, compiler, path)
             if problem is None:
                 write(folder / index_name(recipe), json.dumps(said))
                 return Built(path, functions_of(said))
@@ -75,18 +75,18 @@ def printed(recipe: Recipe) -> Translation:
     return translated(derive(recipe), signatures(recipe))
 
 
-def _compiled(recipe: Recipe, text: str, compiler: Compiler, path: Path) -> str | None:
+def compiled(recipe: Recipe, text: str, compiler: Compiler, path: Path) -> str | None:
     """Compile a text aside, and put the library in its place; return what is wrong, if anything."""
-    _tell()
+    tell()
     with tempfile.TemporaryDirectory(prefix=".making-", dir=path.parent, ignore_cleanup_errors=True) as aside:
         source, library = Path(aside) / f"{recipe.name}.c", Path(aside) / f"made{SUFFIX}"
         source.write_text(text, encoding="utf-8")
         said = Path(aside) / "said.txt"
         try:
             command = compiler.library_command(source, library, recipe.vector, level())
-            ended = _run(command, compiler.environment(path.parent), said)
+            ended = run(command, compiler.environment(path.parent), said)
         except subprocess.TimeoutExpired:
-            return f"it took more than {_LONGEST:g} s"
+            return f"it took more than {LONGEST:g} s"
         if ended != 0 or not library.exists():
             all_lines = said.read_text(encoding="utf-8", errors="replace").splitlines()
             lines = [line for line in all_lines if "error" in line] or [line for line in all_lines if line.strip()]
@@ -97,7 +97,7 @@ def _compiled(recipe: Recipe, text: str, compiler: Compiler, path: Path) -> str 
     return None
 
 
-def _run(command: list[str], environment: dict[str, str], said: Path) -> int:
+def run(command: list[str], environment: dict[str, str], said: Path) -> int:
     """Run a compiler in the folder of what it says; those that it has started end with it, by force if need be.
 
     A pipe would be waited for as long as one of them holds it.
@@ -105,7 +105,7 @@ def _run(command: list[str], environment: dict[str, str], said: Path) -> int:
     with said.open("w") as file, subprocess.Popen(command, cwd=said.parent, env=environment, stdin=subprocess.DEVNULL,
                                                   stdout=file, stderr=file, start_new_session=True) as process:
         try:
-            return process.wait(_LONGEST)
+            return process.wait(LONGEST)
         except BaseException:
             with contextlib.suppress(OSError):
                 if sys.platform == "win32":
@@ -116,13 +116,14 @@ def _run(command: list[str], environment: dict[str, str], said: Path) -> int:
 
 
 @cache
-def _tell() -> None:
+def tell() -> None:
+    """Say, once, that something is compiled."""
     sys.stderr.write("servotwin: compiling kernels for this machine, once\n")
     sys.stderr.flush()
 
 
 @contextlib.contextmanager
-def _alone(path: Path) -> Iterator[None]:
+def alone(path: Path) -> Iterator[None]:
     """Hold a lock, which the operating system takes away from a process that ends; without locks, continue without."""
     flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
     try:

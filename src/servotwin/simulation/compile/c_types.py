@@ -76,8 +76,8 @@ _TAKEN = frozenset(
     "auto bool break case char const continue default do double else enum extern false float for goto if inline int "
     "long main register restrict return short signed sizeof static struct switch true typedef union unsigned void "
     "volatile while int8_t int32_t int64_t uint32_t uint64_t size_t intptr_t INT64_C UINT64_C INT64_MIN INT64_MAX NAN "
-    "INFINITY NULL EXPORTED SMALL INLINED ASIDE PACKED FMA FMAf NEAREST NEARESTf FLOOR FLOORf CEIL CEILf AS_TEXT "
-    "PRAGMA ANEW SUM_IN_ANY_ORDER CHECKED_SIZE TOLD told_1 told_2 told_3 told_4 told_5 told_6 told_7 floor_div floor_mod "
+    "ANEW INFINITY NULL EXPORTED SMALL INLINED ASIDE PACKED FMA FMAf NEAREST NEARESTf FLOOR FLOORf CEIL CEILf AS_TEXT "
+    "PRAGMA SUM_IN_ANY_ORDER CHECKED_SIZE TOLD told_1 told_2 told_3 told_4 told_5 told_6 told_7 floor_div floor_mod "
     "mod_float floor_div_float whole_power moved_left moved_right whole clamped words numbers rows bytes_at halves "
     "copied activate active active_word float_of word_of two_power two_powerf binary_exponent binary_exponentf scaled "
     "isfinite isnan isinf floor fabs fabsf llabs memcpy memmove".split()) | {

@@ -85,7 +85,7 @@ class Standalone:
 
     @property
     def narrow(self) -> str:
-        """The same as `private` with whole numbers of 32 bits, but for seeds and what draws noise by them; no header."""
+        """The same as `private`, without headers; whole numbers have 32 bits, but for seeds and what draws by them."""
         types, functions = self.types, self._printer.functions
         for part in (types.structs, types.tables, types.helpers):
             part[:] = [_WHOLE.sub("int32_t", _SIZES.sub("", each)) for each in part]

@@ -8,17 +8,22 @@ and nothing else. Numbers have 64 bits, or 32 throughout; whole numbers have 32,
 from __future__ import annotations
 
 import ctypes
+import os
 import re
-from collections.abc import Iterator
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from string import Template
 from typing import Any
 
 import numpy as np
 
+from servotwin.errors import InputError
+from servotwin.models.engine.batch.one_lane import Stand
 from servotwin.models.engine.batch.segments.linear_segments import ArcNumbers
-from servotwin.models.engine.legs.lane_legs import Stand
 from servotwin.models.engine.memory import Inputs
 from servotwin.models.state.records import TILE, fields_of, record_of, rows_of
 from servotwin.models.terms.control import Firm
@@ -26,10 +31,13 @@ from servotwin.models.terms.dependence import PROGRAM, PWM
 from servotwin.models.terms.firmware import Firmware
 from servotwin.models.terms.frame import Chip, Frame
 from servotwin.models.terms.numbers import Numbers
+from servotwin.simulation.compile.building import LONGEST, alone, compiled
 from servotwin.simulation.compile.c_types import identifier
+from servotwin.simulation.compile.finding import SUFFIX, Compiler, compilers, flags, level
 from servotwin.simulation.compile.recipe import Recipe
 from servotwin.simulation.compile.signatures import named
 from servotwin.simulation.compile.standalone import Standalone
+from servotwin.simulation.compile.storage import is_there, key_of, writable_folder
 from servotwin.simulation.compile.text.kinds import FLOAT64, INT64, Array, Kind, Record, Tuple
 from servotwin.simulation.compile.text.translate import part_of_header
 
@@ -63,8 +71,8 @@ def _leaves(path: str, kind: Any) -> Iterator[tuple[str, Any]]:
             yield from ((f"{own}[{k}]", float) for k in range(len(hint.__args__)))
 
 
-_ADDRESSES = ("numbers", "arcs", "chips", "programs", "curve", "seeds", "command", "torque", "reals", "wholes", "status",
-              "left", "count")
+_ADDRESSES = ("numbers", "arcs", "chips", "programs", "curve", "seeds", "command", "torque", "reals", "wholes",
+              "status", "left", "count")
 
 
 @cache
@@ -138,17 +146,36 @@ _TICKS = Template('''    real piece[7] = {0, of->command[lane], 0, 0, 0, 0, 0};
     const $gone gone = $entry(($numbers *)(uintptr_t)of->numbers + tile, j, &told, &firm, &stand, of->duration);
     const int32_t status = (int32_t)gone.f1;
     stand = gone.f0;''')
+_PREPARE = Template('''
+INLINED void prepared(const lane_table *of, int32_t lane) {
+    const int64_t tile = lane / $tile;
+    $prepare(($numbers *)(uintptr_t)of->numbers + tile, ($arcs *)(uintptr_t)of->arcs + tile, lane % $tile);
+}
+#if defined(__NVPTX__)
+void servotwin_prepare(const lane_table of) {
+    const int32_t k = THREAD;
+    if (k < of.lanes)
+        prepared(&of, k);
+}
+#else
+EXPORTED void servotwin_prepare(const lane_table *of, int64_t first, int64_t last) {
+    for (int64_t k = first; k < last; k++)
+        prepared(of, (int32_t)k);
+}
+#endif
+''')
 _AROUND = Template('''
 #if defined(__NVPTX__)
 #define NEXT(count) __nvvm_atom_add_gen_i((count), 1)
+#define THREAD (__nvvm_read_ptx_sreg_ctaid_x() * __nvvm_read_ptx_sreg_ntid_x() + __nvvm_read_ptx_sreg_tid_x())
 #else
 #define NEXT(count) ((*(count))++)
 #endif
 $lane
 #if defined(__NVPTX__)
-/* The grid is that of all lanes, also for those in a list: a captured graph cannot ask how many they are. */
+/* The grid is that of all lanes for those in a list: a captured graph cannot ask how many they are. */
 void servotwin_advance(const lane_table of) {
-    const int32_t k = __nvvm_read_ptx_sreg_ctaid_x() * __nvvm_read_ptx_sreg_ntid_x() + __nvvm_read_ptx_sreg_tid_x();
+    const int32_t k = THREAD;
     if (k < $many)
         one(&of, $kth);
 }
@@ -191,8 +218,8 @@ class LaneText:
     def recipe(self) -> Recipe:
         """The kernels within it."""
         never = "BY_LEGS" if self.way == PULSES_BY_ARCS else "BY_ARCS"
-        entry = "ticks" if self.way == TICKS else "pulses"
-        return Recipe(f"lane_{self.way}", (f"servotwin.models.engine.legs.lane_legs:{entry}",), knows=self.flags,
+        entries = tuple(f"servotwin.models.engine.batch.one_lane:{entry}" for entry in _signatures(self.way))
+        return Recipe(f"lane_{self.way}", entries, knows=self.flags,
                       always=PROGRAM | PWM if self.way == TICKS else 0, never=(never,), in_floats=self.floats)
 
     @property
@@ -208,37 +235,113 @@ def _tile(kind: Any) -> Record:
     return Record(rows_of(kind, np.float64))
 
 
-def _signature(way: str) -> tuple[Kind, ...]:
+def _signatures(way: str) -> dict[str, tuple[Kind, ...]]:
+    """Return what the entries of a text are called with, the one that advances a lane first."""
+    numbers, arcs = _tile(Numbers), _tile(ArcNumbers)
     if way == TICKS:
-        told = {"command": _TABLE_OF, "torque": _TABLE_OF, "edges": _FLOATS, "curve": _TABLE_OF, "seed": INT64,
-                "firmware": Array(Record(record_of(Firmware)), 1)}
+        told: dict[str, Kind] = {"command": _TABLE_OF, "torque": _TABLE_OF, "edges": _FLOATS, "curve": _TABLE_OF,
+                                 "seed": INT64, "firmware": Array(Record(record_of(Firmware)), 1)}
         inputs = Tuple(tuple(told.get(name, FLOAT64) for name in Inputs._fields), "Inputs", Inputs._fields)
-        return _tile(Numbers), INT64, inputs, Record(record_of(Firm)), named(Stand), FLOAT64
-    return (INT64, _tile(Numbers), _tile(ArcNumbers), _tile(Chip), INT64, _TABLE_OF, INT64, FLOAT64, FLOAT64,
-            named(Stand), named(Frame), FLOAT64)
+        return {"ticks": (numbers, INT64, inputs, Record(record_of(Firm)), named(Stand), FLOAT64)}
+    pulses: dict[str, tuple[Kind, ...]] = {"pulses": (
+        INT64, numbers, arcs, _tile(Chip), INT64, _TABLE_OF, INT64, FLOAT64, FLOAT64, named(Stand), named(Frame),
+        FLOAT64)}
+    return pulses | ({"prepare": (numbers, arcs, INT64)} if way == PULSES_BY_ARCS else {})
 
 
 @cache
 def _printed(own: LaneText) -> str:
-    text = Standalone({}, floats=own.floats)
-    entry, kinds = own.recipe.entries[0].split(":")[1], _signature(own.way)
-    name = text.add(own.recipe, {entry: kinds})[entry]
-    types = text.types
-    words = {"tile": TILE, "entry": name, "gone": text.result_of(entry), "by": int(own.way == PULSES_BY_LEGS)}
+    text, signatures = Standalone({}, floats=own.floats), _signatures(own.way)
+    names = text.add(own.recipe, signatures)
+    (entry, kinds), *_ = signatures.items()
+    types, prepare = text.types, ""
+    by_legs = int(own.way == PULSES_BY_LEGS)
+    words = {"tile": TILE, "entry": names[entry], "gone": text.result_of(entry), "by": by_legs,
+             "numbers": types.record(_tile(Numbers))}
     if own.way == TICKS:
-        words |= {"numbers": types.record(kinds[0]), "inputs": types.of(kinds[2]), "program": types.record(
-            Record(record_of(Firmware)))}
-        call, state = _TICKS, f"{types.of(named(Stand))} stand; {types.record(kinds[3])} firm;"
+        words |= {"inputs": types.of(kinds[2]), "program": types.record(Record(record_of(Firmware)))}
+        call, state = _TICKS, f"{types.of(named(Stand))} stand; {types.record(Record(record_of(Firm)))} firm;"
     else:
-        words |= {"numbers": types.record(kinds[1]), "arcs": types.record(kinds[2]), "chips": types.record(kinds[3])}
+        words |= {"arcs": types.record(_tile(ArcNumbers)), "chips": types.record(_tile(Chip))}
         call, state = _PULSES, f"{types.of(named(Stand))} stand; {types.of(named(Frame))} now;"
+    if own.way == PULSES_BY_ARCS:
+        prepare = _PREPARE.substitute(words, prepare=names["prepare"])
     reals, wholes = columns(own.way)
     places = [(path, f"reals[{k} * n]") for k, path in enumerate(reals)] + [
         (path, f"wholes[{k} * n]") for k, path in enumerate(wholes)]
     lane = _LANE.substitute(words, state=state, call=call.substitute(words),
                             loads="\n".join(f"    {path} = {place};" for path, place in places),
                             stores="\n".join(f"    {place} = {path};" for path, place in places))
-    by_list = own.way == PULSES_BY_LEGS
-    many, kth = ("(of.left ? *of.count : of.lanes)", "(of.left ? of.left[k] : k)") if by_list else ("of.lanes", "k")
+    many, kth = ("(of.left ? *of.count : of.lanes)", "(of.left ? of.left[k] : k)") if by_legs else ("of.lanes", "k")
     real = f"typedef {'float' if own.floats else 'double'} real;\n"
-    return "\n".join([part_of_header("device.h"), _EXPORTED, text.narrow, real + _TABLE, _AROUND.substitute(lane=lane, many=many, kth=kth)])
+    around = _AROUND.substitute(lane=lane + prepare, many=many, kth=kth)
+    return "\n".join([part_of_header("device.h"), _EXPORTED, text.narrow, real + _TABLE, around])
+
+
+# --- What is made of a text: a library for this processor, PTX for a GPU ----------------------------------------------
+
+def library(own: LaneText) -> ctypes.CDLL:
+    """Return the library of a text, made by the compiler at hand where the cache has none.
+
+    Raises
+    ------
+    InputError
+        If no compiler makes one.
+    """
+    return ctypes.CDLL(str(_kept(own, SUFFIX, lambda compiler, path: compiled(own.recipe, own.text, compiler, path))))
+
+
+def ptx(own: LaneText) -> str:
+    """Return the PTX of a text, made by clang or zig where the cache has none.
+
+    Raises
+    ------
+    InputError
+        If there is neither, or one without this target.
+    """
+    return _kept(own, ".ptx", lambda compiler, path: _as_ptx(own, compiler, path)).read_text(encoding="utf-8")
+
+
+def _kept(own: LaneText, end: str, make: Callable[[Compiler, Path], str | None]) -> Path:
+    """Return the file that a compiler makes of a text, from the cache where it is there."""
+    folder, problems = writable_folder(), []
+    for compiler in compilers():
+        key = key_of(own.text, compiler.identity, *compiler.command, *flags(False, level()))
+        path = folder / f"{own.recipe.name}-{key}{end}"
+        with alone(path):
+            problem = None if is_there(path) else make(compiler, path)
+        if problem is None:
+            return path
+        problems.append(f"{Path(compiler.command[0]).name}: {problem}")
+    raise InputError("lanes one a thread", "; ".join(problems) or "no C compiler",
+                       "clang or zig for a GPU, any C compiler for this processor")
+
+
+_NVPTX = ("-march=sm_80", "-Xclang", "-target-feature", "-Xclang", "+ptx70")  # Ampere and later, drivers from 2020 on
+_FOR_PTX = ("-std=gnu99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-ffreestanding", "-w")
+
+
+def _as_ptx(own: LaneText, compiler: Compiler, path: Path) -> str | None:
+    """Compile a text to PTX aside, and put that in its place; return what is wrong, if anything.
+
+    C has no word for a kernel, so the calling convention is put into the intermediate text.
+    """
+    zig = "ziglang" in compiler.command
+    target = ("-target", "nvptx64-cuda-none") if zig else ("--target=nvptx64-nvidia-cuda",)
+    with tempfile.TemporaryDirectory(prefix=".making-", dir=path.parent, ignore_cleanup_errors=True) as aside:
+        source, middle, made = (Path(aside) / name for name in ("lanes.c", "lanes.ll", "lanes.ptx"))
+        source.write_text(own.text, encoding="utf-8")
+        for before, after, more in ((source, middle, ("-emit-llvm",)), (middle, made, ())):
+            command = [*compiler.command, *target, *_NVPTX, *_FOR_PTX, "-S", *more, str(before), "-o", str(after)]
+            said = subprocess.run(command, env=compiler.environment(path.parent), capture_output=True, text=True,
+                                  timeout=LONGEST, check=False)
+            if said.returncode != 0 or not after.exists():
+                lines = [line for line in said.stderr.splitlines() if "error" in line]
+                return lines[0].strip() if lines else f"it ended with {said.returncode}"
+            if more:
+                middle.write_text(_KERNEL.sub("define ptx_kernel void @servotwin", middle.read_text()))
+        os.replace(made, path)
+    return None
+
+
+_KERNEL = re.compile(r"define (?:dso_local )?void @servotwin")

@@ -52,7 +52,7 @@ from servotwin.models.terms.dependence import (
 )
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.frame import NO_CHIP, Chip
-from servotwin.models.terms.numbers import NOTHING, ROOMS, Numbers
+from servotwin.models.terms.numbers import ACTS, NOTHING, ROOMS, Numbers
 from servotwin.physics.pieces import Piece
 from servotwin.simulation.compile import Recipe, is_plain
 from servotwin.simulation.compile.text.unread import FROM_TICK_TO_TICK, IN_GENERAL, in_general, unread
@@ -66,6 +66,7 @@ _ENTRIES = tuple(f"servotwin.models.engine.run.runs:{name}" for name in ("start"
                                                                     "note_failures"))
 _DIGITAL = PROGRAM | BEYOND | AT_COMMANDS | PWM | ONE_WAY
 _EVERYWHERE = STRAIGHT | DRY | AT_STOPS | SHOWN
+APART = ("heat.T_amb",)  # stands apart too, for where nothing gets warm
 
 
 # --- Lanes side by side -----------------------------------------------------------------------------------------------
@@ -201,6 +202,19 @@ class Terms:
         """Demands of all lanes, or of each: flags of `terms.dependence`."""
         return (_said(may_depend, self.numbers, self._wave) | _said(needed, self.numbers, self.chip, self._firmware)
                 | self._inputs)
+
+    @cached_property
+    def followed(self) -> int:
+        """All that code has to follow which is right for each of the lanes: flags of `terms.dependence`."""
+        asked = self.demands
+        flags = _EVERYWHERE | int(np.bitwise_or.reduce(asked) if np.ndim(asked) else asked)
+        if flags & PROGRAM:
+            flags |= BEYOND | AT_COMMANDS | ONE_WAY
+        for path, acts in ACTS.items():
+            room = path.split(".")[0]
+            if path not in APART and room in self._rooms and not acts & flags and np.any(self.have(path)):
+                flags |= acts
+        return flags
 
     def ask(self, flags: int) -> Any:
         """Tell which lanes ask for some of this."""

@@ -19,7 +19,7 @@ from servotwin.models.engine.memory import SAME, Inputs
 from servotwin.models.engine.motions.elementary import anew
 from servotwin.models.engine.step import COMPLETED, CROWDED, DIVERGED, at_pulses, measured
 from servotwin.models.state.modes import Vector, one_body
-from servotwin.models.state.records import reader
+from servotwin.models.state.records import reader, writer
 from servotwin.models.terms import bridge, duty, frame
 from servotwin.models.terms.frame import Frame
 from servotwin.models.terms.sensor import wiper_at
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from servotwin.models.engine.lanes import Floats
 
 BY_ARCS, BY_LEGS = range(2)
-arc_at = reader("arc_at", ArcNumbers)
+arc_at, put_arcs = reader("arc_at", ArcNumbers), writer("put_arcs", ArcNumbers)
 LEFT = -1  # by arcs, which end where a stop is met: the lane is left to legs
 
 
@@ -87,6 +87,11 @@ def pulses(by: int, numbers: Any, arcs: Any, chips: Any, j: int, curve: Floats, 
         if left > 0 and t >= T_f:
             left, frames, t, now = left - 1, frames + 1, 0.0, frame.shifted(now, T_f)
     return Gone(Stand(y, mesh, wiper, frames, t), now, status)
+
+
+def prepare(numbers: Any, arcs: Any, j: int) -> None:
+    """Put the numbers of a lane's arcs into their tile."""
+    put_arcs(arcs, j, linear_segments.arc_numbers(numbers_at(numbers, j), 0.0))
 
 
 def ticks(numbers: Any, j: int, inputs: Inputs, firm: Any, stand: Stand, duration: float) -> tuple[Stand, int]:
