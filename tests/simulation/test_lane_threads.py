@@ -1,0 +1,226 @@
+"""Lanes that advance one a thread: the same servos as lanes side by side, whatever they have, in any order.
+
+Here a processor goes through the text; on a GPU it is the same text, made to PTX.
+"""
+
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+import servotwin as st
+from servotwin.errors import InputError
+from servotwin.models.terms.stops import Stops
+from servotwin.simulation.compile import threads
+from servotwin.simulation.compile.threads import PULSES_BY_ARCS, PULSES_BY_LEGS, TICKS, LaneText
+from servotwin.simulation.lanes.lane_threads import Threads, text_of
+
+PLAIN, GOALS, PULSES = "hitec-hs-755hb", "feetech-sts3215-12v", "dsservo-ds3218"
+
+
+def chosen(rng, lanes, share=0.5, **numbers):
+    """Return columns in which a share of the lanes has a number within these bounds, and the others the last one."""
+    found = {}
+    for name, (low, high, off) in numbers.items():
+        values = np.where(rng.random(lanes) < share, rng.uniform(low, high, lanes), off)
+        found[name.replace("__", ".")] = values
+    return found
+
+
+def words(rng, lanes, *allowed):
+    return np.array(allowed)[rng.integers(len(allowed), size=lanes)]
+
+
+def analog(rng, lanes):
+    """Servos of which each has what it has by chance."""
+    return chosen(
+        rng, lanes, electronics__minimum_drive_time=(1e-4, 6e-4, 0.0), motor__brush_drop_voltage=(0.1, 0.4, 0.0),
+        supply__bridge_drop_voltage=(0.1, 0.6, 0.0), supply__bridge_drop_resistance=(0.05, 0.2, 0.0),
+        supply__internal_resistance=(0.05, 0.4, 0.0), electronics__supply_coupling=(5e-4, 3e-3, 0.0),
+        electronics__back_emf_injection=(5e-4, 2e-3, 0.0), potentiometer__noise=(5e-4, 3e-3, 0.0),
+        electronics__pulse_timeout=(0.012, 0.06, 10.0), electronics__pulse_width_max=(1.6e-3, 2.2e-3, 3e-3),
+        friction__breakaway_ratio=(1.1, 1.5, 1.0), stops__upper_angle=(1.2, 2.0, 4.0), gear__backlash=(2e-3, 2e-2, 0.0),
+        gear__output_inertia=(1e-5, 1e-4, 1e-5), friction__load_friction=(0.05, 0.3, 0.0),
+        load__inertia=(1e-4, 3e-3, 5e-4), load__coulomb_torque=(0.0, 0.05, 0.0),
+    ) | {"electronics.off_state": words(rng, lanes, "coast", "brake"),
+         "electronics.silence_state": words(rng, lanes, "coast", "brake")}
+
+
+def plain(rng, lanes):
+    """Servos that go by arcs, some of them against a stop."""
+    return chosen(rng, lanes, electronics__deadband=(2e-6, 3e-5, 8e-6), potentiometer__noise=(5e-4, 3e-3, 0.0),
+                  potentiometer__backlash=(1e-3, 1e-2, 0.0), potentiometer__quantisation=(1e-3, 2e-2, 1e-6),
+                  stops__upper_angle=(1.2, 2.0, 4.0), load__inertia=(1e-4, 3e-3, 5e-4))
+
+
+def programmed(rng, lanes):
+    return chosen(
+        rng, lanes, firmware__proportional_gain=(2.0, 20.0, 8.0), firmware__integral_gain=(1.0, 10.0, 0.0),
+        firmware__derivative_gain=(0.01, 0.1, 0.0), firmware__deadband_angle=(1e-3, 6e-3, 0.0),
+        firmware__torque_limit=(0.3, 0.9, 1.0), firmware__duty_slew=(10.0, 60.0, 1e6),
+        firmware__compute_delay=(1e-4, 3e-3, 0.0), firmware__overload_duty=(0.2, 0.6, 1.0),
+        firmware__overload_time=(0.02, 0.1, 2.0), firmware__overload_output=(0.1, 0.3, 0.2),
+        firmware__trip_current=(0.3, 1.5, 9.0), firmware__trip_time=(0.01, 0.05, 1.0),
+        supply__internal_resistance=(0.05, 0.4, 0.0), motor__brush_drop_voltage=(0.1, 0.4, 0.0),
+        gear__backlash=(2e-3, 2e-2, 0.0), gear__output_inertia=(1e-5, 1e-4, 1e-5), load__inertia=(1e-4, 3e-3, 5e-4),
+    ) | {"firmware.off_state": words(rng, lanes, "brake", "coast", "diode")}
+
+
+def goals(rng, lanes):
+    return programmed(rng, lanes) | chosen(
+        rng, lanes, firmware__speed_limit=(0.5, 5.0, 1e3), firmware__acceleration_limit=(5.0, 80.0, 1e5),
+        firmware__bus_latency=(1e-4, 2e-3, 0.0))
+
+
+CASES = {  # servo, what its lanes have, way, how many, and how far they may be off in float64 and float32 [rad]
+    "arcs": (st.PulseServo, PLAIN, plain, PULSES_BY_ARCS, 120, 1e-12, 2e-5),
+    "legs": (st.PulseServo, PLAIN, analog, PULSES_BY_LEGS, 240, 1e-9, None),
+    "goals": (st.DigitalServo, GOALS, goals, TICKS, 160, 1e-9, None),
+    "pulses": (st.DigitalServo, PULSES, programmed, TICKS, 80, 1e-9, None)}
+
+
+def made(case, lanes=None, seed=5):
+    """Return lanes side by side, bounds of their angles, and a generator."""
+    kind, name, draw, _, count, *_ = CASES[case]
+    rng, lanes = np.random.default_rng(seed), lanes or count
+    sims = st.VectorSimulator(kind(st.load_servo(name)), lanes, seed=seed, parameters=draw(rng, lanes))
+    lower, upper, _ = sims._numbers.now(Stops)
+    return sims, max(lower.max(), -1.5), min(upper.min(), 1.5), rng
+
+
+def entered(sims, dtype="float64"):
+    """Return the same lanes one a thread, as they stand."""
+    own, every = Threads(sims._numbers, dtype), np.arange(len(sims))
+    own.put(every, sims._store.memories())
+    return own, every
+
+
+def advanced(sims, own, low, high, rng, steps=40):
+    """Advance both under the same commands, torques and resets; return by how much each lane is off at the most."""
+    lanes, worst, left = len(sims), np.zeros(len(sims)), 0
+    for k in range(steps):
+        if k % 10 == 5:
+            mask = np.flatnonzero(rng.random(lanes) < 0.4)
+            sims.reset(command_angle=rng.uniform(low, high, len(mask)), lanes=mask)
+            own.put(mask, sims._store.memories(mask))
+        if k % 10 == 8:  # a cut: to records and back
+            own.put(np.arange(lanes), own.memories(np.arange(lanes)))
+        if k % 10 == 9:
+            speeds = rng.uniform(-15.0, 15.0, lanes)
+            sims.set(output_speed=speeds)
+            own.put(np.arange(lanes), sims._store.memories())
+        duration, torque = rng.choice([1e-3, 0.02, 0.0137, 0.11]), rng.uniform(-0.05, 0.05, lanes)
+        sims.advance(duration, command_angle=rng.uniform(low, high, lanes), external_torque=torque)
+        own.advance(duration, sims._store.command, sims._store.total)
+        left += own.left
+        assert np.array_equal(own.status != 0, sims.status != 0)
+        np.testing.assert_allclose(own.time, sims.time, rtol=0.0, atol=1e-6 if own.text.floats else 1e-9)
+        worst = np.fmax(worst, np.abs(own.column("stand.y.q") - sims["output_angle"]))
+    return worst, left
+
+
+@pytest.mark.parametrize("case", [
+    pytest.param(case, marks=() if case == "arcs" else pytest.mark.slow) for case in CASES])
+def test_six_hundred_random_servos_are_those_of_lanes(case):
+    sims, low, high, rng = made(case)
+    own, _ = entered(sims)
+    assert own.text.way == CASES[case][3]
+    worst, left = advanced(sims, own, low, high, rng)
+    assert worst.max() <= CASES[case][5], np.argmax(worst)
+    assert (left > 0) == (case == "arcs")  # some met a stop
+
+
+@pytest.mark.slow
+def test_floats_are_off_by_what_they_round():
+    sims, low, high, rng = made("arcs")
+    own, _ = entered(sims, "float32")
+    assert own.reals.dtype == np.float32
+    worst, _ = advanced(sims, own, low, high, rng)
+    assert np.quantile(worst, 0.9) <= 2e-5  # where a pulse more or less is decided by a digit, more
+
+
+def test_a_lane_is_the_same_alone_among_others_and_in_any_order():
+    sims, low, high, rng = made("arcs")
+    own, every = entered(sims)
+    command = sims._numbers.translate.command(None, rng.uniform(low, high, len(sims)), None, None)
+    order = rng.permutation(every)
+    others = {name: values[order] for name, values in plain(np.random.default_rng(5), len(sims)).items()}
+    shuffled = st.VectorSimulator(sims._numbers.model, len(sims), parameters=others)
+    shuffled._numbers.columns.seeds[:] = sims._numbers.columns.seeds[order]
+    again = Threads(shuffled._numbers)
+    again.put(every, sims._store.memories(order))
+    alone = st.VectorSimulator(sims._numbers.model, 1, seed=8, parameters={
+        name: values[3] for name, values in plain(np.random.default_rng(5), len(sims)).items()})
+    one = Threads(alone._numbers)
+    one.put(np.arange(1), sims._store.memories(np.arange(3, 4)))
+    for duration in (0.02, 1e-3, 0.3):
+        own.advance(duration, command, 0.0)
+        again.advance(duration, command[order], 0.0)
+        one.advance(duration, command[3], 0.0)
+    assert np.array_equal(own.reals[:, order], again.reals)
+    assert np.array_equal(own.wholes[:, order], again.wholes)
+    assert np.array_equal(own.reals[:, 3], one.reals[:, 0])
+
+
+def test_twenty_ticks_are_a_frame():
+    sims, low, high, rng = made("arcs")
+    (whole, every), (parts, _) = entered(sims), entered(sims)
+    command = sims._numbers.translate.command(None, rng.uniform(low, high, len(sims)), None, None)
+    for _ in range(10):
+        whole.advance(0.02, command, 0.0)
+        for _ in range(20):
+            parts.advance(1e-3, command, 0.0)
+    assert np.array_equal(whole.column("stand.frames"), parts.column("stand.frames"))
+    np.testing.assert_allclose(whole.column("stand.y.q"), parts.column("stand.y.q"), rtol=0.0, atol=1e-12)
+
+
+def test_a_lane_that_has_failed_is_nan_until_it_is_put_anew_and_harms_no_other():
+    sims, low, high, rng = made("arcs", 5)
+    (own, every), (other, _) = entered(sims), entered(sims)
+    own.column("stand.y.q")[2] = np.nan
+    command = sims._numbers.translate.command(None, rng.uniform(low, high, 5), None, None)
+    for each in (own, other):
+        each.advance(0.05, command, 0.0)
+    assert own.status[2] != 0
+    assert np.isnan(own.column("stand.y.q")[2])
+    assert np.array_equal(np.delete(own.reals, 2, 1), np.delete(other.reals, 2, 1))
+    own.put(every[2:3], sims._store.memories(every[2:3]))
+    own.advance(0.05, command, 0.0)
+    assert own.status[2] == 0
+    assert np.isfinite(own.reals[:2, 2]).all()
+
+
+@pytest.mark.parametrize(("kind", "name", "more", "dtype", "words"), [
+    (st.PulseServo, PLAIN, {"load": st.loads.Pendulum(mass=0.1, length=0.1)}, "float64", "curved q"),
+    (st.PulseServo, PLAIN, {"load": st.loads.Recorded(time=[0.0, 1.0], torque=[0.0, 0.1])}, "float64", "recorded"),
+    (st.PulseServoInductive, PLAIN, {}, "float64", "on i"),
+    (st.BoundedServo, PLAIN, {}, "float64", "follows"),
+    (st.PulseServo, PLAIN, {"bus": st.Supply(open_circuit_voltage=6.0, internal_resistance=0.2)}, "float64", "supply"),
+    (st.DigitalServo, PULSES, {}, "float32", "pulses, in float32")])
+def test_lanes_that_it_does_not_follow_are_refused_by_name(kind, name, more, dtype, words):
+    sims = st.VectorSimulator(kind(st.load_servo(name)), 2, **more)
+    with pytest.raises(InputError, match=rf"^lanes one a thread: got .*{words}") as caught:
+        text_of(sims._numbers, dtype)
+    assert "\n" not in str(caught.value)
+
+
+def on_device():
+    """Return whether there is a compiler that makes PTX."""
+    return shutil.which("clang") is not None
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not on_device(), reason="no clang, which makes PTX")
+@pytest.mark.parametrize("case", ["arcs", "goals"])
+def test_ptx_of_floats_calls_nothing_and_has_no_doubles(case):
+    sims, *_ = made(case, 2)
+    text = text_of(sims._numbers, "float32")
+    found = threads.ptx(text)
+    assert re.findall(r"^\.(version|target) (.*)$", found, re.MULTILINE) == [("version", "7.0"), ("target", "sm_80")]
+    entries = {"servotwin_advance", "servotwin_prepare"} if case == "arcs" else {"servotwin_advance"}
+    assert set(re.findall(r"\.entry (\w+)", found)) == entries
+    assert ".extern" not in found
+    assert ".f64" not in found
+    assert len(found) <= 4e5
+    assert ".f64" in threads.ptx(LaneText(text.way, text.flags, False))
