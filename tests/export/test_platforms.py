@@ -30,6 +30,7 @@ PLATFORMS = {  # what compiles, and what runs it
 }
 SOME = ("plain", "worn", "backlash", "flexible", "warm", "everything", "bounded", "averaged", "on a bus",
         "digital, worn")  # what all others have is in one of them
+IN_FLOATS = ("worn", "on a bus")
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")]
 
 
@@ -38,9 +39,9 @@ def told(tmp_path_factory):
     """Return a function that returns the folder of a structure as C, and what its program tells as gcc compiles it."""
 
     @cache
-    def of(name):
+    def of(name, dtype="float64"):
         folder = tmp_path_factory.mktemp("platforms")
-        export.c(model_of(name, 0), STRUCTURES[name].load, name="servo").write(folder)
+        export.c(model_of(name, 0), STRUCTURES[name].load, name="servo", dtype=dtype).write(folder)
         return folder, lines_of(folder, ("gcc", *STRICT, "-O2"), ())
 
     return of
@@ -68,7 +69,7 @@ def test_all_digits_are_the_same(platform, told, tmp_path):
     compiler, runner = PLATFORMS[platform]
     if not compiles(compiler, tmp_path) or (runner and shutil.which(runner[0]) is None):
         pytest.skip(f"needs {compiler[0]}{' with ' + runner[0] if runner else ''}, for {platform}")
-    for name in SOME:
-        folder, expected = told(name)
+    for name, dtype in [(name, "float64") for name in SOME] + [(name, "float32") for name in IN_FLOATS]:
+        folder, expected = told(name, dtype)
         assert len(expected) == 400
-        assert lines_of(folder, compiler, runner) == expected, name
+        assert lines_of(folder, compiler, runner) == expected, (name, dtype)

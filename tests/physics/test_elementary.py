@@ -1,12 +1,18 @@
 """Functions of `physics.elementary` against 40 digits: at most two units in the last place off, everywhere."""
 
+import ctypes
 import math
+import subprocess
 
 import mpmath
 import numpy as np
 import pytest
 
 from servotwin.physics import elementary
+from servotwin.simulation.compile import Recipe
+from servotwin.simulation.compile.finding import compilers
+from servotwin.simulation.compile.standalone import Standalone
+from servotwin.simulation.compile.text.kinds import FLOAT64
 
 MOST = 2.0  # units in the last place
 
@@ -90,3 +96,73 @@ def test_what_has_no_value_is_nan_and_what_leaves_the_range_is_inf():
             with np.errstate(all="ignore"):
                 exact = float(np.power(x, y))
             np.testing.assert_equal(elementary.power(x, y), exact, f"power({x}, {y})")
+
+
+# --- The same text in C of floats -------------------------------------------------------------------------------------
+
+OF_TWO = ("atan2", "power")
+IN_FLOATS = {
+    "exp": even(-103, 88.7) + spread(-10, 0), "expm1": even(-30, 88.7) + even(-1, 1) + spread(-10, 0),
+    "log": [abs(x) for x in spread(-37.9, 38)] + even(0.5, 2.0),
+    "log1p": [abs(x) for x in spread(-10, 38)] + even(-0.99999, 2.0) + spread(-9, -1),
+    "sin": even(-200, 200) + even(-2e4, 2e4) + spread(-10, 2),
+    "cos": even(-200, 200) + even(-2e4, 2e4) + spread(-10, 2),
+    "tanh": even(-12, 12) + spread(-10, 0), "atanh": even(-1, 1) + spread(-10, -0.001)}
+
+
+@pytest.fixture(scope="module")
+def floats(tmp_path_factory):
+    """Return all functions in C of floats, each of an array or two."""
+    names = (*IN_FLOATS, *OF_TWO)
+    text = Standalone({}, floats=True)
+    recipe = Recipe("elementary", tuple(f"servotwin.physics.elementary:{name}" for name in names), in_floats=True)
+    found = text.add(recipe, {name: (FLOAT64,) * (1 + (name in OF_TWO)) for name in names})
+    many = [f"void many_{name}(long n, const float *x, const float *y, float *z) {{ for (long k = 0; k < n; k++)"
+            f" z[k] = {own}(x[k]{', y[k]' if name in OF_TWO else ''}); }}" for name, own in found.items()]
+    folder = tmp_path_factory.mktemp("floats")
+    (folder / "floats.c").write_text("\n".join([text.private, *many]))
+    if not compilers():
+        pytest.skip("no C compiler")
+    made = str(folder / "floats.so")
+    subprocess.run([*compilers()[0].command, "-std=c99", "-O2", "-w", "-shared", "-fPIC", "-o", made,
+                    str(folder / "floats.c"), "-lm"], check=True)
+    library = ctypes.CDLL(made)
+
+    def call(name, x, y=()):
+        x, y = np.array(x, np.float32), np.array(y, np.float32)
+        z = np.empty_like(x)
+        addresses = (ctypes.c_void_p(each.ctypes.data) for each in (x, y, z))
+        getattr(library, f"many_{name}")(ctypes.c_long(len(x)), *addresses)
+        return zip(x.tolist(), (y if len(y) else x).tolist(), z.tolist(), strict=True)
+
+    return call
+
+
+def off_float(found, exact):
+    if abs(exact) > mpmath.mpf(float(np.finfo(np.float32).max)):
+        return 0.0 if math.isinf(found) else math.inf
+    return float(abs(mpmath.mpf(found) - exact) / float(np.spacing(np.float32(abs(float(exact))))))
+
+
+@pytest.mark.parametrize("name", IN_FLOATS)
+def test_the_last_digits_of_floats(name, floats):
+    worst = max((off_float(z, getattr(mpmath, name)(mpmath.mpf(x))), x) for x, _, z in floats(name, IN_FLOATS[name]))
+    assert worst[0] <= (2.5 if name == "atanh" else MOST), worst
+
+
+def test_the_last_digits_of_floats_of_two(floats):
+    x, y = [abs(each) for each in spread(-30, 30)] + even(0.2, 8.0), even(-1, 1) + even(-40, 40)
+    for name, exact, a, b in (
+            ("atan2", mpmath.atan2, spread(-3, 3), spread(-3, 3)[::-1]), ("power", mpmath.power, x, y)):
+        worst = max((off_float(z, exact(mpmath.mpf(p), mpmath.mpf(q))), p, q) for p, q, z in floats(name, a, b))
+        assert worst[0] <= MOST, (name, worst)
+
+
+def test_floats_without_a_value_are_nan_and_those_beyond_the_range_inf(floats):
+    inf, nan = math.inf, math.nan
+    for name, x, value in (("exp", 89.0, inf), ("exp", -104.0, 0.0), ("exp", nan, nan), ("expm1", -inf, -1.0),
+                           ("expm1", 89.0, inf), ("log", 0.0, -inf), ("log", -1.0, nan), ("log", 1e-40, -92.1034),
+                           ("log1p", -1.0, -inf), ("log1p", -2.0, nan), ("sin", inf, nan), ("sin", 3e4, nan),
+                           ("cos", nan, nan), ("tanh", inf, 1.0), ("atanh", 1.0, inf), ("atanh", 2.0, nan)):
+        (_, _, found), = floats(name, [x])
+        np.testing.assert_allclose(found, value, rtol=1e-5, err_msg=f"{name}({x})")

@@ -40,7 +40,7 @@ def serve(numbers: Numbers, inputs: Inputs, firm: Any, frames: int, time: float,
           origin: float) -> None:
     """Do all that is due at a time [s] after so many frames, which began at `origin` [s since the start].
 
-    What the program remembers changes in place.
+    The memory of the program changes in place.
     """
     firmware = inputs.firmware[0]
     latest = time + SAME * firmware.T_c

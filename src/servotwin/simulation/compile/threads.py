@@ -41,13 +41,17 @@ from servotwin.simulation.compile.storage import is_there, key_of, writable_fold
 from servotwin.simulation.compile.text.kinds import FLOAT64, INT64, Array, Kind, Record, Tuple
 from servotwin.simulation.compile.text.translate import part_of_header
 
-# --- What a lane remembers --------------------------------------------------------------------------------------------
+# --- The memory of a lane ---------------------------------------------------------------------------------------------
 
 PULSES_BY_ARCS, PULSES_BY_LEGS, TICKS = "pulses_by_arcs", "pulses_by_legs", "ticks"
 """Ways in which lanes go, a text each; by arcs those of which some may be left to legs."""
 _STATE: dict[str, tuple[tuple[str, Any], ...]] = {
     PULSES_BY_ARCS: (("stand", Stand), ("now", Frame)), PULSES_BY_LEGS: (("stand", Stand), ("now", Frame)),
     TICKS: (("stand", Stand), ("firm", Firm))}
+
+
+_STILL = re.compile(r"stand\.y\.(i|T_w|T_h)$")  # nothing here has inductance or heat
+_WAITING = re.compile(r"firm\.(duties|coming)\[")
 
 
 def columns(way: str) -> tuple[list[str], list[str]]:
@@ -203,11 +207,14 @@ class LaneText:
         All that it follows: flags of `terms.dependence`.
     floats : bool
         Whether numbers have 32 bits.
+    waits : bool
+        Whether duties or goals of a program may wait from call to call.
     """
 
     way: str
     flags: int
     floats: bool
+    waits: bool = False
 
     @property
     def real(self) -> np.dtype[Any]:
@@ -260,15 +267,15 @@ def _printed(own: LaneText) -> str:
              "numbers": types.record(_tile(Numbers))}
     if own.way == TICKS:
         words |= {"inputs": types.of(kinds[2]), "program": types.record(Record(record_of(Firmware)))}
-        call, state = _TICKS, f"{types.of(named(Stand))} stand; {types.record(Record(record_of(Firm)))} firm;"
+        call, state = _TICKS, f"{types.of(named(Stand))} stand = {{0}}; {types.record(Record(record_of(Firm)))} firm;"
     else:
         words |= {"arcs": types.record(_tile(ArcNumbers)), "chips": types.record(_tile(Chip))}
-        call, state = _PULSES, f"{types.of(named(Stand))} stand; {types.of(named(Frame))} now;"
+        call, state = _PULSES, f"{types.of(named(Stand))} stand = {{0}}; {types.of(named(Frame))} now;"
     if own.way == PULSES_BY_ARCS:
         prepare = _PREPARE.substitute(words, prepare=names["prepare"])
     reals, wholes = columns(own.way)
-    places = [(path, f"reals[{k} * n]") for k, path in enumerate(reals)] + [
-        (path, f"wholes[{k} * n]") for k, path in enumerate(wholes)]
+    places = [(path, f"{name}[{k} * n]") for name, paths in (("reals", reals), ("wholes", wholes))
+              for k, path in enumerate(paths) if not (_STILL.match(path) or (_WAITING.match(path) and not own.waits))]
     lane = _LANE.substitute(words, state=state, call=call.substitute(words),
                             loads="\n".join(f"    {path} = {place};" for path, place in places),
                             stores="\n".join(f"    {place} = {path};" for path, place in places))
@@ -278,7 +285,7 @@ def _printed(own: LaneText) -> str:
     return "\n".join([part_of_header("device.h"), _EXPORTED, text.narrow, real + _TABLE, around])
 
 
-# --- What is made of a text: a library for this processor, PTX for a GPU ----------------------------------------------
+# --- Libraries of a text for this processor, and PTX of it for a GPU --------------------------------------------------
 
 def library(own: LaneText) -> ctypes.CDLL:
     """Return the library of a text, made by the compiler at hand where the cache has none.

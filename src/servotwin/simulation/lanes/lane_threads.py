@@ -83,7 +83,7 @@ def text_of(numbers: LaneNumbers, dtype: str) -> LaneText:
                          allowed="pulse servos and digital servos without heat, inductance, springs, pendulums, "
                                  "fading friction and regulators, each on a supply of its own")
     if digital:
-        return LaneText(TICKS, flags, floats)
+        return LaneText(TICKS, flags, floats, bool(np.any(program.T_d > 0.0) or np.any(program.latency > 0.0)))
     return LaneText(PULSES_BY_LEGS if flags & ~_BY_ARCS else PULSES_BY_ARCS, flags, floats)
 
 
@@ -100,7 +100,7 @@ class Threads:
     ----------
     text : LaneText
     reals, wholes : ndarray, shape (columns, lanes)
-        What lanes remember, as `threads.columns` names it.
+        The memory of lanes, as `threads.columns` names it.
     status : ndarray of int32, shape (lanes,)
         0, or the code of a `Status`; a lane that has failed is nan.
     left : int
