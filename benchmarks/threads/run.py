@@ -19,6 +19,7 @@ import servotwin as st
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from common import best
+
 from servotwin.simulation.compile import threads
 from servotwin.simulation.compile.threads import PULSES_BY_ARCS, PULSES_BY_LEGS, LaneText
 from servotwin.simulation.lanes.lane_threads import Threads, text_of
@@ -55,8 +56,8 @@ def read(ptx: str, registers: int) -> tuple[dict[str, int], float]:
         taken = time.perf_counter() - start
     text = said.stdout + said.stderr
     part = text[text.index("Compiling entry function 'servotwin_advance'"):]
-    patterns = {"registers": r"Used (\d+) registers", "stack": r"(\d+) bytes stack", "stores": r"(\d+) bytes spill stores",
-                "loads": r"(\d+) bytes spill loads"}
+    patterns = {"registers": r"Used (\d+) registers", "stack": r"(\d+) bytes stack",
+                "stores": r"(\d+) bytes spill stores", "loads": r"(\d+) bytes spill loads"}
     return {name: int(re.search(pattern, part).group(1)) for name, pattern in patterns.items()}, taken
 
 

@@ -223,9 +223,14 @@ def test_a_row_has_the_angle_of_its_time(kind):
         truth = peer.servos[1].truth
     times = np.array([one[0] for one in truth])
     angles = np.degrees([one[1].angle for one in truth])
-    start = min(time_ - rows["time_s"][0] for time_ in times[:3])
-    offsets = np.array([min(times - start - t, key=abs) for t in rows["time_s"]])
-    assert abs(np.median(offsets)) < 2e-3  # a question and an answer here last well under a millisecond
+    def offsets_from(start):
+        return np.array([min(times - start - t, key=abs) for t in rows["time_s"]])
+
+    # when the bench began, by the clock of the servo: any of the first answers may have been late
+    start = min((time_ - row for time_ in times[:5] for row in rows["time_s"][:5]),
+                key=lambda start: np.median(np.abs(offsets_from(start))))
+    offsets = offsets_from(start)
+    assert np.median(np.abs(offsets)) < 2e-3  # a question and an answer here last well under a millisecond
     assert np.all(np.diff(rows["time_s"]) > 0.0)
     then = np.interp(rows["time_s"] + start + np.median(offsets), times, angles)  # the first answer may have been late
     count = math.degrees(kind.outputs["angle"][2])

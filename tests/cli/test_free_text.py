@@ -100,7 +100,8 @@ WRITERS = {
     "identification/report/page.py", "identification/sheets/sheet.py", "logs/csv_logs.py", "logs/sidecar.py",
     "look/reports.py", "look/style.py", "paper/report.py", "parameters/output_file.py", "parameters/servo_file.py",
     "plotting/block_diagrams.py", "plotting/files.py", "simulation/compile/building.py",
-    "simulation/compile/storage.py", "simulation/lanes/c_entry.py", "simulation/result.py", "studies/study.py",
+    "simulation/compile/storage.py", "simulation/compile/threads.py", "simulation/lanes/c_entry.py",
+    "simulation/result.py", "studies/study.py",
     "tables/columns.py", "web/alone/page.py", "web/server/own/reading.py", "web/server/own/work.py",
     "wire/service.py", "wire/traffic.py",
 }

@@ -67,6 +67,11 @@ def programmed(rng, lanes):
     ) | {"firmware.off_state": words(rng, lanes, "brake", "coast", "diode")}
 
 
+def undelayed(rng, lanes):
+    """Programs of which nothing waits from call to call."""
+    return programmed(rng, lanes) | {"firmware.compute_delay": 0.0}
+
+
 def goals(rng, lanes):
     return programmed(rng, lanes) | chosen(
         rng, lanes, firmware__speed_limit=(0.5, 5.0, 1e3), firmware__acceleration_limit=(5.0, 80.0, 1e5),
@@ -77,7 +82,7 @@ CASES = {  # servo, what its lanes have, way, how many, and how far they may be 
     "arcs": (st.PulseServo, PLAIN, plain, PULSES_BY_ARCS, 120, 1e-12, 2e-5),
     "legs": (st.PulseServo, PLAIN, analog, PULSES_BY_LEGS, 240, 1e-9, None),
     "goals": (st.DigitalServo, GOALS, goals, TICKS, 160, 1e-9, None),
-    "pulses": (st.DigitalServo, PULSES, programmed, TICKS, 80, 1e-9, None)}
+    "pulses": (st.DigitalServo, PULSES, undelayed, TICKS, 80, 1e-9, None)}
 
 
 def made(case, lanes=None, seed=5):
@@ -126,6 +131,7 @@ def test_six_hundred_random_servos_are_those_of_lanes(case):
     sims, low, high, rng = made(case)
     own, _ = entered(sims)
     assert own.text.way == CASES[case][3]
+    assert own.text.waits == (case == "goals")
     worst, left = advanced(sims, own, low, high, rng)
     assert worst.max() <= CASES[case][5], np.argmax(worst)
     assert (left > 0) == (case == "arcs")  # some met a stop
@@ -165,7 +171,7 @@ def test_a_lane_is_the_same_alone_among_others_and_in_any_order():
 
 def test_twenty_ticks_are_a_frame():
     sims, low, high, rng = made("arcs")
-    (whole, every), (parts, _) = entered(sims), entered(sims)
+    (whole, _), (parts, _) = entered(sims), entered(sims)
     command = sims._numbers.translate.command(None, rng.uniform(low, high, len(sims)), None, None)
     for _ in range(10):
         whole.advance(0.02, command, 0.0)

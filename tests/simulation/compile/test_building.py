@@ -219,7 +219,7 @@ def test_an_index_of_no_use_is_written_anew(here, text, monkeypatch, capsys):
     index = only(here, "*.json")
     right = json.loads(index.read_text())
     index.write_text(text)
-    monkeypatch.setattr(building, "_compiled", None)  # the library is still there
+    monkeypatch.setattr(building, "compiled", None)  # the library is still there
     assert library.loaded(RECIPE).gaussian(3, 7) == pytest.approx(WANTED, rel=1e-14)
     assert capsys.readouterr().err == ""
     assert json.loads(index.read_text()) == right

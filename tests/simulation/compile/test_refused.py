@@ -131,7 +131,7 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_what_has_no_form_is_refused(name, monkeypatch):
-    monkeypatch.setattr(building, "_compiled", None)
+    monkeypatch.setattr(building, "compiled", None)
     arguments, body, line, instead = CASES[name]
     inner = "\n".join(f"    {each}" for each in body.splitlines())
     start = time.process_time()

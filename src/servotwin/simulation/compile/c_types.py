@@ -80,7 +80,7 @@ _TAKEN = frozenset(
     "PRAGMA SUM_IN_ANY_ORDER CHECKED_SIZE TOLD told_1 told_2 told_3 told_4 told_5 told_6 told_7 floor_div floor_mod "
     "mod_float floor_div_float whole_power moved_left moved_right whole clamped words numbers rows bytes_at halves "
     "copied activate active active_word float_of word_of two_power two_powerf binary_exponent binary_exponentf scaled "
-    "isfinite isnan isinf floor fabs fabsf llabs memcpy memmove".split()) | {
+    "scaledf isfinite isnan isinf floor fabs fabsf llabs memcpy memmove".split()) | {
         name + end for name in MATH for end in ("", "f")}
 _OURS = re.compile(r"\w+_(\d+|end|given|)|(as|equal|slice_of|array|min|max)_\w+|in_order|is_in|record|table")
 """Names that are made here: of types, tables, helpers, and of what a statement needs beside its variables."""
