@@ -200,10 +200,10 @@ def test_a_lane_that_has_failed_is_nan_until_it_is_put_anew_and_harms_no_other()
 @pytest.mark.parametrize(("kind", "name", "more", "dtype", "words"), [
     (st.PulseServo, PLAIN, {"load": st.loads.Pendulum(mass=0.1, length=0.1)}, "float64", "curved q"),
     (st.PulseServo, PLAIN, {"load": st.loads.Recorded(time=[0.0, 1.0], torque=[0.0, 0.1])}, "float64", "recorded"),
-    (st.PulseServoInductive, PLAIN, {}, "float64", "on i"),
+    pytest.param(st.PulseServoInductive, PLAIN, {}, "float64", "on i", marks=pytest.mark.slow),
     (st.BoundedServo, PLAIN, {}, "float64", "follows"),
     (st.PulseServo, PLAIN, {"bus": st.Supply(open_circuit_voltage=6.0, internal_resistance=0.2)}, "float64", "supply"),
-    (st.DigitalServo, PULSES, {}, "float32", "pulses, in float32")])
+    pytest.param(st.DigitalServo, PULSES, {}, "float32", "pulses, in float32", marks=pytest.mark.slow)])
 def test_lanes_that_it_does_not_follow_are_refused_by_name(kind, name, more, dtype, words):
     sims = st.VectorSimulator(kind(st.load_servo(name)), 2, **more)
     with pytest.raises(InputError, match=rf"^lanes one a thread: got .*{words}") as caught:
