@@ -22,7 +22,7 @@ from common import best
 
 from servotwin.simulation.compile import threads
 from servotwin.simulation.compile.threads import PULSES_BY_ARCS, PULSES_BY_LEGS, LaneText
-from servotwin.simulation.lanes.lane_threads import Threads, text_of
+from servotwin.simulation.lanes.lane_threads import ThreadedLanes, text_of
 
 LANES, FRAME = 512, 0.02
 ARCHITECTURE = "sm_90"
@@ -75,7 +75,7 @@ def on_device(title: str, own: LaneText, registers: int) -> None:
 def on_processor(title: str, model: object) -> None:
     """Print the time of lanes one a thread beside that of lanes, one thread each, and by how much they differ."""
     sims = st.VectorSimulator(model, LANES, load=st.loads.Inertia(1e-3), threads=1)
-    own = Threads(sims._numbers)
+    own = ThreadedLanes(sims._numbers)
     rng = np.random.default_rng(0)
     angles = rng.uniform(0.2, 1.0, (40, LANES))
     sims.reset(command_angle=angles[0])

@@ -11,10 +11,13 @@ import pytest
 
 import servotwin as st
 from servotwin.errors import InputError
+from servotwin.models.engine.batch.one_lane import BY_ARCS, Stand, pulses
+from servotwin.models.state.modes import Vector
+from servotwin.models.terms.frame import AT_START
 from servotwin.models.terms.stops import Stops
 from servotwin.simulation.compile import threads
 from servotwin.simulation.compile.threads import PULSES_BY_ARCS, PULSES_BY_LEGS, TICKS, LaneText
-from servotwin.simulation.lanes.lane_threads import Threads, text_of
+from servotwin.simulation.lanes.lane_threads import ThreadedLanes, text_of
 
 PLAIN, GOALS, PULSES = "hitec-hs-755hb", "feetech-sts3215-12v", "dsservo-ds3218"
 
@@ -96,7 +99,7 @@ def made(case, lanes=None, seed=5):
 
 def entered(sims, dtype="float64"):
     """Return the same lanes one a thread, as they stand."""
-    own, every = Threads(sims._numbers, dtype), np.arange(len(sims))
+    own, every = ThreadedLanes(sims._numbers, dtype), np.arange(len(sims))
     own.put(every, sims._store.memories())
     return own, every
 
@@ -154,11 +157,11 @@ def test_a_lane_is_the_same_alone_among_others_and_in_any_order():
     others = {name: values[order] for name, values in plain(np.random.default_rng(5), len(sims)).items()}
     shuffled = st.VectorSimulator(sims._numbers.model, len(sims), parameters=others)
     shuffled._numbers.columns.seeds[:] = sims._numbers.columns.seeds[order]
-    again = Threads(shuffled._numbers)
+    again = ThreadedLanes(shuffled._numbers)
     again.put(every, sims._store.memories(order))
     alone = st.VectorSimulator(sims._numbers.model, 1, seed=8, parameters={
         name: values[3] for name, values in plain(np.random.default_rng(5), len(sims)).items()})
-    one = Threads(alone._numbers)
+    one = ThreadedLanes(alone._numbers)
     one.put(np.arange(1), sims._store.memories(np.arange(3, 4)))
     for duration in (0.02, 1e-3, 0.3):
         own.advance(duration, command, 0.0)
@@ -230,3 +233,19 @@ def test_ptx_of_floats_calls_nothing_and_has_no_doubles(case):
     assert ".f64" not in found
     assert len(found) <= 4e5
     assert ".f64" in threads.ptx(LaneText(text.way, text.flags, False))
+
+
+def test_the_text_in_plain_python_is_the_same():
+    sims, low, high, rng = made("arcs", 4)
+    own, _ = entered(sims)
+    command = sims._numbers.translate.command(None, rng.uniform(low, high, 4), None, None)
+    tiles = {name: own._tiles[name].view(np.recarray)[0] for name in ("numbers", "arcs", "chips")}
+    y = Vector(*(own.column(f"stand.y.{name}")[2].item() for name in Vector._fields))
+    stand, now, told = Stand(y, 0, y.q, 0, 0.0), AT_START, (int(sims._numbers.columns.seeds[2]), command[2].item(), 0.02)
+    for duration in (0.02, 3e-3, 0.17):
+        own.advance(duration, command, 0.02)
+        gone = pulses(BY_ARCS, *tiles.values(), 2, np.zeros((0, 2)), *told, stand, now, duration)
+        stand, now = gone.stand, gone.chip
+        assert gone.status == 0
+        assert own.column("stand.y.q")[2] == pytest.approx(stand.y.q, abs=1e-12)
+        assert (own.column("stand.frames")[2], own.column("now.number")[2]) == (stand.frames, now.number)

@@ -87,7 +87,7 @@ def text_of(numbers: LaneNumbers, dtype: str) -> LaneText:
     return LaneText(PULSES_BY_LEGS if flags & ~_BY_ARCS else PULSES_BY_ARCS, flags, floats)
 
 
-class Threads:
+class ThreadedLanes:
     """Lanes of one text, with all that they remember in columns.
 
     Parameters
