@@ -241,7 +241,8 @@ def test_the_text_in_plain_python_is_the_same():
     command = sims._numbers.translate.command(None, rng.uniform(low, high, 4), None, None)
     tiles = {name: own._tiles[name].view(np.recarray)[0] for name in ("numbers", "arcs", "chips")}
     y = Vector(*(own.column(f"stand.y.{name}")[2].item() for name in Vector._fields))
-    stand, now, told = Stand(y, 0, y.q, 0, 0.0), AT_START, (int(sims._numbers.columns.seeds[2]), command[2].item(), 0.02)
+    stand, now = Stand(y, 0, y.q, 0, 0.0), AT_START
+    told = int(sims._numbers.columns.seeds[2]), command[2].item(), 0.02
     for duration in (0.02, 3e-3, 0.17):
         own.advance(duration, command, 0.02)
         gone = pulses(BY_ARCS, *tiles.values(), 2, np.zeros((0, 2)), *told, stand, now, duration)
