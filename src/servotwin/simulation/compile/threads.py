@@ -26,7 +26,7 @@ from servotwin.models.engine.batch.one_lane import Stand
 from servotwin.models.engine.batch.segments.linear_segments import ArcNumbers
 from servotwin.models.engine.memory import Inputs
 from servotwin.models.state.records import TILE, fields_of, record_of, rows_of
-from servotwin.models.terms.control import Firm
+from servotwin.models.terms.control import WAITING, Firm
 from servotwin.models.terms.dependence import PROGRAM, PWM
 from servotwin.models.terms.firmware import Firmware
 from servotwin.models.terms.frame import Chip, Frame
@@ -51,11 +51,15 @@ _STATE: dict[str, tuple[tuple[str, Any], ...]] = {
 
 
 _STILL = re.compile(r"stand\.y\.(i|T_w|T_h)$")  # nothing here has inductance or heat
-_WAITING = re.compile(r"firm\.(duties|coming)\[")
+RINGS = ("duties", "coming")
+"""What a program has waiting, in rings: they stay in memory, one lane's beside the next one's."""
 
 
 def columns(way: str) -> tuple[list[str], list[str]]:
-    """Return the names of the reals and of the whole numbers that a lane remembers, in the order of their columns."""
+    """Return the names of the reals and of the whole numbers that a lane remembers, in the order of their columns.
+
+    Those in the rings of a program are not among them.
+    """
     reals: list[str] = []
     wholes: list[str] = []
     for room, kind in _STATE[way]:
@@ -69,14 +73,12 @@ def _leaves(path: str, kind: Any) -> Iterator[tuple[str, Any]]:
         own = f"{path}.{identifier(name)}"
         if hasattr(hint, "_fields"):
             yield from _leaves(own, hint)
-        elif hint in (int, float):
+        elif name not in RINGS:
             yield own, hint
-        else:
-            yield from ((f"{own}[{k}]", float) for k in range(len(hint.__args__)))
 
 
 _ADDRESSES = ("numbers", "arcs", "chips", "programs", "curve", "seeds", "command", "torque", "reals", "wholes",
-              "status", "left", "count")
+              "rings", "status", "left", "count")
 
 
 @cache
@@ -104,6 +106,7 @@ typedef struct {
     const real *command, *torque; /* as the servo follows it; beside the load [N m] */
     real *reals;                  /* a column each: what a lane remembers */
     int32_t *wholes;
+    real *rings;     /* of programs, a lane after the other */
     int32_t *status; /* of a lane: 0, or that of its failure */
     int32_t *left;   /* lanes that arcs leave to legs, and how many */
     int32_t *count;
@@ -142,12 +145,15 @@ _PULSES = Template('''    const array_double_2 curve = {(real *)(uintptr_t)of->c
     now = gone.chip;''')
 _TICKS = Template('''    real piece[7] = {0, of->command[lane], 0, 0, 0, 0, 0};
     $program *program = ($program *)(uintptr_t)of->programs + of->program_step * lane;
+    firm.duties = of->rings + (int64_t)$room * lane;
+    firm.coming = firm.duties + $room / 2;
     const $inputs told = {
         .command = {piece, {1, 7}}, .torque = {NULL, {0, 7}}, .constant_torque = of->torque[lane],
         .period = program->T_f, .edges = {NULL, {0}},
         .curve = {(real *)(uintptr_t)of->curve, {of->curve_rows, 2}}, .seed = of->seeds[lane], .accuracy = 0,
         .firmware = {program, {1}}};
-    const $gone gone = $entry(($numbers *)(uintptr_t)of->numbers + tile, j, &told, &firm, &stand, of->duration);
+    /* The memory of the program stays where it is: in registers it would have no room. */
+    const $gone gone = $entry(($numbers *)(uintptr_t)of->numbers + tile, j, &told, ANEW(&firm), &stand, of->duration);
     const int32_t status = (int32_t)gone.f1;
     stand = gone.f0;''')
 _PREPARE = Template('''
@@ -207,14 +213,11 @@ class LaneText:
         All that it follows: flags of `terms.dependence`.
     floats : bool
         Whether numbers have 32 bits.
-    waits : bool
-        Whether duties or goals of a program may wait from call to call.
     """
 
     way: str
     flags: int
     floats: bool
-    waits: bool = False
 
     @property
     def real(self) -> np.dtype[Any]:
@@ -256,6 +259,9 @@ def _signatures(way: str) -> dict[str, tuple[Kind, ...]]:
     return pulses | ({"prepare": (numbers, arcs, INT64)} if way == PULSES_BY_ARCS else {})
 
 
+_RINGS = re.compile(rf"\b(float|double) ({'|'.join(RINGS)})\[{WAITING}\];")
+
+
 @cache
 def _printed(own: LaneText) -> str:
     text, signatures = Standalone({}, floats=own.floats), _signatures(own.way)
@@ -266,7 +272,8 @@ def _printed(own: LaneText) -> str:
     words = {"tile": TILE, "entry": names[entry], "gone": text.result_of(entry), "by": by_legs,
              "numbers": types.record(_tile(Numbers))}
     if own.way == TICKS:
-        words |= {"inputs": types.of(kinds[2]), "program": types.record(Record(record_of(Firmware)))}
+        words |= {"room": 2 * WAITING, "inputs": types.of(kinds[2]),
+                  "program": types.record(Record(record_of(Firmware)))}
         call, state = _TICKS, f"{types.of(named(Stand))} stand = {{0}}; {types.record(Record(record_of(Firm)))} firm;"
     else:
         words |= {"arcs": types.record(_tile(ArcNumbers)), "chips": types.record(_tile(Chip))}
@@ -275,14 +282,15 @@ def _printed(own: LaneText) -> str:
         prepare = _PREPARE.substitute(words, prepare=names["prepare"])
     reals, wholes = columns(own.way)
     places = [(path, f"{name}[{k} * n]") for name, paths in (("reals", reals), ("wholes", wholes))
-              for k, path in enumerate(paths) if not (_STILL.match(path) or (_WAITING.match(path) and not own.waits))]
+              for k, path in enumerate(paths) if not _STILL.match(path)]
     lane = _LANE.substitute(words, state=state, call=call.substitute(words),
                             loads="\n".join(f"    {path} = {place};" for path, place in places),
                             stores="\n".join(f"    {place} = {path};" for path, place in places))
     many, kth = ("(of.left ? *of.count : of.lanes)", "(of.left ? of.left[k] : k)") if by_legs else ("of.lanes", "k")
     real = f"typedef {'float' if own.floats else 'double'} real;\n"
     around = _AROUND.substitute(lane=lane + prepare, many=many, kth=kth)
-    return "\n".join([part_of_header("device.h"), _EXPORTED, text.narrow, real + _TABLE, around])
+    kernels = _RINGS.sub(r"\1 *\2;", text.narrow)
+    return "\n".join([part_of_header("device.h"), _EXPORTED, kernels, real + _TABLE, around])
 
 
 # --- Libraries of a text for this processor, and PTX of it for a GPU --------------------------------------------------

@@ -17,6 +17,7 @@ from servotwin.models.engine.memory import SAME, Memories, put_started
 from servotwin.models.state.modes import NOWHERE, RIGID
 from servotwin.models.state.records import rows_of
 from servotwin.models.terms import dependence
+from servotwin.models.terms.control import WAITING
 from servotwin.models.terms.dependence import (
     AT_COMMANDS,
     AT_STOPS,
@@ -42,7 +43,7 @@ from servotwin.models.terms.frame import Chip
 from servotwin.models.terms.numbers import Numbers
 from servotwin.simulation.compile import threads
 from servotwin.simulation.compile.c_types import identifier
-from servotwin.simulation.compile.threads import PULSES_BY_ARCS, PULSES_BY_LEGS, TICKS, LaneText
+from servotwin.simulation.compile.threads import PULSES_BY_ARCS, PULSES_BY_LEGS, RINGS, TICKS, LaneText
 from servotwin.simulation.lanes.forms import Terms
 from servotwin.simulation.lanes.whole_runs import nothing_yet, taken
 
@@ -83,7 +84,7 @@ def text_of(numbers: LaneNumbers, dtype: str) -> LaneText:
                          allowed="pulse servos and digital servos without heat, inductance, springs, pendulums, "
                                  "fading friction and regulators, each on a supply of its own")
     if digital:
-        return LaneText(TICKS, flags, floats, bool(np.any(program.T_d > 0.0) or np.any(program.latency > 0.0)))
+        return LaneText(TICKS, flags, floats)
     return LaneText(PULSES_BY_LEGS if flags & ~_BY_ARCS else PULSES_BY_ARCS, flags, floats)
 
 
@@ -113,6 +114,7 @@ class ThreadedLanes:
         names = threads.columns(self.text.way)
         self._place = {path: (kind, k) for kind, paths in enumerate(names) for k, path in enumerate(paths)}
         self.reals, self.wholes = np.zeros((len(names[0]), count), real), np.zeros((len(names[1]), count), np.int32)
+        self.rings = np.zeros((count if self.text.way == TICKS else 0, len(RINGS), WAITING), real)
         self.status = np.zeros(count, np.int32)
         self._command, self._torque = np.zeros(count, real), np.zeros(count, real)
         self._tiles = {"numbers": self._typed(Numbers, numbers.columns.numbers)}
@@ -124,7 +126,8 @@ class ThreadedLanes:
             self._tiles["arcs"] = np.zeros(len(self._tiles["numbers"]), rows_of(ArcNumbers, real))
         self._room = {"curve": np.ascontiguousarray(numbers.curve, real), "seeds": numbers.columns.seeds,
                       "command": self._command, "torque": self._torque, "reals": self.reals, "wholes": self.wholes,
-                      "status": self.status, "left": np.zeros(count, np.int32), "count": np.zeros(1, np.int32)}
+                      "rings": self.rings, "status": self.status, "left": np.zeros(count, np.int32),
+                      "count": np.zeros(1, np.int32)}
         self._of = threads.table_type(self.text.floats)(
             lanes=count, program_step=1, curve_rows=len(numbers.curve),
             **{name: array.ctypes.data for name, array in (self._tiles | self._room).items()})
@@ -236,9 +239,8 @@ class ThreadedLanes:
             value, own = values[name], f"{path}.{identifier(name)}"
             if hasattr(value, "dtype") and value.dtype.names:
                 self._set(which, own, value)
-            elif value.ndim > 1:
-                for k in range(value.shape[1]):
-                    self.column(f"{own}[{k}]")[which] = value[:, k]
+            elif name in RINGS:
+                self.rings[which, RINGS.index(name)] = value
             else:
                 self.column(own)[which] = value
 
@@ -247,8 +249,7 @@ class ThreadedLanes:
             value, own = into[name], f"{path}.{identifier(name)}"
             if value.dtype.names:
                 self._get(which, own, value)
-            elif value.ndim > 1:
-                for k in range(value.shape[1]):
-                    value[:, k] = self.column(f"{own}[{k}]")[which]
+            elif name in RINGS:
+                value[:] = self.rings[which, RINGS.index(name)]
             else:
                 into[name] = self.column(own)[which]
