@@ -52,7 +52,7 @@ _STATE: dict[str, tuple[tuple[str, Any], ...]] = {
 
 _STILL = re.compile(r"stand\.y\.(i|T_w|T_h)$")  # nothing here has inductance or heat
 RINGS = ("duties", "coming")
-"""What a program has waiting, in rings: they stay in memory, one lane's beside the next one's."""
+"""Rings of a program, with what waits there: they stay in memory, those of one lane beside those of the next."""
 
 
 def columns(way: str) -> tuple[list[str], list[str]]:
