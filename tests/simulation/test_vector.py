@@ -545,26 +545,3 @@ def test_a_lane_that_fails_harms_no_other(servo):
     sims.advance(0.05)
     assert sims.status.tolist() == [0, 0, 0]
     assert np.isfinite(sims["output_angle"]).all()
-
-
-def test_a_goal_that_comes_late_counts_from_when_it_came():
-    """A bus servo whose timeout had run out ignored every goal after it: each seemed to be written at t = 0."""
-    model = st.DigitalServo(st.load_servo("feetech-sts3215-12v").replace(
-        {"firmware.signal_timeout": 0.5, "firmware.signal_loss": "limp"}))
-    goals = [st.signals.constant(angle, unit="deg") for angle in (10.0, 30.0)]
-    sims, sim = st.VectorSimulator(model, 1), st.Simulator(model)
-    sims.reset(command_angle=0.0)
-    state = sim.initial(st.signals.constant(0.0, unit="deg"))
-    seen = []
-    for k in range(24):
-        goal = goals[k >= 8]
-        sims.advance(0.1, command_angle=np.radians(10.0 if k < 8 else 30.0))
-        state = sim.advance(state, 0.1 * (k + 1), goal)
-        seen.append((sims["output_angle"][0], sims["duty"][0], state["output_angle"]))
-    lanes, duty, alone = np.array(seen).T
-    command = st.signals.samples([0.0, 0.8], [10.0, 30.0], unit="deg")
-    whole = st.simulate(model, command, duration=2.4, output_step=0.1, initial={"output_angle": 0.0})
-    np.testing.assert_allclose(lanes, whole["output_angle"][1:], rtol=0.0, atol=1e-9)
-    np.testing.assert_allclose(alone, lanes, rtol=0.0, atol=1e-9)
-    assert duty[7] == duty[20] == 0.0  # limp, before the goal and after it
-    assert duty[11] != 0.0

@@ -152,10 +152,7 @@ def _read_bus(inputs: Inputs, firm: Any, time: float) -> None:
         goal = _goal(inputs, written)
         firm.hears = _stays(inputs, written) + firmware.latency
     if goal != NOWHERE and goal != firm.written:
-        since = _since(inputs, written)
-        if firm.written != NOWHERE:  # a tick ago it was another, whatever a command from call to call says of its start
-            since = max(since, written - firmware.T_c)
-        firm.written, firm.heard, firm.tripped = goal, since + firmware.latency, 0
+        firm.written, firm.heard, firm.tripped = goal, _since(inputs, written) + firmware.latency, 0
         control.aim(firmware, firm, goal)
 
 
