@@ -33,6 +33,8 @@ OTHERS = {
     ("simulation/remarks.py", "heat"): "what a servo trips by, as people read it",
     ("simulation/vector_buses.py", "source"): "a field of what servos on a bus share",
     ("simulation/lanes/store.py", "chip"): "a field of a memory",
+    ("simulation/lanes/lane_threads.py", "chip"): "a field of a memory",
+    ("simulation/compile/threads.py", "firmware"): "a field of what a program gets",
     ("models/engine/batch/digital_batch.py", "sensor"): "a field of a tile",
     ("models/engine/batch/tiles.py", "chip"): "a field of a tile",
 }

@@ -48,7 +48,7 @@ from servotwin.models.terms.dependence import (
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.frame import NO_CHIP, Chip, Decision, Frame
 from servotwin.models.terms.given import Given, Hung, hung_of
-from servotwin.models.terms.numbers import NOTHING, Numbers
+from servotwin.models.terms.numbers import APART, NOTHING, Numbers
 from servotwin.models.terms.sensor import table_of
 from servotwin.models.terms.wiring import Wiring
 from servotwin.physics.pieces import Piece
@@ -57,7 +57,7 @@ from servotwin.simulation.compile.c_types import identifier
 from servotwin.simulation.compile.signatures import named
 from servotwin.simulation.compile.standalone import Standalone
 from servotwin.simulation.compile.text.kinds import FLOAT64, INT64, Array, Kind, Record, Tuple
-from servotwin.simulation.lanes.forms import APART, Terms
+from servotwin.simulation.lanes.forms import Terms
 from servotwin.text import c_comment
 
 if TYPE_CHECKING:

@@ -75,6 +75,8 @@ ROOMS: dict[str, Any] = {**dict(fields_of(Numbers)), "chip": Chip, "firmware": F
 """The records of all terms, by name."""
 NOTHING: dict[str, Any] = {**NEUTRAL._asdict(), "chip": NO_CHIP, "firmware": NO_FIRMWARE}
 """Their values where they are absent."""
+APART = ("heat.T_amb",)
+"""Numbers that a servo without the term has too: its temperature, for where nothing gets warm."""
 
 
 def paths(prefix: str = "", rooms: Any = None) -> Iterator[tuple[str, Any, str]]:

@@ -52,7 +52,7 @@ from servotwin.models.terms.dependence import (
 )
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.frame import NO_CHIP, Chip
-from servotwin.models.terms.numbers import ACTS, NOTHING, ROOMS, Numbers
+from servotwin.models.terms.numbers import ACTS, APART, NOTHING, ROOMS, Numbers
 from servotwin.physics.pieces import Piece
 from servotwin.simulation.compile import Recipe, is_plain
 from servotwin.simulation.compile.text.unread import FROM_TICK_TO_TICK, IN_GENERAL, in_general, unread
@@ -66,7 +66,6 @@ _ENTRIES = tuple(f"servotwin.models.engine.run.runs:{name}" for name in ("start"
                                                                     "note_failures"))
 _DIGITAL = PROGRAM | BEYOND | AT_COMMANDS | PWM | ONE_WAY
 _EVERYWHERE = STRAIGHT | DRY | AT_STOPS | SHOWN
-APART = ("heat.T_amb",)  # stands apart too, for where nothing gets warm
 
 
 # --- Lanes side by side -----------------------------------------------------------------------------------------------
