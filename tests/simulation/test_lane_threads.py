@@ -5,6 +5,7 @@ Here a processor goes through the text; on a GPU it is the same text, made to PT
 
 import re
 import shutil
+import subprocess
 
 import numpy as np
 import pytest
@@ -76,16 +77,16 @@ def goals(rng, lanes):
         firmware__bus_latency=(1e-4, 2e-3, 0.0))
 
 
-CASES = {  # servo, what its lanes have, way, how many, and how far they may be off in float64 and float32 [rad]
-    "arcs": (st.PulseServo, PLAIN, plain, PULSES_BY_ARCS, 120, 1e-12, 2e-5),
-    "legs": (st.PulseServo, PLAIN, analog, PULSES_BY_LEGS, 240, 1e-9, None),
-    "goals": (st.DigitalServo, GOALS, goals, TICKS, 160, 1e-9, None),
-    "pulses": (st.DigitalServo, PULSES, programmed, TICKS, 80, 1e-9, None)}
+CASES = {  # servo, what its lanes have, way, how many, and how far they may be off [rad]; play multiplies rounding
+    "arcs": (st.PulseServo, PLAIN, plain, PULSES_BY_ARCS, 120, 1e-12),
+    "legs": (st.PulseServo, PLAIN, analog, PULSES_BY_LEGS, 240, 1e-11),
+    "goals": (st.DigitalServo, GOALS, goals, TICKS, 160, 1e-9),
+    "pulses": (st.DigitalServo, PULSES, programmed, TICKS, 80, 1e-11)}
 
 
 def made(case, lanes=None, seed=5):
     """Return lanes side by side, bounds of their angles, and a generator."""
-    kind, name, draw, _, count, *_ = CASES[case]
+    kind, name, draw, _, count, _ = CASES[case]
     rng, lanes = np.random.default_rng(seed), lanes or count
     sims = st.VectorSimulator(kind(st.load_servo(name)), lanes, seed=seed, parameters=draw(rng, lanes))
     lower, upper, _ = sims._numbers.now(Stops)
@@ -140,7 +141,7 @@ def test_floats_are_off_by_what_they_round():
     own, _ = entered(sims, "float32")
     assert own.reals.dtype == np.float32
     worst, _ = advanced(sims, own, low, high, rng)
-    assert np.quantile(worst, 0.9) <= 2e-5  # where a pulse more or less is decided by a digit, more
+    assert 0.0 < np.quantile(worst, 0.99) <= 5e-6  # where a pulse more or less is decided by a digit, more
 
 
 def test_a_lane_is_the_same_alone_among_others_and_in_any_order():
@@ -195,10 +196,10 @@ def test_a_lane_that_has_failed_is_nan_until_it_is_put_anew_and_harms_no_other()
 
 
 @pytest.mark.parametrize(("kind", "name", "more", "dtype", "words"), [
-    (st.PulseServo, PLAIN, {"load": st.loads.Pendulum(mass=0.1, length=0.1)}, "float64", "curved q"),
+    (st.PulseServo, PLAIN, {"load": st.loads.Pendulum(mass=0.1, length=0.1)}, "float64", "a pendulum"),
     (st.PulseServo, PLAIN, {"load": st.loads.Recorded(time=[0.0, 1.0], torque=[0.0, 0.1])}, "float64", "recorded"),
-    pytest.param(st.PulseServoInductive, PLAIN, {}, "float64", "on i", marks=pytest.mark.slow),
-    (st.BoundedServo, PLAIN, {}, "float64", "follows"),
+    pytest.param(st.PulseServoInductive, PLAIN, {}, "float64", "inductance", marks=pytest.mark.slow),
+    (st.BoundedServo, PLAIN, {}, "float64", "follows the error"),
     (st.PulseServo, PLAIN, {"bus": st.Supply(open_circuit_voltage=6.0, internal_resistance=0.2)}, "float64", "supply"),
     pytest.param(st.DigitalServo, PULSES, {}, "float32", "pulses, in float32", marks=pytest.mark.slow)])
 def test_lanes_that_it_does_not_follow_are_refused_by_name(kind, name, more, dtype, words):
@@ -209,12 +210,14 @@ def test_lanes_that_it_does_not_follow_are_refused_by_name(kind, name, more, dty
 
 
 def on_device():
-    """Return whether there is a compiler that makes PTX."""
-    return shutil.which("clang") is not None
+    """Return whether there is a clang that makes PTX."""
+    if shutil.which("clang") is None:
+        return False
+    return "nvptx64" in subprocess.run(["clang", "--print-targets"], capture_output=True, text=True, check=False).stdout
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not on_device(), reason="no clang, which makes PTX")
+@pytest.mark.skipif(not on_device(), reason="no clang that makes PTX")
 @pytest.mark.parametrize("case", ["arcs", "goals"])
 def test_ptx_of_floats_calls_nothing_and_has_no_doubles(case):
     sims, *_ = made(case, 2)

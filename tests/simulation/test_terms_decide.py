@@ -30,6 +30,7 @@ OTHERS = {
     ("simulation/lanes/lane_numbers.py", "load"): "the same",
     ("simulation/lanes/packed.py", "motor"): "what is recorded of the motor's contact",
     ("simulation/lanes/packed.py", "firmware"): "a field of what all lanes share",
+    ("simulation/lanes/forms.py", "heat"): "what lanes may have, as people read it",
     ("simulation/remarks.py", "heat"): "what a servo trips by, as people read it",
     ("simulation/vector_buses.py", "source"): "a field of what servos on a bus share",
     ("simulation/lanes/store.py", "chip"): "a field of a memory",

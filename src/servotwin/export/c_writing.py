@@ -28,21 +28,8 @@ from servotwin.models.state.records import numbers_in, record_of
 from servotwin.models.terms import wiring
 from servotwin.models.terms.control import Firm
 from servotwin.models.terms.dependence import (
-    BY_SHARE,
-    CURVED_Q,
-    DROPS,
-    FADING,
-    ON_HEAT,
-    ON_I,
-    PLAY,
     PROGRAM,
-    PULSES,
     PWM,
-    REGULATED,
-    SLACK,
-    SPRING,
-    STEEP_W,
-    STEPS,
     TABLE,
 )
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
@@ -57,7 +44,7 @@ from servotwin.simulation.compile.c_types import identifier
 from servotwin.simulation.compile.signatures import named
 from servotwin.simulation.compile.standalone import Standalone
 from servotwin.simulation.compile.text.kinds import FLOAT64, INT64, Array, Kind, Record, Tuple
-from servotwin.simulation.lanes.forms import Terms
+from servotwin.simulation.lanes.forms import WORDS, Terms
 from servotwin.text import c_comment
 
 if TYPE_CHECKING:
@@ -319,17 +306,9 @@ def recipe_of(flags: int) -> Recipe:
                   always=always, never=("ALL", "READINGS"))
 
 
-_WORDS = {
-    ON_I: "inductance", CURVED_Q: "a pendulum", ON_HEAT: "heat", PLAY: "play of the gear",
-    SPRING: "a spring between two bodies",
-    FADING: "friction that fades", BY_SHARE: "friction by torque", REGULATED: "a limit of current",
-    SLACK: "play of the potentiometer", STEPS: "its steps", TABLE: "its table", DROPS: "drops and open bridges",
-    PULSES: "pulses", PROGRAM: "a program", STEEP_W: "smoothed friction"}
-
-
 def left_out(flags: int) -> str:
     """Return in words what the code of a servo that asks for this does not follow."""
-    return ", ".join(word for flag, word in _WORDS.items() if not flags & flag) or "nothing"
+    return ", ".join(word for flag, word in WORDS.items() if not flags & flag) or "nothing"
 
 
 # --- The function of an exported servo that makes its numbers of parameters, around the kernels that pack -------------

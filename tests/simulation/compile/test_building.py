@@ -22,7 +22,7 @@ RECIPE = Recipe("noise", ("servotwin.models.state.noise:gaussian",))
 SCRIPT = """
 import sys
 from servotwin.simulation.compile import Recipe, backend, building, kernels
-building.LONGEST = float(sys.argv[1])
+building._LONGEST = float(sys.argv[1])
 kernel = kernels(Recipe("noise", ("servotwin.models.state.noise:gaussian",)))
 print(kernel.gaussian(3, 7), "plain" if backend.is_plain() else "compiled")
 """
@@ -102,7 +102,7 @@ BAD = {
     "names nothing": (None, "SERVOTWIN_CC names no program (no-such-compiler)"),
     "fails": (('echo "x.c:1: error: I do not like it" >&2', "exit 1"), "x.c:1: error: I do not like it"),
     "fails without a word": (("exit 3",), "it ended with 3"),
-    "makes nothing": (("exit 0",), "it made no library"),
+    "makes nothing": (("exit 0",), "it made no file"),
     "is killed half way": (('for a; do last=$o; o=$a; done; kill -9 $$',), "it ended with -9"),
     "writes rubbish": (('while [ "$1" != -o ]; do shift; done; echo rubbish > "$2"',),
         "file too short|invalid ELF header"),

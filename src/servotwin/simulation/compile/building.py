@@ -31,7 +31,7 @@ from servotwin.simulation.compile.storage import is_there, key_of, writable_fold
 from servotwin.simulation.compile.text.derive import derive
 from servotwin.simulation.compile.text.translate import Translation, translated
 
-LONGEST = 600.0  # s that a compiler may take
+_LONGEST = 600.0  # s that a compiler may take
 
 
 def made(recipe: Recipe, useless: set[Path]) -> Iterator[Built]:
@@ -81,23 +81,30 @@ def compiled(recipe: Recipe, text: str, compiler: Compiler, path: Path) -> str |
     with tempfile.TemporaryDirectory(prefix=".making-", dir=path.parent, ignore_cleanup_errors=True) as aside:
         source, library = Path(aside) / f"{recipe.name}.c", Path(aside) / f"made{SUFFIX}"
         source.write_text(text, encoding="utf-8")
-        said = Path(aside) / "said.txt"
-        try:
-            command = compiler.library_command(source, library, recipe.vector, level())
-            ended = run(command, compiler.environment(path.parent), said)
-        except subprocess.TimeoutExpired:
-            return f"it took more than {LONGEST:g} s"
-        if ended != 0 or not library.exists():
-            all_lines = said.read_text(encoding="utf-8", errors="replace").splitlines()
-            lines = [line for line in all_lines if "error" in line] or [line for line in all_lines if line.strip()]
-            return lines[0].strip() if lines else f"it ended with {ended}" if ended else "it made no library"
+        command = compiler.library_command(source, library, recipe.vector, level())
+        problem = ran(command, compiler.environment(path.parent), Path(aside) / "said.txt", library)
+        if problem is not None:
+            return problem
         library.chmod(0o700)  # a wide umask would let others write it
         with contextlib.suppress(PermissionError):  # Windows: another process has made it, and loaded it already
             os.replace(library, path)
     return None
 
 
-def run(command: list[str], environment: dict[str, str], said: Path) -> int:
+def ran(command: list[str], environment: dict[str, str], said: Path, made: Path) -> str | None:
+    """Run a compiler that makes a file; return what is wrong, if anything."""
+    try:
+        ended = _run(command, environment, said)
+    except subprocess.TimeoutExpired:
+        return f"it took more than {_LONGEST:g} s"
+    if ended == 0 and made.exists():
+        return None
+    all_lines = said.read_text(encoding="utf-8", errors="replace").splitlines()
+    lines = [line for line in all_lines if "error" in line] or [line for line in all_lines if line.strip()]
+    return lines[0].strip() if lines else f"it ended with {ended}" if ended else "it made no file"
+
+
+def _run(command: list[str], environment: dict[str, str], said: Path) -> int:
     """Run a compiler in the folder of what it says; those that it has started end with it, by force if need be.
 
     A pipe would be waited for as long as one of them holds it.
@@ -105,7 +112,7 @@ def run(command: list[str], environment: dict[str, str], said: Path) -> int:
     with said.open("w") as file, subprocess.Popen(command, cwd=said.parent, env=environment, stdin=subprocess.DEVNULL,
                                                   stdout=file, stderr=file, start_new_session=True) as process:
         try:
-            return process.wait(LONGEST)
+            return process.wait(_LONGEST)
         except BaseException:
             with contextlib.suppress(OSError):
                 if sys.platform == "win32":

@@ -83,9 +83,8 @@ class Standalone:
         """Return C of doubles as C of what numbers are here."""
         return in_floats(text) if self._floats else text
 
-    @property
-    def narrow(self) -> str:
-        """The same as `private`, without headers; whole numbers have 32 bits, but for seeds and what draws by them."""
+    def narrowed(self) -> str:
+        """Return the same as `private`, without headers; whole numbers have 32 bits, but for seeds and their draws."""
         types, functions = self.types, self._printer.functions
         for part in (types.structs, types.tables, types.helpers):
             part[:] = [_WHOLE.sub("int32_t", _SIZES.sub("", each)) for each in part]

@@ -10,7 +10,6 @@ from __future__ import annotations
 import ctypes
 import os
 import re
-import subprocess
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -31,7 +30,7 @@ from servotwin.models.terms.dependence import PROGRAM, PWM
 from servotwin.models.terms.firmware import Firmware
 from servotwin.models.terms.frame import Chip, Frame
 from servotwin.models.terms.numbers import Numbers
-from servotwin.simulation.compile.building import LONGEST, alone, compiled
+from servotwin.simulation.compile.building import alone, compiled, ran, tell
 from servotwin.simulation.compile.c_types import identifier
 from servotwin.simulation.compile.finding import SUFFIX, Compiler, compilers, flags, level
 from servotwin.simulation.compile.recipe import Recipe
@@ -126,7 +125,7 @@ INLINED void one(const lane_table *of, int32_t lane) {
 $loads
 $call
     if (status != 0)
-        stand.y.q = stand.y.w = NAN;
+        stand.y.q = stand.y.w = stand.y.q_m = stand.y.w_m = NAN;
     n = ANEW(n); /* addresses anew, too: kept since the loads they would take a register each, or two */
 $stores
     of->status[lane] = status;
@@ -289,7 +288,7 @@ def _printed(own: LaneText) -> str:
     many, kth = ("(of.left ? *of.count : of.lanes)", "(of.left ? of.left[k] : k)") if by_legs else ("of.lanes", "k")
     real = f"typedef {'float' if own.floats else 'double'} real;\n"
     around = _AROUND.substitute(lane=lane + prepare, many=many, kth=kth)
-    kernels = _RINGS.sub(r"\1 *\2;", text.narrow)
+    kernels = _RINGS.sub(r"\1 *\2;", text.narrowed())
     return "\n".join([part_of_header("device.h"), _EXPORTED, kernels, real + _TABLE, around])
 
 
@@ -321,15 +320,18 @@ def _kept(own: LaneText, end: str, make: Callable[[Compiler, Path], str | None])
     """Return the file that a compiler makes of a text, from the cache where it is there."""
     folder, problems = writable_folder(), []
     for compiler in compilers():
-        key = key_of(own.text, compiler.identity, *compiler.command, *flags(False, level()))
+        key = key_of(own.text, compiler.identity, *compiler.command, *flags(False, level()), *_NVPTX, *_FOR_PTX)
         path = folder / f"{own.recipe.name}-{key}{end}"
-        with alone(path):
-            problem = None if is_there(path) else make(compiler, path)
+        try:
+            with alone(path):
+                problem = None if is_there(path) else make(compiler, path)
+        except OSError as error:
+            problem = str(error)
         if problem is None:
             return path
         problems.append(f"{Path(compiler.command[0]).name}: {problem}")
     raise InputError("lanes one a thread", "; ".join(problems) or "no C compiler",
-                       "clang or zig for a GPU, any C compiler for this processor")
+                     "clang or zig for a GPU, any C compiler for this processor")
 
 
 _NVPTX = ("-march=sm_80", "-Xclang", "-target-feature", "-Xclang", "+ptx70")  # Ampere and later, drivers from 2020 on
@@ -341,20 +343,20 @@ def _as_ptx(own: LaneText, compiler: Compiler, path: Path) -> str | None:
 
     C has no word for a kernel, so the calling convention is put into the intermediate text.
     """
+    tell()
     zig = "ziglang" in compiler.command
     target = ("-target", "nvptx64-cuda-none") if zig else ("--target=nvptx64-nvidia-cuda",)
     with tempfile.TemporaryDirectory(prefix=".making-", dir=path.parent, ignore_cleanup_errors=True) as aside:
-        source, middle, made = (Path(aside) / name for name in ("lanes.c", "lanes.ll", "lanes.ptx"))
+        source, middle, made, said = (Path(aside) / name for name in ("lanes.c", "lanes.ll", "lanes.ptx", "said.txt"))
         source.write_text(own.text, encoding="utf-8")
         for before, after, more in ((source, middle, ("-emit-llvm",)), (middle, made, ())):
             command = [*compiler.command, *target, *_NVPTX, *_FOR_PTX, "-S", *more, str(before), "-o", str(after)]
-            said = subprocess.run(command, env=compiler.environment(path.parent), capture_output=True, text=True,
-                                  timeout=LONGEST, check=False)
-            if said.returncode != 0 or not after.exists():
-                lines = [line for line in said.stderr.splitlines() if "error" in line]
-                return lines[0].strip() if lines else f"it ended with {said.returncode}"
+            problem = ran(command, compiler.environment(path.parent), said, after)
+            if problem is not None:
+                return problem
             if more:
-                middle.write_text(_KERNEL.sub("define ptx_kernel void @servotwin", middle.read_text()))
+                text = middle.read_text(encoding="utf-8")
+                middle.write_text(_KERNEL.sub("define ptx_kernel void @servotwin", text), encoding="utf-8")
         os.replace(made, path)
     return None
 

@@ -68,6 +68,15 @@ _DIGITAL = PROGRAM | BEYOND | AT_COMMANDS | PWM | ONE_WAY
 _EVERYWHERE = STRAIGHT | DRY | AT_STOPS | SHOWN
 
 
+WORDS = {
+    ON_I: "inductance", CURVED_Q: "a pendulum", ON_HEAT: "heat", PLAY: "play of the gear",
+    SPRING: "a spring between two bodies",
+    FADING: "friction that fades", BY_SHARE: "friction by torque", REGULATED: "a limit of current",
+    SLACK: "play of the potentiometer", STEPS: "its steps", TABLE: "its table", DROPS: "drops and open bridges",
+    PULSES: "pulses", PROGRAM: "a program", STEEP_W: "smoothed friction"}
+"""What some demands are called in sentences."""
+
+
 # --- Lanes side by side -----------------------------------------------------------------------------------------------
 BANDED = BY_SHARE | FADING | REGULATED
 STRIDING = ON_HEAT | CURVED_Q | ON_Q

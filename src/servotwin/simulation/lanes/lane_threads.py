@@ -16,7 +16,6 @@ from servotwin.models.engine.batch.segments.linear_segments import ArcNumbers
 from servotwin.models.engine.memory import SAME, Memories, put_started
 from servotwin.models.state.modes import NOWHERE, RIGID
 from servotwin.models.state.records import rows_of
-from servotwin.models.terms import dependence
 from servotwin.models.terms.control import WAITING
 from servotwin.models.terms.dependence import (
     AT_COMMANDS,
@@ -25,6 +24,7 @@ from servotwin.models.terms.dependence import (
     BY_SHARE,
     DROPS,
     DRY,
+    ON_Q,
     ONE_WAY,
     PLAY,
     PROGRAM,
@@ -44,7 +44,7 @@ from servotwin.models.terms.numbers import Numbers
 from servotwin.simulation.compile import threads
 from servotwin.simulation.compile.c_types import identifier
 from servotwin.simulation.compile.threads import PULSES_BY_ARCS, PULSES_BY_LEGS, RINGS, TICKS, LaneText
-from servotwin.simulation.lanes.forms import Terms
+from servotwin.simulation.lanes.forms import WORDS, Terms
 from servotwin.simulation.lanes.whole_runs import nothing_yet, taken
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 _BY_ARCS = STRAIGHT | DRY | AT_STOPS | SHOWN | PULSES | SLACK | STEPS | TABLE
 _BY_LEGS = _BY_ARCS | DROPS | SILENCE | PLAY | TWO_BODIES | BY_SHARE
 _BY_TICKS = _BY_LEGS & ~PULSES | PROGRAM | PWM | ONE_WAY | AT_COMMANDS | BEYOND
-_NAMES = {flag: name for name, flag in vars(dependence).items() if type(flag) is int and name.isupper()}
+_WORDS = WORDS | {ON_Q: "a load that hangs on the angle"}
 
 
 def text_of(numbers: LaneNumbers, dtype: str) -> LaneText:
@@ -70,7 +70,7 @@ def text_of(numbers: LaneNumbers, dtype: str) -> LaneText:
     flags = Terms(own.numbers, own.chips, program, inputs=TABLE if packed.curve.size else 0).followed
     digital, floats = numbers.digital, dtype == "float32"
     left = flags & ~(_BY_TICKS if digital else _BY_LEGS)
-    words = [name.lower().replace("_", " ") for flag, name in _NAMES.items() if left & flag == flag]
+    words = [word for flag, word in _WORDS.items() if left & flag]
     if numbers.supplies.lanes:
         words.append("several servos on a supply")
     if numbers.recorded:
@@ -79,8 +79,8 @@ def text_of(numbers: LaneNumbers, dtype: str) -> LaneText:
         words.append("a voltage that follows the error")
     if digital and floats and np.any(program.goals == 0.0):
         words.append("goals told by pulses, in float32")
-    if words:
-        raise InputError("lanes one a thread", got=", ".join(words),
+    if words or left:
+        raise InputError("lanes one a thread", got=", ".join(words) or "a term that no text follows",
                          allowed="pulse servos and digital servos without heat, inductance, springs, pendulums, "
                                  "fading friction and regulators, each on a supply of its own")
     if digital:

@@ -32,8 +32,8 @@ typedef unsigned long uintptr_t;
 #define rintf __builtin_rintf
 #define copysign __builtin_copysign
 #define copysignf __builtin_copysignf
-#define fmod(a, b) ((a) - (b) * __builtin_trunc((a) / (b)))
-#define fmodf(a, b) ((a) - (b) * __builtin_truncf((a) / (b)))
+double fmod(double, double); /* there is none: no text may need it */
+float fmodf(float, float);
 #define IN_REGISTER "+l"
 #else
 #include <math.h>
@@ -44,4 +44,4 @@ typedef unsigned long uintptr_t;
 #define IN_REGISTER "+r"
 #endif
 /* A tile whose numbers have to be read now: registers are for what changes. */
-#define ANEW(tile) ({ __typeof__(tile) own = (tile); __asm__ volatile("" : IN_REGISTER(own)); own; })
+#define ANEW(tile) ({ __typeof__(tile) read_anew = (tile); __asm__ volatile("" : IN_REGISTER(read_anew)); read_anew; })
