@@ -247,3 +247,23 @@ def test_the_text_in_plain_python_is_the_same():
         assert gone.status == 0
         assert own.column("stand.y.q")[2] == pytest.approx(stand.y.q, abs=1e-12)
         assert (own.column("stand.frames")[2], own.column("now.number")[2]) == (stand.frames, now.number)
+
+
+def test_decisions_that_come_after_the_next_edge():
+    """Frames are shorter here than the pulse of the one-shot, so that a decision waits, and a second one behind it."""
+    model, lanes, rng = st.PulseServo(st.load_servo(PLAIN)), 40, np.random.default_rng(3)
+    periods = rng.uniform(1.55e-3, 1.9e-3, lanes)
+    sims = st.VectorSimulator(model, lanes, parameters={"electronics.frame_period": periods})
+    sims.reset(pulse_width=1.2e-3, output_angle=rng.uniform(2.0, 3.2, lanes))
+    own, every = entered(sims)
+    waited = False
+    for k in range(40):
+        width = rng.uniform(0.9e-3, 1.5e-3, lanes)
+        sims.advance(3.1e-3, pulse_width=width)
+        own.advance(3.1e-3, sims._store.command, sims._store.total)
+        waited = waited or np.any(own.column("now.pending.time") > periods)
+        if k % 7 == 3:
+            own.put(every, own.memories(every))
+        np.testing.assert_allclose(own.column("stand.y.q"), sims["output_angle"], rtol=0.0, atol=1e-12)
+        assert np.array_equal(own.status, sims.status)
+    assert waited
