@@ -74,7 +74,7 @@ WORDS = {
     FADING: "friction that fades", BY_SHARE: "friction by torque", REGULATED: "a limit of current",
     SLACK: "play of the potentiometer", STEPS: "its steps", TABLE: "its table", DROPS: "drops and open bridges",
     PULSES: "pulses", PROGRAM: "a program", STEEP_W: "smoothed friction"}
-"""What some demands are called in sentences."""
+"""Demands in sentences."""
 
 
 # --- Lanes side by side -----------------------------------------------------------------------------------------------
