@@ -30,13 +30,13 @@ export function mount(root, bench) {
     if (header.replaying !== null) return `repeating ${Math.round(100 * header.replaying)} %`;
     if (!header.running) return "stands";
     const second = `${engineering(header.pace, "s", 2)} in a second`;
-    if (header.behind || (asked() !== Infinity && header.pace < 0.97 * asked() && header.t > 2 * asked())) return `cannot keep up: ${second}`;
+    if (header.behind || (asked() !== Infinity && header.pace < 0.97 * asked() && header.t > 2 * asked())) return `only ${second}`; // cannot keep up
     return asked() === 1 ? "real time" : second;
   };
   const draw = paced(() => {
     run.textContent = header.running ? "Pause" : "Run";
     time.textContent = `${header.t.toFixed(asked() >= 0.01 ? 3 : 6)} s`;
-    pace.textContent = says();
+    pace.textContent = pace.title = says();
     pace.classList.toggle("late", header.behind);
     const value = [...speed.options].find((one) => one.value === String(header.speed) || Number(one.value) === Number(header.speed))?.value;
     if (document.activeElement !== speed && value !== undefined) speed.value = value;
