@@ -114,6 +114,23 @@ def test_events_are_those_of_a_result(compiled):
             assert (time, angle) == pytest.approx((event.time, event.value), abs=1e-9)
 
 
+@pytest.mark.slow
+def test_goals_after_a_silence_are_followed(tmp_path):
+    """As in lanes: a servo that was limp for want of a goal is so no more."""
+    model = st.DigitalServo(st.load_servo("feetech-sts3215-12v").replace({
+        "firmware.signal_timeout": 0.15, "firmware.signal_loss": "limp", "firmware.bus_latency": 7e-4}))
+    c = CServo(export.c(model, st.loads.Load(torque=0.8), name="servo"), tmp_path, COMPILERS[0], ("-O1",))
+    lanes = st.VectorSimulator(model, 1, load=st.loads.Load(torque=0.8))
+    lanes.reset(command_angle=0.1)
+    c.start(c.command(0.1))
+    for k in range(80):
+        goal = 0.1 if k < 30 else 0.4
+        lanes.advance(0.02, command_angle=goal)
+        assert c.advance(0.02 * (k + 1), c.command(goal)) == 0
+        assert c.observe(c.command(goal))["output_angle"] == pytest.approx(
+            lanes["output_angle"][0], abs=1e-11)
+
+
 def test_events_beyond_the_room_are_counted(compiled):
     c = compiled("plain")
     counts = []

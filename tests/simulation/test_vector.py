@@ -1,6 +1,7 @@
 """Many servos that stop and go on: the same as one that does, however time is cut, and whatever is changed between."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,9 @@ import servotwin as st
 from conftest import EVERYTHING
 from servotwin.errors import CommandError, InputError, ServotwinError, UnknownNameError
 from servotwin.models.engine.memory import memory_of, time_of
+from servotwin.physics.pieces import Piece, Pieces
 from servotwin.simulation.engine import State
+from servotwin.simulation.lanes.lane_threads import ThreadedLanes
 from vector_cases import CASES, INDUCTIVE, INTEGRATED, WIDTHS, model_of
 
 
@@ -545,3 +548,33 @@ def test_a_lane_that_fails_harms_no_other(servo):
     sims.advance(0.05)
     assert sims.status.tolist() == [0, 0, 0]
     assert np.isfinite(sims["output_angle"]).all()
+
+
+@pytest.mark.parametrize("latency", [0.0, 7e-4, 3e-3])
+@pytest.mark.parametrize("tick", [1e-3, 7.3e-3, 0.02])
+def test_goals_after_a_silence_are_those_of_a_stepped_goal(latency, tick):
+    """A bus servo is limp when no goal has come for a while, and follows the next: in every way a goal is given."""
+    model = st.DigitalServo(st.load_servo("feetech-sts3215-12v").replace({
+        "firmware.signal_timeout": 0.15, "firmware.signal_loss": "limp", "firmware.bus_latency": latency}))
+    load, count = st.loads.Load(inertia=1e-3, torque=0.8), round(0.9 / tick)
+    changes = {0: 0.1, count // 4: 0.4, count // 2: 0.3, count // 2 + 1: 0.35, count // 2 + 2: 0.2, 3 * count // 4: 0.5}
+    stepped = st.signals.constant(0.1, unit="rad")
+    stepped = replace(stepped, pieces=Pieces(tuple(Piece(tick * k, goal) for k, goal in changes.items())))
+    many = st.VectorSimulator(model, 2, load=load)
+    many.reset(command_angle=0.1)
+    threaded = ThreadedLanes(many._numbers, "float64")
+    threaded.put(np.arange(2), many._store.memories())
+    sim, goal, limp = st.Simulator(model, load), 0.1, 0
+    whole = one = sim.initial(stepped)
+    for k in range(count):
+        goal = changes.get(k, goal)
+        whole = sim.advance(whole, tick * (k + 1), stepped)
+        one = sim.advance(one, tick * (k + 1), st.signals.constant(goal, unit="rad"))
+        many.advance(tick, command_angle=goal)
+        threaded.advance(tick, many._store.command, many._store.total)
+        angle = sim.observe(whole, "output_angle", stepped)
+        limp += sim.observe(whole, "duty", stepped) == 0.0
+        assert sim.observe(one, "output_angle", st.signals.constant(goal, unit="rad")) == angle
+        assert many["output_angle"] == pytest.approx(angle, abs=1e-12)
+        assert threaded.column("stand.y.q") == pytest.approx(angle, abs=1e-9)
+    assert 0.1 < limp / count < 0.7

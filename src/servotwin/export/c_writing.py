@@ -431,7 +431,7 @@ _SAME, _NEARLY = "the digits are the same, but for rounding", "angles are those 
 _CURVE = ("    const double *curve; /* of the potentiometer: angle [rad] and error [V] */\n"
           "    int64_t curve_rows;\n")
 _PASSING = ("        state->firm.tick -= frames;\n"
-            "        state->firm.heard -= (float)passed, state->firm.hears -= (float)passed;\n")
+            "        state->firm.heard -= (float)passed, state->firm.since -= (float)passed;\n")
 _BEAT = "    double beat; /* by which the clock counts [s], in all its digits */\n"
 _TABLE = Array(FLOAT64, 2)
 _PROGRAM, _FIRM, _MEMORY, _EVENT = (Record(record_of(kind)) for kind in (Firmware, Firm, Memory, Happened))

@@ -152,7 +152,7 @@ def _read_bus(inputs: Inputs, firm: Any, time: float) -> None:
         goal = _goal(inputs, written)
         firm.hears = _stays(inputs, written) + firmware.latency
     if goal != NOWHERE and goal != firm.written:
-        firm.written, firm.heard, firm.tripped = goal, _since(inputs, written) + firmware.latency, 0
+        firm.written, firm.heard, firm.tripped = goal, _since(inputs, firm, written) + firmware.latency, 0
         control.aim(firmware, firm, goal)
 
 
@@ -171,11 +171,19 @@ def _stays(inputs: Inputs, time: float) -> float:
     return end if piece.slope == 0.0 and piece.amplitude == 0.0 and piece.start <= time else time
 
 
-def _since(inputs: Inputs, time: float) -> float:
+def _since(inputs: Inputs, firm: Any, time: float) -> float:
     """Return when what stands on the bus at a time [s] was written: once, or over and over where it changes."""
     piece, _ = in_force(inputs.command, 0.0, time + SAME * inputs.firmware[0].T_c, 0.0)
     still = piece.slope == 0.0 and piece.amplitude == 0.0
-    return max(piece.start, 0.0) if still else time
+    return min(max(piece.start, firm.since), time) if still else time
+
+
+def take_up(inputs: Inputs, firm: Any, now: float) -> None:
+    """Let a call begin, at a time [s], with a goal that may be another one than the calls before had."""
+    firm.hears = -math.inf
+    start, goal = inputs.command[0][0], inputs.command[0][1]
+    if start <= 0.0 and goal != firm.given:
+        firm.given, firm.since = goal, now
 
 
 def rise(inputs: Inputs, firm: Any) -> None:
@@ -191,7 +199,7 @@ def resume(inputs: Inputs, memory: Memory) -> None:
     """Find the next tick and pulse of a program that continues, under commands that may be others than before."""
     firmware, firm = inputs.firmware[0], of(memory)
     time = origin_of(memory) + memory.point.time
-    firm.hears = -math.inf
+    take_up(inputs, firm, time)
     firm.tick = max(0, math.ceil((time - firmware.t_phi) / firmware.T_c - SAME))
     if firmware.goals > 0.0:
         return

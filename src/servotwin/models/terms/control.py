@@ -157,6 +157,8 @@ class Firm(NamedTuple):
     width: float  # of that
     hears: float  # nothing new comes before this time
     heard: float  # when the latest command was taken; -inf: none yet
+    given: float  # the goal that a table of commands begins with, or `NOWHERE`
+    since: float  # from when on it does: one that is another one is written when a call begins
     coming: Duties  # goals of the next ticks that are written already
     known: int  # how many of them
     first: int  # where the next one is
@@ -190,7 +192,7 @@ class Firm(NamedTuple):
 _NONE = cast("Duties", (0.0,) * WAITING)
 AT_START = Firm(
     torque=1, tick=0, draws=0, waiting=0, head=0, duties=_NONE, duty=0.0, decided=0.0, frame=0, falls=math.inf,
-    width=0.0, hears=-math.inf, heard=-math.inf, coming=_NONE, known=0, first=0, written=NOWHERE, goal=NOWHERE,
+    width=0.0, hears=-math.inf, heard=-math.inf, given=NOWHERE, since=0.0, coming=_NONE, known=0, first=0, written=NOWHERE, goal=NOWHERE,
     y=0.0, age=0, x=0.0, y_then=0.0, resting=0, D=0.0, J=0.0, excess=0.0, r=0.0, rate=0.0, on_course=0,
     overload_clock=OFF, overload_y=0.0, overload_sign=0.0, overloaded=0, current_clock=OFF, lost=0,
     tripped=0, hot=0, starved=0, restart=0.0, soft=OFF, trip=NONE)

@@ -194,7 +194,7 @@ class ThreadedLanes:
         if self.text.way == TICKS:
             firm = memories.firms.copy()
             firm["tick"] -= np.where(self._told_goals(which), frames, 0)
-            for name in ("heard", "hears"):
+            for name in ("heard", "since"):
                 firm[name] -= np.where(self._told_goals(which), frames * period, 0.0)
             self._set(which, "firm", firm)
             self.status[which] = 0
@@ -223,7 +223,7 @@ class ThreadedLanes:
         if self.text.way == TICKS:
             self._get(which, "firm", found.firms)
             found.firms["tick"] += np.where(self._told_goals(which), frames, 0)
-            for name in ("heard", "hears"):
+            for name in ("heard", "since"):
                 found.firms[name] += np.where(self._told_goals(which), frames * period, 0.0)
         else:
             self._get(which, "now", rows["chip"])

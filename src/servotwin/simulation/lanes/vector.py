@@ -183,7 +183,8 @@ class VectorSimulator:
         duration : float
             At least 0 [s].
         pulse_width, command_angle, command_voltage : float or array, shape (lanes,), optional
-            The command from now on, one of them [s], [rad] or [V]; the one before unless given.
+            The command from now on, one of them [s], [rad] or [V]; the one before unless given. A goal that stays is
+            not written again: a servo with `firmware.signal_timeout` waits in vain for one.
         external_torque : float or array, shape (lanes,), optional
             Constant torque beside the load from now on; positive pushes towards −q [N m].
 

@@ -104,7 +104,7 @@ def ticks(numbers: Any, j: int, inputs: Inputs, firm: Any, stand: Stand, duratio
     T_c, first, torque = firmware.T_c, 0 if firmware.goals > 0.0 else before, inputs.constant_torque
     left, rest = whole(t + duration, T_c)
     frames, status = first, COMPLETED
-    firm.hears = -math.inf  # the command may be another one
+    controller.take_up(inputs, firm, first * T_c + t)
     while status == COMPLETED and (left > 0 or t < rest):
         own = numbers_at(anew(numbers), j)
         controller.serve(own, inputs, firm, frames, t, y, wiper, frames * T_c)
@@ -119,7 +119,7 @@ def ticks(numbers: Any, j: int, inputs: Inputs, firm: Any, stand: Stand, duratio
     passed = frames * T_c
     controller.pause(inputs, firm, passed + t)
     if firmware.goals > 0.0:
-        firm.tick, firm.heard, firm.hears = firm.tick - frames, firm.heard - passed, firm.hears - passed
+        firm.tick, firm.heard, firm.since = firm.tick - frames, firm.heard - passed, firm.since - passed
     return Stand(y, mesh, wiper, before + frames - first, t), status
 
 
