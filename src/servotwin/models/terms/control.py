@@ -193,9 +193,9 @@ _NONE = cast("Duties", (0.0,) * WAITING)
 AT_START = Firm(
     torque=1, tick=0, draws=0, waiting=0, head=0, duties=_NONE, duty=0.0, decided=0.0, frame=0, falls=math.inf,
     width=0.0, hears=-math.inf, heard=-math.inf, given=NOWHERE, since=0.0, coming=_NONE, known=0, first=0,
-    written=NOWHERE, goal=NOWHERE, y=0.0, age=0, x=0.0, y_then=0.0, resting=0, D=0.0, J=0.0, excess=0.0, r=0.0, rate=0.0, on_course=0,
-    overload_clock=OFF, overload_y=0.0, overload_sign=0.0, overloaded=0, current_clock=OFF, lost=0,
-    tripped=0, hot=0, starved=0, restart=0.0, soft=OFF, trip=NONE)
+    written=NOWHERE, goal=NOWHERE, y=0.0, age=0, x=0.0, y_then=0.0, resting=0, D=0.0, J=0.0, excess=0.0, r=0.0,
+    rate=0.0, on_course=0, overload_clock=OFF, overload_y=0.0, overload_sign=0.0, overloaded=0, current_clock=OFF,
+    lost=0, tripped=0, hot=0, starved=0, restart=0.0, soft=OFF, trip=NONE)
 Programs = Sequence[Firm]
 NOT_STARTED: Programs = (AT_START,)
 ABSENT: Any = 0  # in its place where there is no program
