@@ -1,4 +1,4 @@
-"""Lanes one a thread: what their text costs a GPU, as its assembler sees it, and a processor beside lanes.
+"""Lanes one a thread: what their text costs a GPU, as its assembler sees it, a processor beside lanes, and a GPU.
 
 `ptxas -v` reads PTX without a GPU; it is in the package nvidia-cuda-nvcc (the extra `peers`), or in CUDA's own folder.
 """
@@ -20,11 +20,14 @@ import servotwin as st
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from common import best
 
+from servotwin.errors import ServotwinError
 from servotwin.simulation.compile import threads
+from servotwin.simulation.compile.cuda import Gpu
 from servotwin.simulation.compile.threads import PULSES_BY_ARCS, PULSES_BY_LEGS, LaneText
 from servotwin.simulation.lanes.lane_threads import ThreadedLanes, text_of
 
 LANES, FRAME = 512, 0.02
+MANY, CALLS = (1 << 16, 1 << 20), 100
 ARCHITECTURE = "sm_90"
 CASES = {  # what it is, its servo and model, and the most registers that its kernel gets
     "plain servo, by arcs": ("hitec-hs-755hb", st.PulseServo, 128),
@@ -98,8 +101,35 @@ def on_processor(title: str, model: object) -> None:
           f" {now / before:6.2f} {off:9.1e}")
 
 
+def on_gpu(title: str, model: object, dtype: str, lanes: int) -> None:
+    """Print servo-seconds a second on a GPU, one frame a call, and of how many lanes the bits are those here."""
+    sims = st.VectorSimulator(model, lanes, load=st.loads.Inertia(1e-3))
+    start = time.perf_counter()
+    there = ThreadedLanes(sims._numbers, dtype, "cuda")
+    ready = time.perf_counter() - start
+    here, every, rng = ThreadedLanes(sims._numbers, dtype), np.arange(lanes), np.random.default_rng(0)
+    commands = [there.array("command").gpu.array(np.asarray(sims._numbers.translate.command(
+        None, rng.uniform(0.2, 1.0, lanes), None, None), here.text.real)) for _ in range(4)]
+    torque = there.array("torque").gpu.array(np.zeros(lanes, here.text.real))
+    for each in (there, here):
+        each.put(every, sims._store.memories())
+    for command in commands:
+        there.advance(FRAME, command, torque)
+        here.advance(FRAME, command.read(), 0.0)
+    same = (there.array("reals").read() == here.array("reals")) | np.isnan(here.array("reals"))
+
+    def frames() -> None:
+        for k in range(CALLS):
+            there.advance(FRAME, commands[k // 10 % 4], torque)
+        assert there.left >= 0  # waits for all of it
+
+    taken = best(frames, 3)
+    print(f"{title:34} {dtype:8} {lanes:9} {CALLS * FRAME * lanes / taken:10.2e} {1e3 * taken / CALLS:9.3f} ms"
+          f" {same.all(axis=0).sum():9} {ready:7.1f} s")
+
+
 def main() -> None:
-    """Print both tables."""
+    """Print the tables."""
     models = {title: (kind(st.load_servo(name)), most) for title, (name, kind, most) in CASES.items()}
     texts = {title: {dtype: text_of(st.VectorSimulator(model, 1, load=st.loads.Inertia(1e-3))._numbers, dtype)
                      for dtype in ("float32", "float64")} for title, (model, _) in models.items()}
@@ -118,6 +148,17 @@ def main() -> None:
     print(f"{'':34} {'lanes by':20} {'lanes':>11} {'threads':>11} {'ratio':>6} {'off (rad)':>9}")
     for title, (model, _) in models.items():
         on_processor(title, model)
+    print("\nOn a GPU, a call for each frame, what lanes remember read and written")
+    try:
+        Gpu("cuda")
+    except ServotwinError as error:
+        print(f"{error}: this table is left out")
+        return
+    print(f"{'':34} {'':8} {'lanes':>9} {'servo-s/s':>10} {'a call':>12} {'same bits':>9} {'ready':>9}")
+    for title, (model, _) in models.items():
+        for dtype in ("float32", "float64"):
+            for lanes in MANY:
+                on_gpu(title, model, dtype, lanes)
 
 
 if __name__ == "__main__":

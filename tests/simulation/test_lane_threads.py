@@ -139,7 +139,7 @@ def test_six_hundred_random_servos_are_those_of_lanes(case):
 def test_floats_are_off_by_what_they_round():
     sims, low, high, rng = made("arcs")
     own, _ = entered(sims, "float32")
-    assert own.reals.dtype == np.float32
+    assert own.array("reals").dtype == np.float32
     worst, _ = advanced(sims, own, low, high, rng)
     assert 0.0 < np.quantile(worst, 0.99) <= 5e-6  # where a pulse more or less is decided by a digit, more
 
@@ -162,9 +162,9 @@ def test_a_lane_is_the_same_alone_among_others_and_in_any_order():
         own.advance(duration, command, 0.0)
         again.advance(duration, command[order], 0.0)
         one.advance(duration, command[3], 0.0)
-    assert np.array_equal(own.reals[:, order], again.reals)
-    assert np.array_equal(own.wholes[:, order], again.wholes)
-    assert np.array_equal(own.reals[:, 3], one.reals[:, 0])
+    assert np.array_equal(own.array("reals")[:, order], again.array("reals"))
+    assert np.array_equal(own.array("wholes")[:, order], again.array("wholes"))
+    assert np.array_equal(own.array("reals")[:, 3], one.array("reals")[:, 0])
 
 
 def test_twenty_ticks_are_a_frame():
@@ -188,11 +188,11 @@ def test_a_lane_that_has_failed_is_nan_until_it_is_put_anew_and_harms_no_other()
         each.advance(0.05, command, 0.0)
     assert own.status[2] != 0
     assert np.isnan(own.column("stand.y.q")[2])
-    assert np.array_equal(np.delete(own.reals, 2, 1), np.delete(other.reals, 2, 1))
+    assert np.array_equal(np.delete(own.array("reals"), 2, 1), np.delete(other.array("reals"), 2, 1))
     own.put(every[2:3], sims._store.memories(every[2:3]))
     own.advance(0.05, command, 0.0)
     assert own.status[2] == 0
-    assert np.isfinite(own.reals[:2, 2]).all()
+    assert np.isfinite(own.array("reals")[:2, 2]).all()
 
 
 @pytest.mark.parametrize(("kind", "name", "more", "dtype", "words"), [
@@ -236,7 +236,7 @@ def test_the_text_in_plain_python_is_the_same():
     sims, low, high, rng = made("arcs", 4)
     own, _ = entered(sims)
     command = sims._numbers.translate.command(None, rng.uniform(low, high, 4), None, None)
-    tiles = {name: own._tiles[name].view(np.recarray)[0] for name in ("numbers", "arcs", "chips")}
+    tiles = {name: own.array(name).view(np.recarray)[0] for name in ("numbers", "arcs", "chips")}
     y = Vector(*(own.column(f"stand.y.{name}")[2].item() for name in Vector._fields))
     stand, now = Stand(y, 0, y.q, 0, 0.0), AT_START
     told = int(sims._numbers.columns.seeds[2]), command[2].item(), 0.02

@@ -237,6 +237,11 @@ class LaneText:
         return _printed(self)
 
 
+def entries(own: LaneText) -> tuple[str, ...]:
+    """Return the names of a text's functions, which are kernels on a GPU."""
+    return ("servotwin_advance", "servotwin_prepare") if own.way == PULSES_BY_ARCS else ("servotwin_advance",)
+
+
 _FLOATS, _TABLE_OF = Array(FLOAT64, 1), Array(FLOAT64, 2)
 
 

@@ -1,11 +1,13 @@
 """Lanes that advance one a thread: their columns, what they are called with, and the way from records and back.
 
-The text is that of a GPU (`simulation.compile.threads`); here a processor goes through it, lane after lane.
+The text is one (`simulation.compile.threads`): a GPU goes through it with a thread for each lane, a processor lane
+after lane, with the same digits.
 """
 
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -43,6 +45,7 @@ from servotwin.models.terms.frame import Chip
 from servotwin.models.terms.numbers import Numbers
 from servotwin.simulation.compile import threads
 from servotwin.simulation.compile.c_types import identifier
+from servotwin.simulation.compile.cuda import KDL_CUDA, Gpu, GpuArray, guest, stream_of
 from servotwin.simulation.compile.threads import PULSES_BY_ARCS, PULSES_BY_LEGS, RINGS, TICKS, LaneText
 from servotwin.simulation.lanes.forms import WORDS, Terms
 from servotwin.simulation.lanes.whole_runs import nothing_yet, taken
@@ -53,6 +56,9 @@ if TYPE_CHECKING:
 _BY_ARCS = STRAIGHT | DRY | AT_STOPS | SHOWN | PULSES | SLACK | STEPS | TABLE
 _BY_LEGS = _BY_ARCS | DROPS | SILENCE | PLAY | TWO_BODIES | BY_SHARE
 _BY_TICKS = _BY_LEGS & ~PULSES | PROGRAM | PWM | ONE_WAY | AT_COMMANDS | BEYOND
+_REMEMBERED = ("reals", "wholes", "rings", "status")
+PLAIN_REGISTERS, MOST_REGISTERS = 128, 168  # of a thread by arcs, and by anything else: more threads, or no spills
+Arrays = Mapping[str, NDArray[Any]]
 _WORDS = WORDS | {ON_Q: "a load that hangs on the angle"}
 
 
@@ -88,6 +94,85 @@ def text_of(numbers: LaneNumbers, dtype: str) -> LaneText:
     return LaneText(PULSES_BY_LEGS if flags & ~_BY_ARCS else PULSES_BY_ARCS, flags, floats)
 
 
+class OnProcessor:
+    """Where a processor goes through texts: its arrays are those of numpy."""
+
+    def __init__(self, texts: Sequence[LaneText], arrays: Arrays) -> None:
+        self._libraries, self._arrays = [threads.library(text) for text in texts], arrays
+        self.addresses = {name: array.ctypes.data for name, array in arrays.items()}
+
+    def call(self, k: int, entry: str, table: ctypes.Structure, lanes: int, stream: int) -> None:
+        """Let all lanes go through an entry of the k-th text; the second is for lanes that the first has left."""
+        if k == 0 or self._arrays["count"][0]:
+            getattr(self._libraries[k], entry)(ctypes.byref(table), ctypes.c_int64(0), ctypes.c_int64(lanes))
+
+    def clear(self, name: str, stream: int) -> None:
+        """Set an array to 0."""
+        self._arrays[name][:] = 0
+
+    def seen(self, name: str) -> Any:
+        """Return an array, in place."""
+        return self._arrays[name]
+
+    def given(self, name: str, values: Any, stream: int) -> int:
+        """Return the address of numbers that somebody gives, one for each lane or for all."""
+        self._arrays[name][:] = values
+        return self.addresses[name]
+
+    def fetch(self, *names: str) -> None:
+        """Bring arrays to the processor, where they are not there."""
+
+    def send(self, *names: str) -> None:
+        """Bring them back."""
+
+
+class OnGpu:
+    """Where a GPU does, a thread for each lane: its arrays have a copy on the processor, fetched when that is read."""
+
+    def __init__(self, texts: Sequence[LaneText], arrays: Arrays, device: str) -> None:
+        self._gpu, self._arrays = Gpu(device), arrays
+        self._kernels = [self._gpu.kernels(
+            threads.ptx(text), threads.entries(text),
+            PLAIN_REGISTERS if text.way == PULSES_BY_ARCS else MOST_REGISTERS) for text in texts]
+        self._own = {name: self._gpu.array(array) for name, array in arrays.items()}
+        self.addresses = {name: array.address for name, array in self._own.items()}
+        self._stream, self._guests = 0, dict[str, Any]()
+
+    def call(self, k: int, entry: str, table: ctypes.Structure, lanes: int, stream: int) -> None:
+        """Put an entry of the k-th text on a stream, for all lanes; how many of a list do something, it reads there."""
+        self._stream = stream
+        self._gpu.launch(self._kernels[k][entry], lanes, table, stream)
+
+    def clear(self, name: str, stream: int) -> None:
+        """Set an array to 0."""
+        self._own[name].clear(stream)
+
+    def seen(self, name: str) -> Any:
+        """Return an array, in place."""
+        self._own[name].stream = self._stream
+        return self._own[name]
+
+    def given(self, name: str, values: Any, stream: int) -> int:
+        """Return the address of numbers that somebody gives: an array on the device stays where it is."""
+        own = self._own[name]
+        if hasattr(values, "__dlpack_device__") and int(values.__dlpack_device__()[0]) == KDL_CUDA:
+            address, self._guests[name] = guest(name, values, self._gpu, own.shape, own.dtype, stream)
+            return address
+        self._arrays[name][:] = values
+        own.write(self._arrays[name], stream)
+        return own.address
+
+    def fetch(self, *names: str) -> None:
+        """Bring arrays to the processor."""
+        for name in names:
+            self._arrays[name][:] = self._own[name].read(self._stream)
+
+    def send(self, *names: str) -> None:
+        """Bring them back."""
+        for name in names:
+            self._own[name].write(self._arrays[name], self._stream)
+
+
 class ThreadedLanes:
     """Lanes of one text, with all that they remember in columns.
 
@@ -96,46 +181,47 @@ class ThreadedLanes:
     numbers : LaneNumbers
     dtype : str
         "float64" or "float32": of all numbers, throughout.
+    device : str
+        "cpu", or "cuda" with or without ":" and the number of a GPU, where all of it stands and runs.
 
     Attributes
     ----------
     text : LaneText
-    reals, wholes : ndarray, shape (columns, lanes)
-        The memory of lanes, as `threads.columns` names it.
-    status : ndarray of int32, shape (lanes,)
-        0, or the code of a `Status`; a lane that has failed is nan.
-    left : int
-        How many lanes arcs have left to legs in the latest call.
+
+    Raises
+    ------
+    InputError
+        If lanes have what no text follows, there is no such device, or no compiler for it.
     """
 
-    def __init__(self, numbers: LaneNumbers, dtype: str = "float64") -> None:
+    def __init__(self, numbers: LaneNumbers, dtype: str = "float64", device: str = "cpu") -> None:
         self._numbers, self.text = numbers, text_of(numbers, dtype)
         real, count = self.text.real, numbers.count
         names = threads.columns(self.text.way)
-        self._place = {path: (kind, k) for kind, paths in enumerate(names) for k, path in enumerate(paths)}
-        self.reals, self.wholes = np.zeros((len(names[0]), count), real), np.zeros((len(names[1]), count), np.int32)
-        self.rings = np.zeros((count if self.text.way == TICKS else 0, len(RINGS), WAITING), real)
-        self.status = np.zeros(count, np.int32)
-        self._command, self._torque = np.zeros(count, real), np.zeros(count, real)
-        self._tiles = {"numbers": self._typed(Numbers, numbers.columns.numbers)}
-        if self.text.way == TICKS:
+        self._place = {path: (kind, k) for kind, paths in zip(("reals", "wholes"), names, strict=True)
+                       for k, path in enumerate(paths)}
+        by_ticks = self.text.way == TICKS
+        arrays = {
+            "numbers": self._typed(Numbers, numbers.columns.numbers), "seeds": numbers.columns.seeds,
+            "curve": np.ascontiguousarray(numbers.curve, real), "command": np.zeros(count, real),
+            "torque": np.zeros(count, real), "reals": np.zeros((len(names[0]), count), real),
+            "wholes": np.zeros((len(names[1]), count), np.int32), "status": np.zeros(count, np.int32),
+            "rings": np.zeros((count if by_ticks else 0, len(RINGS), WAITING), real),
+            "left": np.zeros(count, np.int32), "count": np.zeros(1, np.int32)}
+        if by_ticks:
             programs = numbers.columns.firmware
-            self._tiles["programs"] = programs.astype([(name, real) for name in Firmware._fields])
+            arrays["programs"] = programs.astype([(name, real) for name in Firmware._fields])
         else:
-            self._tiles["chips"] = self._typed(Chip, numbers.columns.chips)
-            self._tiles["arcs"] = np.zeros(len(self._tiles["numbers"]), rows_of(ArcNumbers, real))
-        self._room = {"curve": np.ascontiguousarray(numbers.curve, real), "seeds": numbers.columns.seeds,
-                      "command": self._command, "torque": self._torque, "reals": self.reals, "wholes": self.wholes,
-                      "rings": self.rings, "status": self.status, "left": np.zeros(count, np.int32),
-                      "count": np.zeros(1, np.int32)}
-        self._of = threads.table_type(self.text.floats)(
-            lanes=count, program_step=1, curve_rows=len(numbers.curve),
-            **{name: array.ctypes.data for name, array in (self._tiles | self._room).items()})
-        self._library = threads.library(self.text)
-        self._by_legs = None
+            arrays["chips"] = self._typed(Chip, numbers.columns.chips)
+            arrays["arcs"] = np.zeros(len(arrays["numbers"]), rows_of(ArcNumbers, real))
+        self._arrays, self._texts = arrays, [self.text]
         if self.text.way == PULSES_BY_ARCS:
-            self._by_legs = threads.library(LaneText(PULSES_BY_LEGS, self.text.flags, self.text.floats))
-            self._call(self._library.servotwin_prepare)
+            self._texts.append(LaneText(PULSES_BY_LEGS, self.text.flags, self.text.floats))
+        self._at = OnProcessor(self._texts, arrays) if device == "cpu" else OnGpu(self._texts, arrays, device)
+        self._of = threads.table_type(self.text.floats)(
+            lanes=count, program_step=1, curve_rows=len(numbers.curve), **self._at.addresses)
+        if self.text.way == PULSES_BY_ARCS:
+            self._at.call(0, "servotwin_prepare", self._of, count, 0)
         elif self.text.way == PULSES_BY_LEGS:
             self._of.left = None  # all lanes, not those of a list
 
@@ -145,34 +231,53 @@ class ThreadedLanes:
         found.view(self.text.real)[:] = tiles.view(np.float64)
         return found
 
-    def _call(self, function: Any) -> None:
-        function(ctypes.byref(self._of), ctypes.c_int64(0), ctypes.c_int64(self._numbers.count))
+    def advance(self, duration: float, command: Any, torque: Any, stream: Any = None) -> None:
+        """Advance all lanes by a time [s] under commands as the engine follows them, and torques of loads [N m].
 
-    def advance(self, duration: float, command: Any, torque: Any) -> None:
-        """Advance all lanes by a time [s] under commands as the engine follows them, and torques of loads [N m]."""
-        self._command[:], self._torque[:], self._of.duration = command, torque, duration
-        self._room["count"][0] = 0
-        self._call(self._library.servotwin_advance)
-        if self._by_legs is not None and self.left:
-            self._call(self._by_legs.servotwin_advance)
+        On a GPU all of it is put on a `stream`; arrays that are there already are read in place, and then nothing is
+        allocated and nothing waits.
+        """
+        on = stream_of(stream)
+        self._of.command = self._at.given("command", command, on)
+        self._of.torque = self._at.given("torque", torque, on)
+        self._of.duration = duration
+        self._at.clear("count", on)
+        for k in range(len(self._texts)):
+            self._at.call(k, "servotwin_advance", self._of, self._numbers.count, on)
 
     @property
     def left(self) -> int:
         """How many lanes arcs have left to legs in the latest call."""
-        return int(self._room["count"][0])
+        self._at.fetch("count")
+        return int(self._arrays["count"][0])
+
+    @property
+    def status(self) -> Any:
+        """0 of each lane, or the code of a `Status`, shape (lanes,), in place; a lane that has failed is nan."""
+        return self.array("status")
+
+    def array(self, name: str) -> Any:
+        """Return an array by its name in `threads`' table, in place: where the lanes are."""
+        return self._at.seen(name)
 
     # --- what lanes remember ------------------------------------------------------------------------------------------
 
-    def column(self, path: str) -> NDArray[Any]:
-        """Return the column of something that lanes remember, to be read or written in place."""
-        kind, k = self._place[path]
-        found: NDArray[Any] = (self.reals, self.wholes)[kind][k]
+    def column(self, path: str) -> Any:
+        """Return the column of something that lanes remember, shape (lanes,), in place: where the lanes are."""
+        name, k = self._place[path]
+        found = self.array(name)
+        return found.row(k) if isinstance(found, GpuArray) else found[k]
+
+    def _column(self, path: str) -> NDArray[Any]:
+        name, k = self._place[path]
+        found: NDArray[Any] = self._arrays[name][k]
         return found
 
     @property
     def time(self) -> NDArray[np.float64]:
         """Time of each lane since it was reset [s]."""
-        found: NDArray[np.float64] = self.column("stand.frames") * self._period + self.column("stand.time")
+        self._at.fetch("reals", "wholes")
+        found: NDArray[np.float64] = self._column("stand.frames") * self._period + self._column("stand.time")
         return found
 
     @property
@@ -183,6 +288,7 @@ class ThreadedLanes:
 
     def put(self, which: NDArray[np.int64], memories: Memories) -> None:
         """Let some lanes remember what records say."""
+        self._at.fetch(*_REMEMBERED)
         rows, period = memories.rows, self._period[which]
         point = rows["point"]
         time = rows["frames"] * rows["beat"] + point["time"]
@@ -197,29 +303,34 @@ class ThreadedLanes:
             for name in ("heard", "since"):
                 firm[name] -= np.where(self._told_goals(which), frames * period, 0.0)
             self._set(which, "firm", firm)
-            self.status[which] = 0
-            return
-        now = rows["chip"].copy()
+        else:
+            self._set(which, "now", self._chips_at(rows, frames, shift))
+        self._arrays["status"][which] = 0
+        self._at.send(*_REMEMBERED)
+
+    def _chips_at(self, rows: Any, frames: NDArray[np.int64], shift: NDArray[np.float64]) -> Any:
+        """Return what chips remember, by times since the latest edge."""
+        now, point = rows["chip"].copy(), rows["point"]
         for group, name in ((now, "drive_end"), (now, "clock"), (now["pending"], "time"), (now["later"], "time")):
             group[name] -= shift
         now["number"] = np.maximum(now["number"], frames)
         now["silent"] = np.where(point["anchor_time"] == np.inf, now["clock"] <= point["time"] - shift, now["silent"])
-        self._set(which, "now", now)
-        self.status[which] = 0
+        return now
 
     def memories(self, which: NDArray[np.int64]) -> Memories:
         """Return what some lanes remember, as records."""
+        self._at.fetch(*_REMEMBERED)
         rest = nothing_yet(1)
         put_started(rest, 0, NOWHERE, RIGID)
         found = taken(rest, np.zeros(len(which), np.int64))
         rows, period = found.rows, self._period[which]
-        frames, point = self.column("stand.frames")[which], rows["point"]
+        frames, point = self._column("stand.frames")[which], rows["point"]
         rows["frames"], rows["beat"] = frames, period
         self._get(which, "stand.y", point["y"])
         for name in point["y"].dtype.names or ():
             point["anchor"][name] = point["y"][name]
-        point["mode"]["mesh"], point["wiper"] = self.column("stand.mesh")[which], self.column("stand.wiper")[which]
-        point["time"] = self.column("stand.time")[which]
+        point["mode"]["mesh"], point["wiper"] = self._column("stand.mesh")[which], self._column("stand.wiper")[which]
+        point["time"] = self._column("stand.time")[which]
         if self.text.way == TICKS:
             self._get(which, "firm", found.firms)
             found.firms["tick"] += np.where(self._told_goals(which), frames, 0)
@@ -240,9 +351,9 @@ class ThreadedLanes:
             if hasattr(value, "dtype") and value.dtype.names:
                 self._set(which, own, value)
             elif name in RINGS:
-                self.rings[which, RINGS.index(name)] = value
+                self._arrays["rings"][which, RINGS.index(name)] = value
             else:
-                self.column(own)[which] = value
+                self._column(own)[which] = value
 
     def _get(self, which: Any, path: str, into: Any) -> None:
         for name in into.dtype.names:
@@ -250,6 +361,6 @@ class ThreadedLanes:
             if value.dtype.names:
                 self._get(which, own, value)
             elif name in RINGS:
-                value[:] = self.rings[which, RINGS.index(name)]
+                value[:] = self._arrays["rings"][which, RINGS.index(name)]
             else:
-                into[name] = self.column(own)[which]
+                into[name] = self._column(own)[which]
