@@ -205,7 +205,7 @@ class GpuArray:
     shape : tuple of int
     dtype : dtype
     base : object
-        What owns the memory; kept for as long as this is.
+        The owner of the memory; kept for as long as this array is.
     """
 
     def __init__(self, gpu: Gpu, address: int, shape: tuple[int, ...], dtype: np.dtype[Any], base: Any) -> None:
