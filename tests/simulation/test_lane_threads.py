@@ -12,13 +12,15 @@ import pytest
 
 import servotwin as st
 from servotwin.errors import InputError
-from servotwin.models.engine.batch.one_lane import BY_ARCS, Stand, pulses
+from servotwin.models.engine.batch.one_lane import BY_ARCS, COMMAND_ANGLE, PULSE_WIDTH, Stand, pulses
+from servotwin.models.engine.observe import Observed
 from servotwin.models.state.modes import Vector
 from servotwin.models.terms.frame import AT_START
 from servotwin.models.terms.stops import Stops
 from servotwin.simulation.compile import threads
 from servotwin.simulation.compile.threads import PULSES_BY_ARCS, PULSES_BY_LEGS, TICKS, LaneText
 from servotwin.simulation.lanes.lane_threads import ThreadedLanes, text_of
+from servotwin.simulation.start import Status
 
 PLAIN, GOALS, PULSES = "hitec-hs-755hb", "feetech-sts3215-12v", "dsservo-ds3218"
 
@@ -165,6 +167,55 @@ def test_a_lane_is_the_same_alone_among_others_and_in_any_order():
     assert np.array_equal(own.array("reals")[:, order], again.array("reals"))
     assert np.array_equal(own.array("wholes")[:, order], again.array("wholes"))
     assert np.array_equal(own.array("reals")[:, 3], one.array("reals")[:, 0])
+
+
+@pytest.mark.parametrize("case", ["arcs", pytest.param("legs", marks=pytest.mark.slow),
+                                  pytest.param("goals", marks=pytest.mark.slow)])
+def test_lanes_begin_and_show_what_lanes_show(case):
+    """By a mask, at an angle or under a command of a kind; and all signals between, with what each command does."""
+    sims, low, high, rng = made(case, 60)
+    own, every = entered(sims)
+    kinds = {COMMAND_ANGLE: "command_angle", PULSE_WIDTH: "command_angle" if case == "goals" else "pulse_width"}
+    for k in range(12):
+        kind = [COMMAND_ANGLE, PULSE_WIDTH][k % 2]
+        angles = rng.uniform(low, high, 60)
+        command = angles if kinds[kind] == "command_angle" else rng.uniform(1.1e-3, 1.9e-3, 60)
+        if k % 3 == 1:
+            mask, at = rng.random(60) < 0.4, np.where(rng.random(60) < 0.5, rng.uniform(low, high, 60), np.nan)
+            begin = every[mask & ~np.isnan(at)], every[mask & np.isnan(at)]
+            sims.reset(**{kinds[kind]: command[begin[0]]}, output_angle=at[begin[0]], lanes=begin[0])
+            sims.reset(**{kinds[kind]: command[begin[1]]}, lanes=begin[1])
+            own.begin(command, kind=kind, angle=at, mask=mask)
+            assert own.time == pytest.approx(sims.time, abs=1e-12)
+        sims.advance(0.0137, **{kinds[kind]: command}, external_torque=0.02)
+        own.advance(0.0137, command, sims._store.total, kind=kind)
+        seen = own.look(sims._store.total)
+        assert own.column("stand.y.q") == pytest.approx(sims["output_angle"], abs=1e-9)
+        for name in sims.signals:
+            if name in Observed._fields and not name.endswith("temperature"):
+                reduction = 1.0 / sims._numbers.reduction if name == "motor_torque" else 1.0
+                reduction = sims._numbers.reduction if name in ("motor_angle", "motor_speed") else reduction
+                scale = max(1.0, np.abs(sims[name]).max())
+                assert reduction * seen[Observed._fields.index(name)] == pytest.approx(
+                    sims[name], abs=1e-6 * scale), name
+
+
+@pytest.mark.parametrize(("kind", "command", "angle"), [
+    (COMMAND_ANGLE, np.nan, 0.5), (PULSE_WIDTH, -1e-3, 0.5), (PULSE_WIDTH, 0.1, 0.5), (PULSE_WIDTH, 1.5e-3, 99.0)])
+def test_what_a_servo_does_not_take_fails_its_lane_and_no_other(kind, command, angle):
+    sims, *_ = made("arcs", 6)
+    own, _ = entered(sims)
+    commands, angles = np.full(6, {COMMAND_ANGLE: 0.5, PULSE_WIDTH: 1.5e-3}[kind]), np.full(6, 0.5)
+    commands[2], angles[2] = command, angle
+    own.begin(commands, kind=kind, angle=angles)
+    assert own.status.tolist() == [0, 0, Status.REFUSED.code, 0, 0, 0]
+    own.begin(1.5e-3, kind=PULSE_WIDTH)
+    assert not own.status.any()
+    if angle < 9.0:
+        own.advance(0.02, commands, 0.0, kind=kind)
+        assert own.status.tolist() == [0, 0, Status.REFUSED.code, 0, 0, 0]
+        assert np.isnan(own.look(0.0)).any(axis=0).tolist() == [False, False, True, False, False, False]
+    assert np.isfinite(np.delete(own.array("reals")[:2], 2, 1)).all()
 
 
 def test_twenty_ticks_are_a_frame():

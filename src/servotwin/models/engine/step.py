@@ -38,7 +38,7 @@ MOST_IDLE = 200  # events without time advancing
 _MOST_OSCILLATIONS = 1e7  # within one motion
 
 # How a step ends; the members of simulation.Status carry the same numbers.
-COMPLETED, DIVERGED, STEP_TOO_SMALL, CHATTER, TOO_FAST, CROWDED = range(6)
+COMPLETED, DIVERGED, STEP_TOO_SMALL, CHATTER, TOO_FAST, CROWDED, REFUSED = range(7)
 
 
 def step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, m: Motion,

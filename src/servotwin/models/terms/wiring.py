@@ -168,17 +168,21 @@ def digital(given: Given, period: float) -> Wiring:
                   1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0 if stands(given) else 0.0, least, most, lower, upper)
 
 
+def followed(wiring: Wiring, command: float) -> float:
+    """Return what the engine follows of a pulse [s] or a goal [rad]."""
+    return wiring.gain * command + wiring.offset
+
+
 def possible(wiring: Wiring, command: float) -> bool:
     """Tell whether a servo takes a pulse [s] or a goal [rad]; it does not take nan."""
-    followed = wiring.gain * command + wiring.offset
-    return wiring.low <= command <= wiring.high and wiring.least < followed < wiring.most
+    return wiring.low <= command <= wiring.high and wiring.least < followed(wiring, command) < wiring.most
 
 
-def rest_angle(wiring: Wiring, curve: Sequence[Sequence[float]] | NDArray[np.float64], followed: float) -> float:
+def rest_angle(wiring: Wiring, curve: Sequence[Sequence[float]] | NDArray[np.float64], under: float) -> float:
     """Return the angle without error under what the engine follows, within goals and stops [rad]."""
     if wiring.endless > 0.0:
         return 0.0
-    v_o = control_voltage_from_pulse(followed, wiring.slope, wiring.T_0)
+    v_o = control_voltage_from_pulse(under, wiring.slope, wiring.T_0)
     q = angle_from_voltage(v_o, wiring.p, wiring.b_o)
     if len(curve) > 0:
         q = angle_at(wiring.p, wiring.b_o, curve, feedback_voltage(q, wiring.p, wiring.b_o))

@@ -11,7 +11,7 @@ import ctypes
 import os
 import re
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -24,12 +24,16 @@ from servotwin.errors import InputError
 from servotwin.models.engine.batch.one_lane import Stand
 from servotwin.models.engine.batch.segments.linear_segments import ArcNumbers
 from servotwin.models.engine.memory import Inputs
+from servotwin.models.engine.observe import Observed
+from servotwin.models.engine.step import REFUSED
 from servotwin.models.state.records import TILE, fields_of, record_of, rows_of
+from servotwin.models.terms import control, frame
 from servotwin.models.terms.control import WAITING, Firm
 from servotwin.models.terms.dependence import PROGRAM, PWM
 from servotwin.models.terms.firmware import Firmware
 from servotwin.models.terms.frame import Chip, Frame
 from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.wiring import Wiring
 from servotwin.simulation.compile.building import alone, compiled, ran, tell
 from servotwin.simulation.compile.c_types import identifier
 from servotwin.simulation.compile.finding import SUFFIX, Compiler, compilers, flags, level
@@ -49,6 +53,7 @@ _STATE: dict[str, tuple[tuple[str, Any], ...]] = {
     TICKS: (("stand", Stand), ("firm", Firm))}
 
 
+_MOVES = re.compile(r"stand\.y\.(q|w|q_m|w_m)$")
 _STILL = re.compile(r"stand\.y\.(i|T_w|T_h)$")  # nothing here has inductance or heat
 RINGS = ("duties", "coming")
 """Rings of a program, with what waits there: they stay in memory, those of one lane beside those of the next."""
@@ -76,14 +81,14 @@ def _leaves(path: str, kind: Any) -> Iterator[tuple[str, Any]]:
             yield own, hint
 
 
-_ADDRESSES = ("numbers", "arcs", "chips", "programs", "curve", "seeds", "command", "torque", "reals", "wholes",
-              "rings", "status", "left", "count")
+_ADDRESSES = ("numbers", "arcs", "chips", "programs", "wirings", "curve", "seeds", "command", "torque", "angle", "mask",
+              "reals", "wholes", "rings", "status", "seen", "left", "count")
 
 
 @cache
 def table_type(floats: bool) -> type[Any]:
     """Return the struct that a text is called with: addresses, on the device where it runs there."""
-    order = ("lanes", "numbers", "arcs", "chips", "programs", "program_step", "curve", "curve_rows", *_ADDRESSES[5:])
+    order = ("lanes", *_ADDRESSES[:4], "program_step", "wirings", "curve", "curve_rows", *_ADDRESSES[6:], "kind")
     fields = [(name, ctypes.c_void_p if name in _ADDRESSES else ctypes.c_int64) for name in order]
     return type("Table", (ctypes.Structure,), {"_fields_": [*fields, ("duration", ctypes.c_float if floats
                                                                      else ctypes.c_double)]})
@@ -99,16 +104,21 @@ typedef struct {
     int64_t lanes;
     const void *numbers, *arcs, *chips, *programs; /* tiles, and records of programs */
     int64_t program_step;                          /* from the program of a lane to the next one's: 0 where it is one */
+    const void *wirings;                           /* tiles: how commands are taken */
     const real *curve;                             /* of the potentiometers */
     int64_t curve_rows;
     const int64_t *seeds;
-    const real *command, *torque; /* as the servo follows it; beside the load [N m] */
+    const real *command, *torque; /* of a kind; beside the load [N m] */
+    const real *angle;            /* where lanes begin [rad]; nan, or none of it: where they have no error */
+    const uint8_t *mask;          /* lanes that begin; none of it: all */
     real *reals;                  /* a column each: what a lane remembers */
     int32_t *wholes;
     real *rings;     /* of programs, a lane after the other */
     int32_t *status; /* of a lane: 0, or that of its failure */
+    real *seen;      /* a column each: signals */
     int32_t *left;   /* lanes that arcs leave to legs, and how many */
     int32_t *count;
+    int64_t kind;    /* of commands */
     real duration;
 } lane_table;
 '''
@@ -123,6 +133,12 @@ INLINED void one(const lane_table *of, int32_t lane) {
         return;
     $state
 $loads
+    const real command = $follow(of->kind, ($wirings *)(uintptr_t)of->wirings + tile, j, of->command[lane]);
+    if (command != command) {
+        of->status[lane] = $refused;
+$lose
+        return;
+    }
 $call
     if (status != 0)
         stand.y.q = stand.y.w = stand.y.q_m = stand.y.w_m = NAN;
@@ -133,8 +149,8 @@ $stores
 ''')
 _PULSES = Template('''    const array_double_2 curve = {(real *)(uintptr_t)of->curve, {of->curve_rows, 2}};
     const $gone gone = $entry($by, ($numbers *)(uintptr_t)of->numbers + tile, ($arcs *)(uintptr_t)of->arcs + tile,
-        ($chips *)(uintptr_t)of->chips + tile, j, curve, of->seeds[lane], of->command[lane], of->torque[lane], &stand,
-        &now, of->duration);
+        ($chips *)(uintptr_t)of->chips + tile, j, curve, of->seeds[lane], command, of->torque[lane], &stand, &now,
+        of->duration);
     const int32_t status = (int32_t)gone.status;
     if (status == -1) {
         of->left[NEXT(of->count)] = lane;
@@ -142,7 +158,7 @@ _PULSES = Template('''    const array_double_2 curve = {(real *)(uintptr_t)of->c
     }
     stand = gone.stand;
     now = gone.chip;''')
-_TICKS = Template('''    real piece[7] = {0, of->command[lane], 0, 0, 0, 0, 0};
+_TICKS = Template('''    real piece[7] = {0, command, 0, 0, 0, 0, 0};
     $program *program = ($program *)(uintptr_t)of->programs + of->program_step * lane;
     firm.duties = of->rings + (int64_t)$room * lane;
     firm.coming = firm.duties + $room / 2;
@@ -173,13 +189,70 @@ EXPORTED void servotwin_prepare(const lane_table *of, int64_t first, int64_t las
 }
 #endif
 ''')
-_AROUND = Template('''
+_BESIDE = Template('''
+INLINED void begin(const lane_table *of, int32_t lane) {
+    const int64_t n = of->lanes, tile = lane / $tile;
+    const int32_t j = lane % $tile;
+    real *reals = of->reals + lane;
+    int32_t *wholes = of->wholes + lane;
+    if (of->mask && !of->mask[lane])
+        return;
+    $wirings *wiring = ($wirings *)(uintptr_t)of->wirings + tile;
+    const array_double_2 curve = {(real *)(uintptr_t)of->curve, {of->curve_rows, 2}};
+    const real command = $follow(of->kind, wiring, j, of->command[lane]);
+    const $stand stand = $begin(($numbers *)(uintptr_t)of->numbers + tile, wiring, j, curve, command,
+        of->angle ? of->angle[lane] : NAN);
+    if (command != command || stand.y.q != stand.y.q) {
+        of->status[lane] = $refused;
+$lose
+        return;
+    }
+$begun
+    of->status[lane] = 0;
+}
+INLINED void look(const lane_table *of, int32_t lane) {
+    const int64_t n = of->lanes, tile = lane / $tile;
+    const int32_t j = lane % $tile;
+    real *reals = of->reals + lane, *seen = of->seen + lane;
+    int32_t *wholes = of->wholes + lane;
+    const array_double_2 curve = {(real *)(uintptr_t)of->curve, {of->curve_rows, 2}};
+    $state
+$loads
+$rings    const $observed shown = $look(($numbers *)(uintptr_t)of->numbers + tile, j, curve, of->torque[lane], $memory);
+    const int lost = of->status[lane] != 0;
+$shown
+}
+#if defined(__NVPTX__)
+void servotwin_begin(const lane_table of) {
+    const int32_t k = THREAD;
+    if (k < of.lanes)
+        begin(&of, k);
+}
+void servotwin_look(const lane_table of) {
+    const int32_t k = THREAD;
+    if (k < of.lanes)
+        look(&of, k);
+}
+#else
+EXPORTED void servotwin_begin(const lane_table *of, int64_t first, int64_t last) {
+    for (int64_t k = first; k < last; k++)
+        begin(of, (int32_t)k);
+}
+EXPORTED void servotwin_look(const lane_table *of, int64_t first, int64_t last) {
+    for (int64_t k = first; k < last; k++)
+        look(of, (int32_t)k);
+}
+#endif
+''')
+_THREAD = '''
 #if defined(__NVPTX__)
 #define NEXT(count) __nvvm_atom_add_gen_i((count), 1)
 #define THREAD (__nvvm_read_ptx_sreg_ctaid_x() * __nvvm_read_ptx_sreg_ntid_x() + __nvvm_read_ptx_sreg_tid_x())
 #else
 #define NEXT(count) ((*(count))++)
 #endif
+'''
+_AROUND = Template('''
 $lane
 #if defined(__NVPTX__)
 /* The grid is that of all lanes for those in a list: a captured graph cannot ask how many they are. */
@@ -212,11 +285,14 @@ class LaneText:
         All that it follows: flags of `terms.dependence`.
     floats : bool
         Whether numbers have 32 bits.
+    beside : bool
+        Whether it has all else than time: where lanes begin, and what is seen of them.
     """
 
     way: str
     flags: int
     floats: bool
+    beside: bool = False
 
     @property
     def real(self) -> np.dtype[Any]:
@@ -227,8 +303,8 @@ class LaneText:
     def recipe(self) -> Recipe:
         """The kernels within it."""
         never = "BY_LEGS" if self.way == PULSES_BY_ARCS else "BY_ARCS"
-        entries = tuple(f"servotwin.models.engine.batch.one_lane:{entry}" for entry in _signatures(self.way))
-        return Recipe(f"lane_{self.way}", entries, knows=self.flags,
+        entries = tuple(f"servotwin.models.engine.batch.one_lane:{entry}" for entry in _signatures(self))
+        return Recipe(f"lane_{self.way}{'_beside' if self.beside else ''}", entries, knows=self.flags,
                       always=PROGRAM | PWM if self.way == TICKS else 0, never=(never,), in_floats=self.floats)
 
     @property
@@ -239,6 +315,8 @@ class LaneText:
 
 def entries(own: LaneText) -> tuple[str, ...]:
     """Return the names of a text's functions, which are kernels on a GPU."""
+    if own.beside:
+        return "servotwin_begin", "servotwin_look"
     return ("servotwin_advance", "servotwin_prepare") if own.way == PULSES_BY_ARCS else ("servotwin_advance",)
 
 
@@ -249,18 +327,23 @@ def _tile(kind: Any) -> Record:
     return Record(rows_of(kind, np.float64))
 
 
-def _signatures(way: str) -> dict[str, tuple[Kind, ...]]:
-    """Return what the entries of a text are called with, the one that advances a lane first."""
-    numbers, arcs = _tile(Numbers), _tile(ArcNumbers)
-    if way == TICKS:
+def _signatures(own: LaneText) -> dict[str, tuple[Kind, ...]]:
+    """Return what the entries of a text are called with, the one that advances a lane, or looks at it, first."""
+    numbers, arcs, wirings, stand, chip = _tile(Numbers), _tile(ArcNumbers), _tile(Wiring), named(Stand), named(Frame)
+    firm = Record(record_of(Firm))
+    always: dict[str, tuple[Kind, ...]] = {"follow": (INT64, wirings, INT64, FLOAT64)}
+    if own.beside:
+        always["begin"] = (numbers, wirings, INT64, _TABLE_OF, FLOAT64, FLOAT64)
+        looks = ("look_at_ticks", firm) if own.way == TICKS else ("look_at_pulses", chip)
+        return {looks[0]: (numbers, INT64, _TABLE_OF, FLOAT64, stand, looks[1])} | always
+    if own.way == TICKS:
         told: dict[str, Kind] = {"command": _TABLE_OF, "torque": _TABLE_OF, "edges": _FLOATS, "curve": _TABLE_OF,
                                  "seed": INT64, "firmware": Array(Record(record_of(Firmware)), 1)}
         inputs = Tuple(tuple(told.get(name, FLOAT64) for name in Inputs._fields), "Inputs", Inputs._fields)
-        return {"ticks": (numbers, INT64, inputs, Record(record_of(Firm)), named(Stand), FLOAT64)}
+        return {"ticks": (numbers, INT64, inputs, firm, stand, FLOAT64)} | always
     pulses: dict[str, tuple[Kind, ...]] = {"pulses": (
-        INT64, numbers, arcs, _tile(Chip), INT64, _TABLE_OF, INT64, FLOAT64, FLOAT64, named(Stand), named(Frame),
-        FLOAT64)}
-    return pulses | ({"prepare": (numbers, arcs, INT64)} if way == PULSES_BY_ARCS else {})
+        INT64, numbers, arcs, _tile(Chip), INT64, _TABLE_OF, INT64, FLOAT64, FLOAT64, stand, chip, FLOAT64)}
+    return pulses | always | ({"prepare": (numbers, arcs, INT64)} if own.way == PULSES_BY_ARCS else {})
 
 
 _RINGS = re.compile(rf"\b(float|double) ({'|'.join(RINGS)})\[{WAITING}\];")
@@ -268,37 +351,77 @@ _RINGS = re.compile(rf"\b(float|double) ({'|'.join(RINGS)})\[{WAITING}\];")
 
 @cache
 def _printed(own: LaneText) -> str:
-    text, signatures = Standalone({}, floats=own.floats), _signatures(own.way)
+    text, signatures = Standalone({}, floats=own.floats), _signatures(own)
     names = text.add(own.recipe, signatures)
     (entry, kinds), *_ = signatures.items()
-    types, prepare = text.types, ""
-    by_legs = int(own.way == PULSES_BY_LEGS)
-    words = {"tile": TILE, "entry": names[entry], "gone": text.result_of(entry), "by": by_legs,
-             "numbers": types.record(_tile(Numbers))}
-    if own.way == TICKS:
-        words |= {"room": 2 * WAITING, "inputs": types.of(kinds[2]),
-                  "program": types.record(Record(record_of(Firmware)))}
-        call, state = _TICKS, f"{types.of(named(Stand))} stand = {{0}}; {types.record(Record(record_of(Firm)))} firm;"
-    else:
-        words |= {"arcs": types.record(_tile(ArcNumbers)), "chips": types.record(_tile(Chip))}
-        call, state = _PULSES, f"{types.of(named(Stand))} stand = {{0}}; {types.of(named(Frame))} now;"
-    if own.way == PULSES_BY_ARCS:
-        prepare = _PREPARE.substitute(words, prepare=names["prepare"])
+    types, by_ticks = text.types, own.way == TICKS
     reals, wholes = columns(own.way)
     places = [(path, f"{name}[{k} * n]") for name, paths in (("reals", reals), ("wholes", wholes))
               for k, path in enumerate(paths) if not _STILL.match(path)]
-    lane = _LANE.substitute(words, state=state, call=call.substitute(words),
-                            loads="\n".join(f"    {path} = {place};" for path, place in places),
-                            stores="\n".join(f"    {place} = {path};" for path, place in places))
-    many, kth = ("(of.left ? *of.count : of.lanes)", "(of.left ? of.left[k] : k)") if by_legs else ("of.lanes", "k")
-    real = f"typedef {'float' if own.floats else 'double'} real;\n"
-    around = _AROUND.substitute(lane=lane + prepare, many=many, kth=kth)
+    stand, firm = types.of(named(Stand)), types.record(Record(record_of(Firm)))
+    words = {
+        "tile": TILE, "refused": REFUSED, "by": int(own.way == PULSES_BY_LEGS), "room": 2 * WAITING, "stand": stand,
+        "entry": names[entry], "gone": text.result_of(entry), "follow": names["follow"],
+        "numbers": types.record(_tile(Numbers)), "wirings": types.record(_tile(Wiring)),
+        "state": f"{stand} stand = {{0}}; " + (f"{firm} firm;" if by_ticks else f"{types.of(named(Frame))} now;"),
+        "loads": _lines(f"{path} = {place};" for path, place in places),
+        "stores": _lines(f"{place} = {path};" for path, place in places),
+        "lose": _lines(f"    {place} = NAN;" for path, place in places if _MOVES.match(path))}
+    if own.beside:
+        around = _beside(words, names, places, by_ticks)
+    else:
+        around = _advancing(own, words, names, text, kinds)
     kernels = _RINGS.sub(r"\1 *\2;", text.narrowed())
-    return "\n".join([part_of_header("device.h"), _EXPORTED, kernels, real + _TABLE, around])
+    real = f"typedef {'float' if own.floats else 'double'} real;\n"
+    return "\n".join([part_of_header("device.h"), _EXPORTED, kernels, real + _TABLE + _THREAD, around])
+
+
+def _advancing(own: LaneText, words: dict[str, Any], names: Mapping[str, str], text: Standalone,
+               kinds: tuple[Kind, ...]) -> str:
+    """Return the functions that let lanes advance, around the kernels."""
+    types, prepare = text.types, ""
+    if own.way == TICKS:
+        words = words | {"inputs": types.of(kinds[2]), "program": types.record(Record(record_of(Firmware)))}
+    else:
+        words = words | {"arcs": types.record(_tile(ArcNumbers)), "chips": types.record(_tile(Chip))}
+    if own.way == PULSES_BY_ARCS:
+        prepare = _PREPARE.substitute(words, prepare=names["prepare"])
+    lane = _LANE.substitute(words, call=(_TICKS if own.way == TICKS else _PULSES).substitute(words))
+    many, kth = ("(of.left ? *of.count : of.lanes)", "(of.left ? of.left[k] : k)") if words["by"] else ("of.lanes", "k")
+    return _AROUND.substitute(lane=lane + prepare, many=many, kth=kth)
+
+
+def _beside(words: dict[str, Any], names: Mapping[str, str], places: Sequence[tuple[str, str]], by_ticks: bool) -> str:
+    """Return the functions that let lanes begin, and look at them; noise continues where it was."""
+    begun = dict(_numbers_in("firm", control.AT_START)) if by_ticks else dict(_numbers_in("now", frame.AT_START))
+    kept = ("firm.draws", "now.draws")
+    return _BESIDE.substitute(
+        words, begin=names["begin"], look=words["entry"], observed=words["gone"],
+        memory="&stand, &firm" if by_ticks else "&stand, &now",
+        rings=f"    firm.duties = of->rings + {2 * WAITING}LL * lane, firm.coming = firm.duties + {WAITING};\n"
+        if by_ticks else "",
+        begun=_lines(f"{place} = {begun.get(path, path)};" for path, place in places if path not in kept),
+        shown=_lines(f"seen[{k} * n] = lost ? NAN : shown.{identifier(name)};"
+                     for k, name in enumerate(Observed._fields)))
+
+
+def _lines(lines: Iterable[str]) -> str:
+    return "\n".join(f"    {line}" for line in lines)
+
+
+def _numbers_in(path: str, values: Any) -> Iterator[tuple[str, str]]:
+    """Return the numbers of a named tuple as C has them, by their paths; rings apart."""
+    for name, value in zip(values._fields, values, strict=True):
+        own = f"{path}.{identifier(name)}"
+        if hasattr(value, "_fields"):
+            yield from _numbers_in(own, value)
+        elif name not in RINGS:
+            yield own, str(value) if isinstance(value, int) else repr(value).replace("inf", "INFINITY")
 
 
 # --- Libraries of a text for this processor, and PTX of it for a GPU --------------------------------------------------
 
+@cache
 def library(own: LaneText) -> ctypes.CDLL:
     """Return the library of a text, made by the compiler at hand where the cache has none.
 

@@ -7,6 +7,7 @@ after lane, with the same digits.
 from __future__ import annotations
 
 import ctypes
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -14,10 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
+from servotwin.models.engine.batch.one_lane import FOLLOWED
 from servotwin.models.engine.batch.segments.linear_segments import ArcNumbers
 from servotwin.models.engine.memory import SAME, Memories, put_started
+from servotwin.models.engine.observe import Observed
 from servotwin.models.state.modes import NOWHERE, RIGID
-from servotwin.models.state.records import rows_of
+from servotwin.models.state.records import mapped, rows_of, tiles_with
+from servotwin.models.terms import wiring
 from servotwin.models.terms.control import WAITING
 from servotwin.models.terms.dependence import (
     AT_COMMANDS,
@@ -43,6 +47,7 @@ from servotwin.models.terms.dependence import (
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.frame import Chip
 from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.wiring import Wiring
 from servotwin.simulation.compile import threads
 from servotwin.simulation.compile.c_types import identifier
 from servotwin.simulation.compile.cuda import KDL_CUDA, Gpu, GpuArray, guest, stream_of
@@ -94,17 +99,31 @@ def text_of(numbers: LaneNumbers, dtype: str) -> LaneText:
     return LaneText(PULSES_BY_LEGS if flags & ~_BY_ARCS else PULSES_BY_ARCS, flags, floats)
 
 
+def _wirings_of(numbers: LaneNumbers) -> NDArray[Any]:
+    """Return tiles with how each lane takes commands."""
+    columns = np.empty((len(Wiring._fields), numbers.count))
+    for chunk in numbers.chunks:
+        law = wiring.digital if numbers.digital else wiring.pulsed
+        for column, values in zip(columns, mapped(np.ravel, chunk.model.made_of(law, math.nan)), strict=True):
+            column[chunk.which] = values
+    return tiles_with(Wiring, Wiring(*columns), numbers.count)
+
+
 class OnProcessor:
     """Where a processor goes through texts: its arrays are those of numpy."""
 
     def __init__(self, texts: Sequence[LaneText], arrays: Arrays) -> None:
-        self._libraries, self._arrays = [threads.library(text) for text in texts], arrays
+        self._texts, self._arrays = texts, arrays
         self.addresses = {name: array.ctypes.data for name, array in arrays.items()}
 
     def call(self, k: int, entry: str, table: ctypes.Structure, lanes: int, stream: int) -> None:
-        """Let all lanes go through an entry of the k-th text; the second is for lanes that the first has left."""
-        if k == 0 or self._arrays["count"][0]:
-            getattr(self._libraries[k], entry)(ctypes.byref(table), ctypes.c_int64(0), ctypes.c_int64(lanes))
+        """Let all lanes go through an entry of the k-th text."""
+        function = getattr(threads.library(self._texts[k]), entry)
+        function(ctypes.byref(table), ctypes.c_int64(0), ctypes.c_int64(lanes))
+
+    def any_left(self) -> bool:
+        """Tell whether a list may have lanes."""
+        return bool(self._arrays["count"][0])
 
     def clear(self, name: str, stream: int) -> None:
         """Set an array to 0."""
@@ -133,15 +152,19 @@ class OnGpu:
         self._gpu, self._arrays = Gpu(device), arrays
         self._kernels = [self._gpu.kernels(
             threads.ptx(text), threads.entries(text),
-            PLAIN_REGISTERS if text.way == PULSES_BY_ARCS else MOST_REGISTERS) for text in texts]
+            MOST_REGISTERS if text.beside or text.way != PULSES_BY_ARCS else PLAIN_REGISTERS) for text in texts]
         self._own = {name: self._gpu.array(array) for name, array in arrays.items()}
         self.addresses = {name: array.address for name, array in self._own.items()}
         self._stream, self._guests = 0, dict[str, Any]()
 
     def call(self, k: int, entry: str, table: ctypes.Structure, lanes: int, stream: int) -> None:
-        """Put an entry of the k-th text on a stream, for all lanes; how many of a list do something, it reads there."""
+        """Put an entry of the k-th text on a stream, for all lanes."""
         self._stream = stream
         self._gpu.launch(self._kernels[k][entry], lanes, table, stream)
+
+    def any_left(self) -> bool:
+        """Tell whether a list may have lanes: the kernel that goes over it reads how many."""
+        return True
 
     def clear(self, name: str, stream: int) -> None:
         """Set an array to 0."""
@@ -207,6 +230,8 @@ class ThreadedLanes:
             "torque": np.zeros(count, real), "reals": np.zeros((len(names[0]), count), real),
             "wholes": np.zeros((len(names[1]), count), np.int32), "status": np.zeros(count, np.int32),
             "rings": np.zeros((count if by_ticks else 0, len(RINGS), WAITING), real),
+            "wirings": self._typed(Wiring, _wirings_of(numbers)), "angle": np.zeros(count, real),
+            "mask": np.zeros(count, np.uint8), "seen": np.zeros((len(Observed._fields), count), real),
             "left": np.zeros(count, np.int32), "count": np.zeros(1, np.int32)}
         if by_ticks:
             programs = numbers.columns.firmware
@@ -217,6 +242,7 @@ class ThreadedLanes:
         self._arrays, self._texts = arrays, [self.text]
         if self.text.way == PULSES_BY_ARCS:
             self._texts.append(LaneText(PULSES_BY_LEGS, self.text.flags, self.text.floats))
+        self._texts.append(LaneText(self.text.way, self.text.flags, self.text.floats, beside=True))
         self._at = OnProcessor(self._texts, arrays) if device == "cpu" else OnGpu(self._texts, arrays, device)
         self._of = threads.table_type(self.text.floats)(
             lanes=count, program_step=1, curve_rows=len(numbers.curve), **self._at.addresses)
@@ -231,19 +257,40 @@ class ThreadedLanes:
         found.view(self.text.real)[:] = tiles.view(np.float64)
         return found
 
-    def advance(self, duration: float, command: Any, torque: Any, stream: Any = None) -> None:
-        """Advance all lanes by a time [s] under commands as the engine follows them, and torques of loads [N m].
+    def advance(self, duration: float, command: Any, torque: Any, *, kind: int = FOLLOWED, stream: Any = None) -> None:
+        """Advance all lanes by a time [s] under commands of a kind, and torques of loads [N m].
 
-        On a GPU all of it is put on a `stream`; arrays that are there already are read in place, and then nothing is
-        allocated and nothing waits.
+        A lane that gets a command which its servo does not take has failed. On a GPU all of it is put on a `stream`;
+        arrays that are there already are read in place, and then nothing is allocated and nothing waits.
         """
-        on = stream_of(stream)
-        self._of.command = self._at.given("command", command, on)
-        self._of.torque = self._at.given("torque", torque, on)
+        on = self._told(stream, kind, command=command, torque=torque)
         self._of.duration = duration
         self._at.clear("count", on)
-        for k in range(len(self._texts)):
-            self._at.call(k, "servotwin_advance", self._of, self._numbers.count, on)
+        for k in range(len(self._texts) - 1):
+            if k == 0 or self._at.any_left():
+                self._at.call(k, "servotwin_advance", self._of, self._numbers.count, on)
+
+    def begin(self, command: Any, *, kind: int = FOLLOWED, angle: Any = None, mask: Any = None,
+              stream: Any = None) -> None:
+        """Put lanes to rest at an angle [rad], or where they have no error where that is nan, and their clocks to 0.
+
+        Noise continues where it was. `mask` tells which, all unless given: numbers of 8 bits.
+        """
+        on = self._told(stream, kind, command=command, angle=angle, mask=mask)
+        self._at.call(len(self._texts) - 1, "servotwin_begin", self._of, self._numbers.count, on)
+
+    def look(self, torque: Any, *, stream: Any = None) -> Any:
+        """Return what shows under torques of loads [N m], shape (signals of `observe.Observed`, lanes), in place."""
+        on = self._told(stream, FOLLOWED, torque=torque)
+        self._at.call(len(self._texts) - 1, "servotwin_look", self._of, self._numbers.count, on)
+        return self.array("seen")
+
+    def _told(self, stream: Any, kind: int, **given: Any) -> int:
+        """Note where that is which somebody gives; return the handle of a stream."""
+        on, self._of.kind = stream_of(stream), kind
+        for name, values in given.items():
+            setattr(self._of, name, None if values is None else self._at.given(name, values, on))
+        return on
 
     @property
     def left(self) -> int:

@@ -17,18 +17,23 @@ from servotwin.models.engine.lanes import chip_at, numbers_at
 from servotwin.models.engine.legs import legs
 from servotwin.models.engine.memory import SAME, Inputs
 from servotwin.models.engine.motions.elementary import anew
+from servotwin.models.engine.observe import Observed, observed, told_by
 from servotwin.models.engine.step import COMPLETED, CROWDED, DIVERGED, at_pulses, measured
-from servotwin.models.state.modes import Vector, one_body
+from servotwin.models.state.modes import INSIDE, RIGID, Vector, one_body
 from servotwin.models.state.records import reader, writer
-from servotwin.models.terms import bridge, duty, frame
+from servotwin.models.terms import bridge, duty, frame, play
 from servotwin.models.terms.frame import Frame
+from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import wiper_at
+from servotwin.models.terms.wiring import TRAVEL_SLACK, Wiring, followed, possible, rest_angle
 
 if TYPE_CHECKING:
     from servotwin.models.engine.lanes import Floats
 
 BY_ARCS, BY_LEGS = range(2)
+FOLLOWED, PULSE_WIDTH, COMMAND_ANGLE = range(3)  # kinds of commands: as the engine follows it, or of the servo
 arc_at, put_arcs = reader("arc_at", ArcNumbers), writer("put_arcs", ArcNumbers)
+wiring_at = reader("wiring_at", Wiring)
 LEFT = -1  # by arcs, which end where a stop is met: the lane is left to legs
 
 
@@ -128,3 +133,44 @@ def whole(time: float, period: float) -> tuple[int, float]:
     left = math.floor(time / period + SAME)
     rest = time - left * period
     return left, rest if rest > SAME * period else 0.0
+
+
+# --- Beside time: commands, where a lane begins, and what is seen of it -----------------------------------------------
+
+def follow(kind: int, wirings: Any, j: int, command: float) -> float:
+    """Return what the engine follows of a command of a kind [s, rad]; nan where the servo does not take it."""
+    if kind == FOLLOWED:
+        return command
+    wiring = wiring_at(anew(wirings), j)
+    told = wiring.per_angle * command + wiring.at_zero if kind == COMMAND_ANGLE else command
+    return followed(wiring, told) if possible(wiring, told) else math.nan
+
+
+def begin(numbers: Any, wirings: Any, j: int, curve: Floats, command: float, angle: float) -> Stand:
+    """Return a servo at rest at an angle [rad], or where it has no error under what the engine follows if that is nan.
+
+    Its angle is nan where it is beyond a stop.
+    """
+    wiring, own = wiring_at(wirings, j), numbers_at(numbers, j)
+    q = angle if angle == angle else rest_angle(wiring, curve, command)
+    q = q if wiring.lower - TRAVEL_SLACK <= q <= wiring.upper + TRAVEL_SLACK else math.nan
+    mesh = INSIDE if play.present(own.play) else RIGID
+    return Stand(Vector(q, 0.0, 0.0, 0.0, 0.0, q, 0.0), mesh, q, 0, 0.0)
+
+
+def look_at_pulses(numbers: Any, j: int, curve: Floats, torque: float, stand: Stand, now: Frame) -> Observed:
+    """Return the signals of an analog servo as it stands."""
+    own = at_pulses(numbers_at(numbers, j), now.silent)
+    return _seen(own, curve, torque, stand, now.drive * own.source.V, now.drive, now.error)
+
+
+def look_at_ticks(numbers: Any, j: int, curve: Floats, torque: float, stand: Stand, firm: Any) -> Observed:
+    """Return the signals of a digital servo as it stands."""
+    own = duty.at_duty(numbers_at(numbers, j), firm.duty)
+    seen = _seen(own, curve, torque, stand, duty.voltage(own.source, firm.duty), 0.0, 0.0)
+    return told_by(own.bridge, firm, seen)
+
+
+def _seen(own: Numbers, curve: Floats, torque: float, stand: Stand, u: float, drive: float, error: float) -> Observed:
+    mode = legs.mode_from(own, torque, u, stand.y, stand.mesh)
+    return observed(own, curve, mode, u, torque, stand.y, stand.wiper, drive, error)

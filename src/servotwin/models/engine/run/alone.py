@@ -27,7 +27,7 @@ from servotwin.models.terms.frame import NO_CHIP, Chip
 from servotwin.models.terms.frame import present as pulsed_chip
 from servotwin.models.terms.given import Given, Hung
 from servotwin.models.terms.numbers import Numbers, warm
-from servotwin.models.terms.wiring import Wiring, possible, rest_angle
+from servotwin.models.terms.wiring import Wiring, followed, possible, rest_angle
 from servotwin.physics.pieces import Piece, piece_value
 
 if TYPE_CHECKING:
@@ -69,11 +69,6 @@ def start(servo: Alone, curve: Floats, memories: Memories, command: float) -> in
     mesh = INSIDE if play.present(servo.plant.play) else RIGID
     put_memory(memories.rows[0], started(Vector(q, 0.0, 0.0, T, T, q, 0.0), mesh, memories.firms[0:1]))
     return READY
-
-
-def followed(wiring: Wiring, command: float) -> float:
-    """Return what the engine follows of a pulse [s] or a goal [rad]."""
-    return wiring.gain * command + wiring.offset
 
 
 def answer(servo: Alone, command: float, torque: float) -> int:

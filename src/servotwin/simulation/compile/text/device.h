@@ -1,6 +1,7 @@
 /* One text for a processor and, by clang, for a GPU, where there is no library: functions of floats are instructions. */
 #if defined(__NVPTX__)
 typedef signed char int8_t;
+typedef unsigned char uint8_t;
 typedef int int32_t;
 typedef unsigned uint32_t;
 typedef long long int64_t;
