@@ -81,18 +81,20 @@ def test_lanes_there_are_those_here(driver, case, dtype):
     held, launches, left = driver["bytes"], driver["launches"], 0
     for k in range(12):
         command = sims._numbers.translate.command(None, rng.uniform(low, high, 150), None, None)
-        speeds, some = rng.uniform(-25.0, 25.0, 140), lanes[k:k + 140]
+        speeds, mask = rng.uniform(-25.0, 25.0, 150), rng.random(150) < 0.3
         for each in (here, there):
             each.advance((0.0137, 0.11)[k % 2], command, 0.01)
-            if k < 10 and k % 4 == 2:
-                memories = each.memories(some)
-                memories.rows["point"]["y"]["w"] = memories.rows["point"]["y"]["w_m"] = speeds
-                each.put(some, memories)
+            if k % 4 == 2:
+                each.impose(speed=speeds, inertia=np.full(150, 1e-3), mask=mask)
+            if k % 4 == 3:
+                each.begin(mask=mask)
+                each.put(lanes[k:k + 40], each.memories(lanes[k:k + 40]))
         left += here.left
         assert there.left == here.left
-    assert driver["launches"] - launches == (24 if case == "arcs" else 12)
+    assert driver["launches"] - launches == (24 if case == "arcs" else 12) + 12 + 6  # told, and imposed
+    assert there.look().read().tobytes() == here.look().tobytes()
     assert (left > 0) == (case == "arcs")
-    for name in ("reals", "wholes", "rings", "status", *(["arcs"] if case == "arcs" else [])):
+    for name in ("reals", "wholes", "rings", "status", "numbers", *(["arcs"] if case == "arcs" else [])):
         assert there.array(name).read().tobytes() == here.array(name).tobytes(), name
     assert there.time.tolist() == here.time.tolist()
     assert driver["bytes"] == held > before  # nothing is allocated on the way

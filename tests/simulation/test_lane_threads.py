@@ -12,13 +12,12 @@ import pytest
 
 import servotwin as st
 from servotwin.errors import InputError
-from servotwin.models.engine.batch.one_lane import BY_ARCS, COMMAND_ANGLE, PULSE_WIDTH, Stand, pulses
-from servotwin.models.engine.observe import Observed
+from servotwin.models.engine.one_lane import BY_ARCS, COMMAND_ANGLE, PULSE_WIDTH, Stand, pulses
 from servotwin.models.state.modes import Vector
 from servotwin.models.terms.frame import AT_START
 from servotwin.models.terms.stops import Stops
 from servotwin.simulation.compile import threads
-from servotwin.simulation.compile.threads import PULSES_BY_ARCS, PULSES_BY_LEGS, TICKS, LaneText
+from servotwin.simulation.compile.threads import PULSES_BY_ARCS, PULSES_BY_LEGS, SEEN, TICKS, LaneText
 from servotwin.simulation.lanes.lane_threads import ThreadedLanes, text_of
 from servotwin.simulation.start import Status
 
@@ -118,7 +117,7 @@ def advanced(sims, own, low, high, rng, steps=40):
             own.put(np.arange(lanes), sims._store.memories())
         duration, torque = rng.choice([1e-3, 0.02, 0.0137, 0.11]), rng.uniform(-0.05, 0.05, lanes)
         sims.advance(duration, command_angle=rng.uniform(low, high, lanes), external_torque=torque)
-        own.advance(duration, sims._store.command, sims._store.total)
+        own.advance(duration, sims._store.command, sims._store.torque)
         left += own.left
         assert np.array_equal(own.status != 0, sims.status != 0)
         np.testing.assert_allclose(own.time, sims.time, rtol=0.0, atol=1e-6 if own.text.floats else 1e-9)
@@ -172,7 +171,7 @@ def test_a_lane_is_the_same_alone_among_others_and_in_any_order():
 @pytest.mark.parametrize("case", ["arcs", pytest.param("legs", marks=pytest.mark.slow),
                                   pytest.param("goals", marks=pytest.mark.slow)])
 def test_lanes_begin_and_show_what_lanes_show(case):
-    """By a mask, at an angle or under a command of a kind; and all signals between, with what each command does."""
+    """They begin by a mask, at an angle or under a command of a kind; angles, speeds and inertias are imposed."""
     sims, low, high, rng = made(case, 60)
     own, every = entered(sims)
     kinds = {COMMAND_ANGLE: "command_angle", PULSE_WIDTH: "command_angle" if case == "goals" else "pulse_width"}
@@ -185,19 +184,26 @@ def test_lanes_begin_and_show_what_lanes_show(case):
             begin = every[mask & ~np.isnan(at)], every[mask & np.isnan(at)]
             sims.reset(**{kinds[kind]: command[begin[0]]}, output_angle=at[begin[0]], lanes=begin[0])
             sims.reset(**{kinds[kind]: command[begin[1]]}, lanes=begin[1])
-            own.begin(command, kind=kind, angle=at, mask=mask)
+            own.tell(command, kind=kind)
+            own.begin(at, mask=mask)
             assert own.time == pytest.approx(sims.time, abs=1e-12)
         sims.advance(0.0137, **{kinds[kind]: command}, external_torque=0.02)
-        own.advance(0.0137, command, sims._store.total, kind=kind)
-        seen = own.look(sims._store.total)
+        own.advance(0.0137, command, sims._store.torque, kind=kind)
+        if k % 4 == 2:
+            speed, turned = rng.uniform(-9.0, 9.0, 60), rng.random(60) < 0.5
+            to = np.clip(sims["output_angle"] + rng.uniform(-0.05, 0.05, 60), low, high)
+            inertia, J_L = rng.random(60) < 0.3, rng.uniform(1e-4, 4e-3, 60)
+            sims.set(output_angle=to[turned], output_speed=speed[turned], lanes=turned)
+            sims.set(output_speed=speed[~turned], lanes=~turned)
+            sims.set(load_inertia=J_L[inertia], lanes=inertia)
+            own.impose(angle=np.where(turned, to, np.nan), speed=speed)
+            own.impose(inertia=J_L, mask=inertia)
+        seen = dict(zip(SEEN, own.look(), strict=True))
         assert own.column("stand.y.q") == pytest.approx(sims["output_angle"], abs=1e-9)
-        for name in sims.signals:
-            if name in Observed._fields and not name.endswith("temperature"):
-                reduction = 1.0 / sims._numbers.reduction if name == "motor_torque" else 1.0
-                reduction = sims._numbers.reduction if name in ("motor_angle", "motor_speed") else reduction
+        for name in ("time", *sims.signals):
+            if name in seen and not name.endswith("temperature"):
                 scale = max(1.0, np.abs(sims[name]).max())
-                assert reduction * seen[Observed._fields.index(name)] == pytest.approx(
-                    sims[name], abs=1e-6 * scale), name
+                assert seen[name] == pytest.approx(sims[name], abs=1e-6 * scale), name
 
 
 @pytest.mark.parametrize(("kind", "command", "angle"), [
@@ -207,14 +213,16 @@ def test_what_a_servo_does_not_take_fails_its_lane_and_no_other(kind, command, a
     own, _ = entered(sims)
     commands, angles = np.full(6, {COMMAND_ANGLE: 0.5, PULSE_WIDTH: 1.5e-3}[kind]), np.full(6, 0.5)
     commands[2], angles[2] = command, angle
-    own.begin(commands, kind=kind, angle=angles)
+    own.tell(commands, kind=kind)
+    own.begin(angles)
     assert own.status.tolist() == [0, 0, Status.REFUSED.code, 0, 0, 0]
-    own.begin(1.5e-3, kind=PULSE_WIDTH)
+    own.tell(1.5e-3, kind=PULSE_WIDTH)
+    own.begin()
     assert not own.status.any()
     if angle < 9.0:
         own.advance(0.02, commands, 0.0, kind=kind)
         assert own.status.tolist() == [0, 0, Status.REFUSED.code, 0, 0, 0]
-        assert np.isnan(own.look(0.0)).any(axis=0).tolist() == [False, False, True, False, False, False]
+        assert np.isnan(own.look()).any(axis=0).tolist() == [False, False, True, False, False, False]
     assert np.isfinite(np.delete(own.array("reals")[:2], 2, 1)).all()
 
 
@@ -311,7 +319,7 @@ def test_decisions_that_come_after_the_next_edge():
     for k in range(40):
         width = rng.uniform(0.9e-3, 1.5e-3, lanes)
         sims.advance(3.1e-3, pulse_width=width)
-        own.advance(3.1e-3, sims._store.command, sims._store.total)
+        own.advance(3.1e-3, sims._store.command, sims._store.torque)
         waited = waited or np.any(own.column("now.pending.time") > periods)
         if k % 7 == 3:
             own.put(every, own.memories(every))

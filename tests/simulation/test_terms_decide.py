@@ -35,6 +35,7 @@ OTHERS = {
     ("simulation/vector_buses.py", "source"): "a field of what servos on a bus share",
     ("simulation/lanes/store.py", "chip"): "a field of a memory",
     ("simulation/lanes/lane_threads.py", "chip"): "a field of a memory",
+    ("simulation/lanes/lane_threads.py", "shaft"): "of which loads are taken away",
     ("simulation/compile/threads.py", "firmware"): "a field of what a program gets",
     ("models/engine/batch/digital_batch.py", "sensor"): "a field of a tile",
     ("models/engine/batch/tiles.py", "chip"): "a field of a tile",

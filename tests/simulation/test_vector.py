@@ -571,7 +571,7 @@ def test_goals_after_a_silence_are_those_of_a_stepped_goal(latency, tick):
         whole = sim.advance(whole, tick * (k + 1), stepped)
         one = sim.advance(one, tick * (k + 1), st.signals.constant(goal, unit="rad"))
         many.advance(tick, command_angle=goal)
-        threaded.advance(tick, many._store.command, many._store.total)
+        threaded.advance(tick, many._store.command, many._store.torque)
         angle = sim.observe(whole, "output_angle", stepped)
         limp += sim.observe(whole, "duty", stepped) == 0.0
         assert sim.observe(one, "output_angle", st.signals.constant(goal, unit="rad")) == angle

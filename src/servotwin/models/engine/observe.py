@@ -236,6 +236,15 @@ def told_by(path: Bridge, firm: Any, shown: Observed) -> Observed:
         shown.housing_temperature, now, goal, firm.r, float(firm.trip))
 
 
+def at_motor(shown: Observed, N: float) -> Observed:
+    """Return the same signals with those of the motor at its own shaft."""
+    return Observed(
+        shown.armature_voltage, shown.armature_current, shown.bus_voltage, shown.supply_current,
+        shown.motor_torque / N, shown.load_torque, N * shown.motor_angle, N * shown.motor_speed, shown.load_angle,
+        shown.feedback_voltage, shown.error_time, shown.drive, shown.winding_temperature, shown.housing_temperature,
+        shown.duty, shown.goal_angle, shown.reference_angle, shown.trip)
+
+
 def on_bus(numbers: Numbers, V_bus: float) -> Numbers:
     """Return a servo on a bus whose voltage is known; that of its source is then left out."""
     path, supply = numbers.bridge, numbers.source

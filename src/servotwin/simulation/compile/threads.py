@@ -21,10 +21,10 @@ from typing import Any
 import numpy as np
 
 from servotwin.errors import InputError
-from servotwin.models.engine.batch.one_lane import Stand
 from servotwin.models.engine.batch.segments.linear_segments import ArcNumbers
 from servotwin.models.engine.memory import Inputs
 from servotwin.models.engine.observe import Observed
+from servotwin.models.engine.one_lane import Stand
 from servotwin.models.engine.step import REFUSED
 from servotwin.models.state.records import TILE, fields_of, record_of, rows_of
 from servotwin.models.terms import control, frame
@@ -81,8 +81,8 @@ def _leaves(path: str, kind: Any) -> Iterator[tuple[str, Any]]:
             yield own, hint
 
 
-_ADDRESSES = ("numbers", "arcs", "chips", "programs", "wirings", "curve", "seeds", "command", "torque", "angle", "mask",
-              "reals", "wholes", "rings", "status", "seen", "left", "count")
+_ADDRESSES = ("numbers", "arcs", "chips", "programs", "wirings", "curve", "seeds", "bare", "command", "torque", "followed",
+              "total", "angle", "speed", "inertia", "mask", "reals", "wholes", "rings", "status", "seen", "left", "count")
 
 
 @cache
@@ -108,14 +108,16 @@ typedef struct {
     const real *curve;                             /* of the potentiometers */
     int64_t curve_rows;
     const int64_t *seeds;
-    const real *command, *torque; /* of a kind; beside the load [N m] */
-    const real *angle;            /* where lanes begin [rad]; nan, or none of it: where they have no error */
-    const uint8_t *mask;          /* lanes that begin; none of it: all */
-    real *reals;                  /* a column each: what a lane remembers */
+    const real *bare;             /* a column each: torque of the load, inertias without it, reduction, period */
+    const real *command, *torque; /* that are told: of a kind; beside the load [N m]; none of it: as before */
+    real *followed, *total;       /* what that comes to: as the servo follows it; with the load's [N m] */
+    const real *angle, *speed, *inertia; /* that are imposed, or where lanes begin; nan, or none of it: not */
+    const uint8_t *mask;                 /* lanes of which that is said; none of it: all */
+    real *reals;                         /* a column each: what a lane remembers */
     int32_t *wholes;
     real *rings;     /* of programs, a lane after the other */
     int32_t *status; /* of a lane: 0, or that of its failure */
-    real *seen;      /* a column each: signals */
+    real *seen;      /* a column each: signals, and the time since a lane began */
     int32_t *left;   /* lanes that arcs leave to legs, and how many */
     int32_t *count;
     int64_t kind;    /* of commands */
@@ -133,12 +135,6 @@ INLINED void one(const lane_table *of, int32_t lane) {
         return;
     $state
 $loads
-    const real command = $follow(of->kind, ($wirings *)(uintptr_t)of->wirings + tile, j, of->command[lane]);
-    if (command != command) {
-        of->status[lane] = $refused;
-$lose
-        return;
-    }
 $call
     if (status != 0)
         stand.y.q = stand.y.w = stand.y.q_m = stand.y.w_m = NAN;
@@ -149,8 +145,8 @@ $stores
 ''')
 _PULSES = Template('''    const array_double_2 curve = {(real *)(uintptr_t)of->curve, {of->curve_rows, 2}};
     const $gone gone = $entry($by, ($numbers *)(uintptr_t)of->numbers + tile, ($arcs *)(uintptr_t)of->arcs + tile,
-        ($chips *)(uintptr_t)of->chips + tile, j, curve, of->seeds[lane], command, of->torque[lane], &stand, &now,
-        of->duration);
+        ($chips *)(uintptr_t)of->chips + tile, j, curve, of->seeds[lane], of->followed[lane], of->total[lane], &stand,
+        &now, of->duration);
     const int32_t status = (int32_t)gone.status;
     if (status == -1) {
         of->left[NEXT(of->count)] = lane;
@@ -158,12 +154,12 @@ _PULSES = Template('''    const array_double_2 curve = {(real *)(uintptr_t)of->c
     }
     stand = gone.stand;
     now = gone.chip;''')
-_TICKS = Template('''    real piece[7] = {0, command, 0, 0, 0, 0, 0};
+_TICKS = Template('''    real piece[7] = {0, of->followed[lane], 0, 0, 0, 0, 0};
     $program *program = ($program *)(uintptr_t)of->programs + of->program_step * lane;
     firm.duties = of->rings + (int64_t)$room * lane;
     firm.coming = firm.duties + $room / 2;
     const $inputs told = {
-        .command = {piece, {1, 7}}, .torque = {NULL, {0, 7}}, .constant_torque = of->torque[lane],
+        .command = {piece, {1, 7}}, .torque = {NULL, {0, 7}}, .constant_torque = of->total[lane],
         .period = program->T_f, .edges = {NULL, {0}},
         .curve = {(real *)(uintptr_t)of->curve, {of->curve_rows, 2}}, .seed = of->seeds[lane], .accuracy = 0,
         .firmware = {program, {1}}};
@@ -190,6 +186,26 @@ EXPORTED void servotwin_prepare(const lane_table *of, int64_t first, int64_t las
 #endif
 ''')
 _BESIDE = Template('''
+INLINED void lose(const lane_table *of, int32_t lane) {
+    const int64_t n = of->lanes;
+    real *reals = of->reals + lane;
+    of->status[lane] = $refused;
+$lose
+}
+INLINED void tell(const lane_table *of, int32_t lane) {
+    if (of->mask && !of->mask[lane])
+        return;
+    if (of->torque)
+        of->total[lane] = of->bare[lane] + of->torque[lane];
+    if (of->command) {
+        const int64_t tile = lane / $tile;
+        const real followed =
+            $follow(of->kind, ($wirings *)(uintptr_t)of->wirings + tile, lane % $tile, of->command[lane]);
+        of->followed[lane] = followed;
+        if (followed != followed && of->status[lane] == 0)
+            lose(of, lane);
+    }
+}
 INLINED void begin(const lane_table *of, int32_t lane) {
     const int64_t n = of->lanes, tile = lane / $tile;
     const int32_t j = lane % $tile;
@@ -199,12 +215,11 @@ INLINED void begin(const lane_table *of, int32_t lane) {
         return;
     $wirings *wiring = ($wirings *)(uintptr_t)of->wirings + tile;
     const array_double_2 curve = {(real *)(uintptr_t)of->curve, {of->curve_rows, 2}};
-    const real command = $follow(of->kind, wiring, j, of->command[lane]);
+    const real command = of->followed[lane];
     const $stand stand = $begin(($numbers *)(uintptr_t)of->numbers + tile, wiring, j, curve, command,
         of->angle ? of->angle[lane] : NAN);
     if (command != command || stand.y.q != stand.y.q) {
-        of->status[lane] = $refused;
-$lose
+        lose(of, lane);
         return;
     }
 $begun
@@ -218,11 +233,33 @@ INLINED void look(const lane_table *of, int32_t lane) {
     const array_double_2 curve = {(real *)(uintptr_t)of->curve, {of->curve_rows, 2}};
     $state
 $loads
-$rings    const $observed shown = $look(($numbers *)(uintptr_t)of->numbers + tile, j, curve, of->torque[lane], $memory);
+$rings    const $observed shown = $look(($numbers *)(uintptr_t)of->numbers + tile, j, curve,
+        of->total[lane], of->bare[3 * n + lane], $memory);
     const int lost = of->status[lane] != 0;
 $shown
 }
+INLINED void impose(const lane_table *of, int32_t lane) {
+    const int64_t n = of->lanes, tile = lane / $tile;
+    const int32_t j = lane % $tile;
+    real *reals = of->reals + lane;
+    int32_t *wholes = of->wholes + lane;
+    if ((of->mask && !of->mask[lane]) || of->status[lane] != 0)
+        return;
+    $numbers *numbers = ($numbers *)(uintptr_t)of->numbers + tile;
+    if (of->inertia && of->inertia[lane] >= 0) {
+        $hang(numbers, j, of->bare[n + lane], of->bare[2 * n + lane], of->inertia[lane]);
+$prepared    }
+    $stand stand = {0};
+$stand_loads
+    stand = $impose(numbers, j, &stand, of->angle ? of->angle[lane] : NAN, of->speed ? of->speed[lane] : NAN);
+$stand_stores
+}
 #if defined(__NVPTX__)
+void servotwin_tell(const lane_table of) {
+    const int32_t k = THREAD;
+    if (k < of.lanes)
+        tell(&of, k);
+}
 void servotwin_begin(const lane_table of) {
     const int32_t k = THREAD;
     if (k < of.lanes)
@@ -233,7 +270,16 @@ void servotwin_look(const lane_table of) {
     if (k < of.lanes)
         look(&of, k);
 }
+void servotwin_impose(const lane_table of) {
+    const int32_t k = THREAD;
+    if (k < of.lanes)
+        impose(&of, k);
+}
 #else
+EXPORTED void servotwin_tell(const lane_table *of, int64_t first, int64_t last) {
+    for (int64_t k = first; k < last; k++)
+        tell(of, (int32_t)k);
+}
 EXPORTED void servotwin_begin(const lane_table *of, int64_t first, int64_t last) {
     for (int64_t k = first; k < last; k++)
         begin(of, (int32_t)k);
@@ -242,8 +288,16 @@ EXPORTED void servotwin_look(const lane_table *of, int64_t first, int64_t last) 
     for (int64_t k = first; k < last; k++)
         look(of, (int32_t)k);
 }
+EXPORTED void servotwin_impose(const lane_table *of, int64_t first, int64_t last) {
+    for (int64_t k = first; k < last; k++)
+        impose(of, (int32_t)k);
+}
 #endif
 ''')
+BARE = ("torque", "output_inertia", "motor_inertia", "reduction", "period")
+"""Columns of what lanes are beside their tiles: of the load, of the shaft without it, and of frames or ticks."""
+SEEN = (*Observed._fields, "time")
+"""Columns of what shows of lanes."""
 _THREAD = '''
 #if defined(__NVPTX__)
 #define NEXT(count) __nvvm_atom_add_gen_i((count), 1)
@@ -303,7 +357,7 @@ class LaneText:
     def recipe(self) -> Recipe:
         """The kernels within it."""
         never = "BY_LEGS" if self.way == PULSES_BY_ARCS else "BY_ARCS"
-        entries = tuple(f"servotwin.models.engine.batch.one_lane:{entry}" for entry in _signatures(self))
+        entries = tuple(f"servotwin.models.engine.one_lane:{entry}" for entry in _signatures(self))
         return Recipe(f"lane_{self.way}{'_beside' if self.beside else ''}", entries, knows=self.flags,
                       always=PROGRAM | PWM if self.way == TICKS else 0, never=(never,), in_floats=self.floats)
 
@@ -316,7 +370,7 @@ class LaneText:
 def entries(own: LaneText) -> tuple[str, ...]:
     """Return the names of a text's functions, which are kernels on a GPU."""
     if own.beside:
-        return "servotwin_begin", "servotwin_look"
+        return tuple(f"servotwin_{entry}" for entry in ("tell", "begin", "impose", "look"))
     return ("servotwin_advance", "servotwin_prepare") if own.way == PULSES_BY_ARCS else ("servotwin_advance",)
 
 
@@ -331,19 +385,21 @@ def _signatures(own: LaneText) -> dict[str, tuple[Kind, ...]]:
     """Return what the entries of a text are called with, the one that advances a lane, or looks at it, first."""
     numbers, arcs, wirings, stand, chip = _tile(Numbers), _tile(ArcNumbers), _tile(Wiring), named(Stand), named(Frame)
     firm = Record(record_of(Firm))
-    always: dict[str, tuple[Kind, ...]] = {"follow": (INT64, wirings, INT64, FLOAT64)}
     if own.beside:
-        always["begin"] = (numbers, wirings, INT64, _TABLE_OF, FLOAT64, FLOAT64)
+        always: dict[str, tuple[Kind, ...]] = {"follow": (INT64, wirings, INT64, FLOAT64)}
+        always |= {"begin": (numbers, wirings, INT64, _TABLE_OF, FLOAT64, FLOAT64)}
+        always |= {"impose": (numbers, INT64, stand, FLOAT64, FLOAT64), "hang": (numbers, INT64, *[FLOAT64] * 3)}
+        always |= {"prepare": (numbers, arcs, INT64)} if own.way == PULSES_BY_ARCS else {}
         looks = ("look_at_ticks", firm) if own.way == TICKS else ("look_at_pulses", chip)
-        return {looks[0]: (numbers, INT64, _TABLE_OF, FLOAT64, stand, looks[1])} | always
+        return {looks[0]: (numbers, INT64, _TABLE_OF, FLOAT64, FLOAT64, stand, looks[1])} | always
     if own.way == TICKS:
         told: dict[str, Kind] = {"command": _TABLE_OF, "torque": _TABLE_OF, "edges": _FLOATS, "curve": _TABLE_OF,
                                  "seed": INT64, "firmware": Array(Record(record_of(Firmware)), 1)}
         inputs = Tuple(tuple(told.get(name, FLOAT64) for name in Inputs._fields), "Inputs", Inputs._fields)
-        return {"ticks": (numbers, INT64, inputs, firm, stand, FLOAT64)} | always
+        return {"ticks": (numbers, INT64, inputs, firm, stand, FLOAT64)}
     pulses: dict[str, tuple[Kind, ...]] = {"pulses": (
         INT64, numbers, arcs, _tile(Chip), INT64, _TABLE_OF, INT64, FLOAT64, FLOAT64, stand, chip, FLOAT64)}
-    return pulses | always | ({"prepare": (numbers, arcs, INT64)} if own.way == PULSES_BY_ARCS else {})
+    return pulses | ({"prepare": (numbers, arcs, INT64)} if own.way == PULSES_BY_ARCS else {})
 
 
 _RINGS = re.compile(rf"\b(float|double) ({'|'.join(RINGS)})\[{WAITING}\];")
@@ -361,13 +417,13 @@ def _printed(own: LaneText) -> str:
     stand, firm = types.of(named(Stand)), types.record(Record(record_of(Firm)))
     words = {
         "tile": TILE, "refused": REFUSED, "by": int(own.way == PULSES_BY_LEGS), "room": 2 * WAITING, "stand": stand,
-        "entry": names[entry], "gone": text.result_of(entry), "follow": names["follow"],
-        "numbers": types.record(_tile(Numbers)), "wirings": types.record(_tile(Wiring)),
+        "entry": names[entry], "gone": text.result_of(entry), "numbers": types.record(_tile(Numbers)),
         "state": f"{stand} stand = {{0}}; " + (f"{firm} firm;" if by_ticks else f"{types.of(named(Frame))} now;"),
         "loads": _lines(f"{path} = {place};" for path, place in places),
         "stores": _lines(f"{place} = {path};" for path, place in places),
         "lose": _lines(f"    {place} = NAN;" for path, place in places if _MOVES.match(path))}
     if own.beside:
+        words |= {"arcs": types.record(_tile(ArcNumbers)), "wirings": types.record(_tile(Wiring))}
         around = _beside(words, names, places, by_ticks)
     else:
         around = _advancing(own, words, names, text, kinds)
@@ -395,14 +451,20 @@ def _beside(words: dict[str, Any], names: Mapping[str, str], places: Sequence[tu
     """Return the functions that let lanes begin, and look at them; noise continues where it was."""
     begun = dict(_numbers_in("firm", control.AT_START)) if by_ticks else dict(_numbers_in("now", frame.AT_START))
     kept = ("firm.draws", "now.draws")
+    time = f"stand.frames * of->bare[{BARE.index('period')} * n + lane] + stand.time"
+    shown = [f"shown.{identifier(name)}" for name in Observed._fields]
+    prepared = "" if "prepare" not in names else (
+        f"        {names['prepare']}(numbers, ({words['arcs']} *)(uintptr_t)of->arcs + tile, j);\n")
     return _BESIDE.substitute(
-        words, begin=names["begin"], look=words["entry"], observed=words["gone"],
+        words, **{entry: names[entry] for entry in ("follow", "begin", "impose", "hang")}, prepared=prepared,
+        look=words["entry"], observed=words["gone"],
         memory="&stand, &firm" if by_ticks else "&stand, &now",
         rings=f"    firm.duties = of->rings + {2 * WAITING}LL * lane, firm.coming = firm.duties + {WAITING};\n"
         if by_ticks else "",
         begun=_lines(f"{place} = {begun.get(path, path)};" for path, place in places if path not in kept),
-        shown=_lines(f"seen[{k} * n] = lost ? NAN : shown.{identifier(name)};"
-                     for k, name in enumerate(Observed._fields)))
+        stand_loads=_lines(f"{path} = {place};" for path, place in places if path.startswith("stand.")),
+        stand_stores=_lines(f"{place} = {path};" for path, place in places if path.startswith("stand.")),
+        shown=_lines(f"seen[{k} * n] = lost ? NAN : {value};" for k, value in enumerate((*shown, time))))
 
 
 def _lines(lines: Iterable[str]) -> str:

@@ -15,12 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.models.engine.batch.one_lane import FOLLOWED
 from servotwin.models.engine.batch.segments.linear_segments import ArcNumbers
 from servotwin.models.engine.memory import SAME, Memories, put_started
-from servotwin.models.engine.observe import Observed
+from servotwin.models.engine.one_lane import FOLLOWED
 from servotwin.models.state.modes import NOWHERE, RIGID
-from servotwin.models.state.records import mapped, rows_of, tiles_with
+from servotwin.models.state.records import columns_of, mapped, rows_of, tiles_with
 from servotwin.models.terms import wiring
 from servotwin.models.terms.control import WAITING
 from servotwin.models.terms.dependence import (
@@ -47,11 +46,12 @@ from servotwin.models.terms.dependence import (
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.frame import Chip
 from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.shaft import Shaft
 from servotwin.models.terms.wiring import Wiring
 from servotwin.simulation.compile import threads
 from servotwin.simulation.compile.c_types import identifier
 from servotwin.simulation.compile.cuda import KDL_CUDA, Gpu, GpuArray, guest, stream_of
-from servotwin.simulation.compile.threads import PULSES_BY_ARCS, PULSES_BY_LEGS, RINGS, TICKS, LaneText
+from servotwin.simulation.compile.threads import PULSES_BY_ARCS, PULSES_BY_LEGS, RINGS, SEEN, TICKS, LaneText
 from servotwin.simulation.lanes.forms import WORDS, Terms
 from servotwin.simulation.lanes.whole_runs import nothing_yet, taken
 
@@ -230,8 +230,9 @@ class ThreadedLanes:
             "torque": np.zeros(count, real), "reals": np.zeros((len(names[0]), count), real),
             "wholes": np.zeros((len(names[1]), count), np.int32), "status": np.zeros(count, np.int32),
             "rings": np.zeros((count if by_ticks else 0, len(RINGS), WAITING), real),
-            "wirings": self._typed(Wiring, _wirings_of(numbers)), "angle": np.zeros(count, real),
-            "mask": np.zeros(count, np.uint8), "seen": np.zeros((len(Observed._fields), count), real),
+            "wirings": self._typed(Wiring, _wirings_of(numbers)), "bare": self._bare().astype(real),
+            **{name: np.zeros(count, real) for name in ("angle", "speed", "inertia", "followed", "total")},
+            "mask": np.zeros(count, np.uint8), "seen": np.zeros((len(SEEN), count), real),
             "left": np.zeros(count, np.int32), "count": np.zeros(1, np.int32)}
         if by_ticks:
             programs = numbers.columns.firmware
@@ -246,10 +247,17 @@ class ThreadedLanes:
         self._at = OnProcessor(self._texts, arrays) if device == "cpu" else OnGpu(self._texts, arrays, device)
         self._of = threads.table_type(self.text.floats)(
             lanes=count, program_step=1, curve_rows=len(numbers.curve), **self._at.addresses)
+        self.tell(torque=0.0)
         if self.text.way == PULSES_BY_ARCS:
             self._at.call(0, "servotwin_prepare", self._of, count, 0)
         elif self.text.way == PULSES_BY_LEGS:
             self._of.left = None  # all lanes, not those of a list
+
+    def _bare(self) -> NDArray[np.float64]:
+        """Return what lanes are beside their tiles, a row for each of `threads.BARE`."""
+        numbers, shaft = self._numbers, columns_of(Shaft, self._numbers.given["shaft"], slice(self._numbers.count))
+        return np.array([numbers.columns.torque, shaft.J_out - numbers.load_total, shaft.J - shaft.J_out,
+                         numbers.reduction, self._period])
 
     def _typed(self, kind: Any, tiles: NDArray[Any]) -> NDArray[Any]:
         """Return tiles with numbers of this text's type."""
@@ -257,40 +265,51 @@ class ThreadedLanes:
         found.view(self.text.real)[:] = tiles.view(np.float64)
         return found
 
-    def advance(self, duration: float, command: Any, torque: Any, *, kind: int = FOLLOWED, stream: Any = None) -> None:
-        """Advance all lanes by a time [s] under commands of a kind, and torques of loads [N m].
+    def tell(self, command: Any = None, torque: Any = None, *, kind: int = FOLLOWED, mask: Any = None,
+             stream: Any = None) -> None:
+        """Give lanes commands of a kind, and torques beside their loads [N m]; they stay until others come.
 
-        A lane that gets a command which its servo does not take has failed. On a GPU all of it is put on a `stream`;
-        arrays that are there already are read in place, and then nothing is allocated and nothing waits.
+        A lane that gets a command which its servo does not take has failed. `mask` tells which lanes are meant, all
+        unless given: numbers of 8 bits. On a GPU, here and in all that follows, the work is put on a `stream`; arrays
+        that are there already are read in place, and then nothing is allocated and nothing waits.
         """
-        on = self._told(stream, kind, command=command, torque=torque)
+        self._do("tell", stream, kind, command=command, torque=torque, mask=mask)
+
+    def advance(self, duration: float, command: Any = None, torque: Any = None, *, kind: int = FOLLOWED,
+                stream: Any = None) -> None:
+        """Advance all lanes by a time [s], under commands and torques as `tell` takes them, or those before."""
+        if command is not None or torque is not None:
+            self.tell(command, torque, kind=kind, stream=stream)
+        on = stream_of(stream)
         self._of.duration = duration
         self._at.clear("count", on)
         for k in range(len(self._texts) - 1):
             if k == 0 or self._at.any_left():
                 self._at.call(k, "servotwin_advance", self._of, self._numbers.count, on)
 
-    def begin(self, command: Any, *, kind: int = FOLLOWED, angle: Any = None, mask: Any = None,
-              stream: Any = None) -> None:
+    def begin(self, angle: Any = None, *, mask: Any = None, stream: Any = None) -> None:
         """Put lanes to rest at an angle [rad], or where they have no error where that is nan, and their clocks to 0.
 
-        Noise continues where it was. `mask` tells which, all unless given: numbers of 8 bits.
+        Noise continues where it was.
         """
-        on = self._told(stream, kind, command=command, angle=angle, mask=mask)
-        self._at.call(len(self._texts) - 1, "servotwin_begin", self._of, self._numbers.count, on)
+        self._do("begin", stream, angle=angle, mask=mask)
 
-    def look(self, torque: Any, *, stream: Any = None) -> Any:
-        """Return what shows under torques of loads [N m], shape (signals of `observe.Observed`, lanes), in place."""
-        on = self._told(stream, FOLLOWED, torque=torque)
-        self._at.call(len(self._texts) - 1, "servotwin_look", self._of, self._numbers.count, on)
+    def impose(self, *, angle: Any = None, speed: Any = None, inertia: Any = None, mask: Any = None,
+               stream: Any = None) -> None:
+        """Impose angles [rad], speeds [rad/s] and inertias of loads [kg m²] as `VectorSimulator.set` does; nan: not."""
+        self._do("impose", stream, angle=angle, speed=speed, inertia=inertia, mask=mask)
+
+    def look(self, *, stream: Any = None) -> Any:
+        """Return what shows, shape (`threads.SEEN`, lanes), in place."""
+        self._do("look", stream)
         return self.array("seen")
 
-    def _told(self, stream: Any, kind: int, **given: Any) -> int:
-        """Note where that is which somebody gives; return the handle of a stream."""
+    def _do(self, entry: str, stream: Any, kind: int = FOLLOWED, **given: Any) -> None:
+        """Let all lanes go through an entry beside time, with what is given, and without what is None."""
         on, self._of.kind = stream_of(stream), kind
         for name, values in given.items():
             setattr(self._of, name, None if values is None else self._at.given(name, values, on))
-        return on
+        self._at.call(len(self._texts) - 1, f"servotwin_{entry}", self._of, self._numbers.count, on)
 
     @property
     def left(self) -> int:

@@ -17,7 +17,7 @@ from servotwin.models.engine.memory import (
     started,
     time_of,
 )
-from servotwin.models.engine.observe import Observed, observed, told_by
+from servotwin.models.engine.observe import Observed, at_motor, observed, told_by
 from servotwin.models.engine.run.run import as_now, mode_under, run, told
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.state.modes import INSIDE, RIGID, Vector
@@ -109,15 +109,6 @@ def observe(servo: Alone, inputs: Inputs, memories: Memories) -> Seen:
     if duty.present(numbers.bridge):
         shown = told_by(numbers.bridge, memory.firm[0], shown)
     return Seen(point.y.q, point.y.w, at_motor(shown, servo.reduction))
-
-
-def at_motor(shown: Observed, N: float) -> Observed:
-    """Return the same signals with those of the motor at its own shaft."""
-    return Observed(
-        shown.armature_voltage, shown.armature_current, shown.bus_voltage, shown.supply_current,
-        shown.motor_torque / N, shown.load_torque, N * shown.motor_angle, N * shown.motor_speed, shown.load_angle,
-        shown.feedback_voltage, shown.error_time, shown.drive, shown.winding_temperature, shown.housing_temperature,
-        shown.duty, shown.goal_angle, shown.reference_angle, shown.trip)
 
 
 # --- A servo alone, made of what is given of it and of what hangs on its shaft ----------------------------------------

@@ -10,21 +10,22 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.models.engine import controller
+from servotwin.models.engine import controller, cosim
 from servotwin.models.engine.batch.segments import linear_segments
 from servotwin.models.engine.batch.segments.linear_segments import ArcNumbers
 from servotwin.models.engine.lanes import chip_at, numbers_at
 from servotwin.models.engine.legs import legs
-from servotwin.models.engine.memory import SAME, Inputs
+from servotwin.models.engine.memory import SAME, Inputs, Point
 from servotwin.models.engine.motions.elementary import anew
-from servotwin.models.engine.observe import Observed, observed, told_by
+from servotwin.models.engine.observe import Observed, at_motor, observed, told_by
 from servotwin.models.engine.step import COMPLETED, CROWDED, DIVERGED, at_pulses, measured
-from servotwin.models.state.modes import INSIDE, RIGID, Vector, one_body
+from servotwin.models.state.modes import INSIDE, RIGID, Mode, Vector, one_body
 from servotwin.models.state.records import reader, writer
 from servotwin.models.terms import bridge, duty, frame, play
 from servotwin.models.terms.frame import Frame
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import wiper_at
+from servotwin.models.terms.shaft import Shaft
 from servotwin.models.terms.wiring import TRAVEL_SLACK, Wiring, followed, possible, rest_angle
 
 if TYPE_CHECKING:
@@ -158,17 +159,32 @@ def begin(numbers: Any, wirings: Any, j: int, curve: Floats, command: float, ang
     return Stand(Vector(q, 0.0, 0.0, 0.0, 0.0, q, 0.0), mesh, q, 0, 0.0)
 
 
-def look_at_pulses(numbers: Any, j: int, curve: Floats, torque: float, stand: Stand, now: Frame) -> Observed:
-    """Return the signals of an analog servo as it stands."""
+def impose(numbers: Any, j: int, stand: Stand, angle: float, speed: float) -> Stand:
+    """Return a servo whose shaft another simulator puts to an angle [rad] or gives a speed [rad/s]; nan: not."""
+    own = numbers_at(numbers, j)
+    point = Point(0.0, stand.y, Mode(0, 0, stand.mesh, 0, 0), math.inf, stand.y, 0.0, stand.wiper)
+    point = cosim.placed(point, cosim.within_stops(numbers, j, angle), speed, angle == angle, speed == speed,
+                         own.play.half, own.sensor.half_slack, False)
+    return Stand(point.y, point.mode.mesh, point.wiper, stand.frames, stand.time)
+
+
+def hang(numbers: Any, j: int, bare: float, behind: float, J_L: float) -> None:
+    """Hang an inertia [kg m²] on a shaft; `bare` is that of its output without it, `behind` that of its motor."""
+    own, J_out = numbers_at(numbers, j).shaft, J_L + bare
+    cosim.put_shaft(numbers.shaft, j, Shaft(J_out + behind, own.b, J_out, own.b_out))
+
+
+def look_at_pulses(numbers: Any, j: int, curve: Floats, torque: float, N: float, stand: Stand, now: Frame) -> Observed:
+    """Return the signals of an analog servo as it stands; N is the reduction of its gear."""
     own = at_pulses(numbers_at(numbers, j), now.silent)
-    return _seen(own, curve, torque, stand, now.drive * own.source.V, now.drive, now.error)
+    return at_motor(_seen(own, curve, torque, stand, now.drive * own.source.V, now.drive, now.error), N)
 
 
-def look_at_ticks(numbers: Any, j: int, curve: Floats, torque: float, stand: Stand, firm: Any) -> Observed:
-    """Return the signals of a digital servo as it stands."""
+def look_at_ticks(numbers: Any, j: int, curve: Floats, torque: float, N: float, stand: Stand, firm: Any) -> Observed:
+    """Return the signals of a digital servo as it stands; N is the reduction of its gear."""
     own = duty.at_duty(numbers_at(numbers, j), firm.duty)
     seen = _seen(own, curve, torque, stand, duty.voltage(own.source, firm.duty), 0.0, 0.0)
-    return told_by(own.bridge, firm, seen)
+    return at_motor(told_by(own.bridge, firm, seen), N)
 
 
 def _seen(own: Numbers, curve: Floats, torque: float, stand: Stand, u: float, drive: float, error: float) -> Observed:
