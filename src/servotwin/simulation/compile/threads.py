@@ -81,8 +81,9 @@ def _leaves(path: str, kind: Any) -> Iterator[tuple[str, Any]]:
             yield own, hint
 
 
-_ADDRESSES = ("numbers", "arcs", "chips", "programs", "wirings", "curve", "seeds", "bare", "command", "torque", "followed",
-              "total", "angle", "speed", "inertia", "mask", "reals", "wholes", "rings", "status", "seen", "left", "count")
+_ADDRESSES = ("numbers", "arcs", "chips", "programs", "wirings", "curve", "seeds", "bare", "command", "torque",
+              "followed", "total", "angle", "speed", "inertia", "mask", "reals", "wholes", "rings", "status", "seen",
+              "left", "count")
 
 
 @cache
