@@ -14,13 +14,14 @@ import pytest
 from servotwin.errors import InputError, ServotwinError
 from servotwin.simulation.compile import cuda, threads
 from servotwin.simulation.compile.cuda import Gpu, stream_of
-from servotwin.simulation.lanes import lane_threads
 from servotwin.simulation.lanes.lane_threads import ThreadedLanes
 from simulation.test_lane_threads import CASES, made, on_device
 
 SOURCE = Path(__file__).with_name("stand_in_driver.c")
 FIELDS = ("version", "devices", "major", "minor", "contexts", "bytes", "launches", "registers")
-pytestmark = pytest.mark.skipif(shutil.which("cc") is None or not on_device(), reason="no C compiler, or none for PTX")
+needs_compilers = pytest.mark.skipif(shutil.which("cc") is None or not on_device(),
+                                     reason="no C compiler, or none for PTX")
+pytestmark = needs_compilers
 
 
 class StandIn:
@@ -106,7 +107,7 @@ def test_lanes_there_are_those_here(driver, case, dtype):
 class Guest:
     """An array of another library, in memory that the stand-in shares; `numpy` knows no streams."""
 
-    def __init__(self, array, device=1):
+    def __init__(self, array, device=3):
         self.array, self.device, self.streams = array, device, []
 
     def __dlpack_device__(self):
@@ -119,9 +120,8 @@ class Guest:
 
 @pytest.fixture
 def shared(driver, monkeypatch):
-    """The stand-in, whose arrays are called those of a processor, so that `numpy` reads them."""
-    for module in (cuda, lane_threads):
-        monkeypatch.setattr(module, "KDL_CUDA", 1)
+    """The stand-in, whose arrays are called those of a processor that a GPU reads too, so that `numpy` takes them."""
+    monkeypatch.setattr(cuda, "KDL_CUDA", 3)
     return driver
 
 
@@ -131,7 +131,9 @@ def test_arrays_go_to_and_fro_in_place(shared):
     command, guests = sims._store.command.copy(), (Guest(sims._store.command), Guest(np.full(20, 0.02)))
     held = shared["bytes"]
     seen = np.from_dlpack(there.column("stand.y.q"))
-    there.advance(0.05, *guests, stream=7)
+    there.put_on(7)
+    there.advance(0.05, *guests)
+    assert there.column("stand.y.q").stream == 7
     here.advance(0.05, command, 0.02)
     assert [guest.streams for guest in guests] == [[7], [7]]
     assert np.array_equal(seen, here.column("stand.y.q"))
@@ -170,7 +172,7 @@ def test_a_guest_that_does_not_fit_is_refused_before_anything_moves(shared, valu
 def test_a_guest_on_another_device_is_refused(shared, monkeypatch):
     sims, *_ = made("arcs", 20)
     _, there = on_gpu(shared, sims)
-    monkeypatch.setattr(Guest, "__dlpack_device__", lambda self: (1, 3))
+    monkeypatch.setattr(Guest, "__dlpack_device__", lambda self: (3, 3))
     with pytest.raises(InputError, match=r"^command: got 'an array on another device', allowed: one on cuda:0$"):
         there.advance(0.02, Guest(np.zeros(20)), 0.0)
 
@@ -196,7 +198,7 @@ def test_streams_of_other_libraries_are_known():
     ({"devices": 0}, "cuda", "got 'cuda', allowed: cpu$"),
     ({"devices": 2}, "cuda:2", "got 'cuda:2', allowed: cpu, cuda:0, cuda:1$"),
     ({"major": 7, "minor": 5}, "cuda:0", r"got 'cuda:0, of compute capability 7\.5', allowed: cpu, or .* 8\.0 or"),
-    ({}, "gpu", "got 'gpu', allowed: cpu, cuda or cuda: and a number$"),
+    ({}, 0, "got 0, allowed: cpu, cuda or"), ({}, "gpu", "got 'gpu', allowed: cpu, cuda or cuda: and a number$"),
     ({}, "cuda:", "got 'cuda:', allowed: cpu, cuda or"), ({}, "cuda:-1", "got 'cuda:-1', allowed: cpu, cuda or")])
 def test_devices_that_do_not_do_are_refused_in_a_line(driver, changes, device, words):
     driver.set(**changes)
@@ -224,8 +226,10 @@ def test_what_the_driver_does_not_do_is_said_in_a_line(driver):
     gpu = Gpu("cuda")
     with pytest.raises(ServotwinError, match=r"^cuda: cuModuleLoadDataEx: .* invalid ptxas fatal: no PTX of 7\.0$"):
         gpu.kernels(".version 9.9", ["servotwin_advance"], 128)
+    array = gpu.array(np.zeros(3))
+    array.stream = -1
     with pytest.raises(ServotwinError, match=r"^cuda: cuStreamSynchronize: invalid argument$"):
-        gpu.array(np.zeros(3)).write(np.zeros(3), -1)
+        array.read()
 
 
 def real_gpu():

@@ -3,6 +3,7 @@
 Here a processor goes through the text; on a GPU it is the same text, made to PTX.
 """
 
+import ctypes
 import re
 import shutil
 import subprocess
@@ -285,6 +286,8 @@ def test_ptx_of_floats_calls_nothing_and_has_no_doubles(case):
     assert re.findall(r"^\.(version|target) (.*)$", found, re.MULTILINE) == [("version", "7.0"), ("target", "sm_80")]
     entries = {"servotwin_advance", "servotwin_prepare"} if case == "arcs" else {"servotwin_advance"}
     assert set(re.findall(r"\.entry (\w+)", found)) == entries
+    sizes = set(re.findall(r"\.param \.align 8 \.b8 servotwin_\w+_param_0\[(\d+)\]", found))
+    assert sizes == {str(ctypes.sizeof(threads.table_type(True)))}
     assert ".extern" not in found
     assert ".f64" not in found
     assert len(found) <= 3e5

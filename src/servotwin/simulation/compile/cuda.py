@@ -126,7 +126,7 @@ class Gpu:
     """
 
     def __init__(self, device: str) -> None:
-        name, _, number = device.partition(":")
+        name, _, number = device.partition(":") if isinstance(device, str) else ("", "", "")
         if name != "cuda" or not (number.isdecimal() or device == "cuda"):
             raise InputError("device", device, "cpu, cuda or cuda: and a number")
         self.number, self._driver = int(number or 0), _driver()
@@ -210,7 +210,16 @@ class GpuArray:
 
     def __init__(self, gpu: Gpu, address: int, shape: tuple[int, ...], dtype: np.dtype[Any], base: Any) -> None:
         self.gpu, self.address, self.shape, self.dtype, self._base = gpu, address, shape, dtype, base
-        self.stream = 0  # on which its numbers are made
+        self._stream = 0
+
+    @property
+    def stream(self) -> int:
+        """Handle of the stream on which its numbers are made."""
+        return self._base.stream if isinstance(self._base, GpuArray) else self._stream
+
+    @stream.setter
+    def stream(self, stream: int) -> None:
+        self._stream = stream
 
     def __len__(self) -> int:
         return self.shape[0]
@@ -223,29 +232,27 @@ class GpuArray:
     def row(self, k: int) -> GpuArray:
         """Return a row, in place."""
         size = self.nbytes // self.shape[0]
-        found = GpuArray(self.gpu, self.address + k * size, self.shape[1:], self.dtype, self)
-        found.stream = self.stream
-        return found
+        return GpuArray(self.gpu, self.address + k * size, self.shape[1:], self.dtype, self)
 
-    def write(self, values: NDArray[Any], stream: int = 0) -> None:
-        """Take numbers from the processor."""
+    def write(self, values: NDArray[Any]) -> None:
+        """Take numbers from the processor, when all that is on its stream is done."""
         values = np.ascontiguousarray(values, self.dtype)
         with self.gpu._current() as driver:
-            driver.call("cuMemcpyHtoDAsync_v2", self.address, values.ctypes.data, self.nbytes, stream)
-            driver.call("cuStreamSynchronize", stream)
+            driver.call("cuMemcpyHtoDAsync_v2", self.address, values.ctypes.data, self.nbytes, self.stream)
+            driver.call("cuStreamSynchronize", self.stream)
 
-    def read(self, stream: int = 0) -> NDArray[Any]:
-        """Return its numbers on the processor, when all that is on a stream is done."""
+    def read(self) -> NDArray[Any]:
+        """Return its numbers on the processor, when all that is on its stream is done."""
         found = np.empty(self.shape, self.dtype)
         with self.gpu._current() as driver:
-            driver.call("cuMemcpyDtoHAsync_v2", found.ctypes.data, self.address, self.nbytes, stream)
-            driver.call("cuStreamSynchronize", stream)
+            driver.call("cuMemcpyDtoHAsync_v2", found.ctypes.data, self.address, self.nbytes, self.stream)
+            driver.call("cuStreamSynchronize", self.stream)
         return found
 
-    def clear(self, stream: int = 0) -> None:
-        """Set all of it to 0."""
+    def clear(self) -> None:
+        """Set all of it to 0, on its stream."""
         with self.gpu._current() as driver:
-            driver.call("cuMemsetD8Async", self.address, 0, self.nbytes, stream)
+            driver.call("cuMemsetD8Async", self.address, 0, self.nbytes, self.stream)
 
     # --- for other libraries ------------------------------------------------------------------------------------------
 
@@ -293,7 +300,7 @@ def stream_of(stream: Any) -> int:
 # --- DLPack -----------------------------------------------------------------------------------------------------------
 
 KDL_CUDA = 2
-_KINDS = {0: "i", 1: "u", 2: "f"}
+_KINDS = {0: "i", 1: "u", 2: "f", 6: "b"}
 
 
 class _Tensor(ctypes.Structure):
@@ -341,6 +348,11 @@ def _capsule(array: GpuArray) -> Any:
     return _new(address, _NAME, ctypes.cast(_DESTRUCTOR, ctypes.c_void_p))
 
 
+def is_guest(values: Any) -> bool:
+    """Tell whether something is an array on a GPU."""
+    return hasattr(values, "__dlpack_device__") and int(values.__dlpack_device__()[0]) == KDL_CUDA
+
+
 def guest(name: str, values: Any, gpu: Gpu, shape: tuple[int, ...], dtype: np.dtype[Any],
           stream: int) -> tuple[int, Any]:
     """Return the address of another library's array, and what keeps it there.
@@ -358,6 +370,7 @@ def guest(name: str, values: Any, gpu: Gpu, shape: tuple[int, ...], dtype: np.dt
     of = _Managed.from_address(address or 0).tensor
     own = tuple(of.shape[k] for k in range(of.ndim))
     kept = f"{_KINDS.get(of.code, '?')}{of.bits // 8}"
+    kept = "u1" if kept == "b1" and dtype == np.uint8 else kept  # a mask
     if (kept, of.lanes) != (f"{dtype.kind}{dtype.itemsize}", 1):
         raise InputError(name, got=f"an array of {_named(kept)}", allowed=f"one of {dtype.name}")
     dense = not of.strides or all(own[k] == 1 or of.strides[k] == math.prod(own[k + 1:]) for k in range(of.ndim))

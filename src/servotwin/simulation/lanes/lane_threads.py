@@ -50,7 +50,7 @@ from servotwin.models.terms.shaft import Shaft
 from servotwin.models.terms.wiring import Wiring
 from servotwin.simulation.compile import threads
 from servotwin.simulation.compile.c_types import identifier
-from servotwin.simulation.compile.cuda import KDL_CUDA, Gpu, GpuArray, guest, stream_of
+from servotwin.simulation.compile.cuda import Gpu, GpuArray, guest, is_guest, stream_of
 from servotwin.simulation.compile.threads import PULSES_BY_ARCS, PULSES_BY_LEGS, RINGS, SEEN, TICKS, LaneText
 from servotwin.simulation.lanes.forms import WORDS, Terms
 from servotwin.simulation.lanes.whole_runs import nothing_yet, taken
@@ -116,7 +116,10 @@ class OnProcessor:
         self._texts, self._arrays = texts, arrays
         self.addresses = {name: array.ctypes.data for name, array in arrays.items()}
 
-    def call(self, k: int, entry: str, table: ctypes.Structure, lanes: int, stream: int) -> None:
+    def put_on(self, stream: int) -> None:
+        """Let work be on a stream from now on; a processor has none."""
+
+    def call(self, k: int, entry: str, table: ctypes.Structure, lanes: int) -> None:
         """Let all lanes go through an entry of the k-th text."""
         function = getattr(threads.library(self._texts[k]), entry)
         function(ctypes.byref(table), ctypes.c_int64(0), ctypes.c_int64(lanes))
@@ -125,7 +128,7 @@ class OnProcessor:
         """Tell whether a list may have lanes."""
         return bool(self._arrays["count"][0])
 
-    def clear(self, name: str, stream: int) -> None:
+    def clear(self, name: str) -> None:
         """Set an array to 0."""
         self._arrays[name][:] = 0
 
@@ -133,7 +136,7 @@ class OnProcessor:
         """Return an array, in place."""
         return self._arrays[name]
 
-    def given(self, name: str, values: Any, stream: int) -> int:
+    def given(self, name: str, values: Any) -> int:
         """Return the address of numbers that somebody gives, one for each lane or for all."""
         self._arrays[name][:] = values
         return self.addresses[name]
@@ -157,43 +160,49 @@ class OnGpu:
         self.addresses = {name: array.address for name, array in self._own.items()}
         self._stream, self._guests = 0, dict[str, Any]()
 
-    def call(self, k: int, entry: str, table: ctypes.Structure, lanes: int, stream: int) -> None:
-        """Put an entry of the k-th text on a stream, for all lanes."""
-        self._stream = stream
-        self._gpu.launch(self._kernels[k][entry], lanes, table, stream)
+    def put_on(self, stream: int) -> None:
+        """Let work be on a stream from now on, after all that is on the one before."""
+        if stream != self._stream:
+            self._gpu.follows(stream, self._stream)
+            self._stream = stream
+            for array in self._own.values():
+                array.stream = stream
+
+    def call(self, k: int, entry: str, table: ctypes.Structure, lanes: int) -> None:
+        """Put an entry of the k-th text on the stream, for all lanes."""
+        self._gpu.launch(self._kernels[k][entry], lanes, table, self._stream)
 
     def any_left(self) -> bool:
         """Tell whether a list may have lanes: the kernel that goes over it reads how many."""
         return True
 
-    def clear(self, name: str, stream: int) -> None:
+    def clear(self, name: str) -> None:
         """Set an array to 0."""
-        self._own[name].clear(stream)
+        self._own[name].clear()
 
     def seen(self, name: str) -> Any:
         """Return an array, in place."""
-        self._own[name].stream = self._stream
         return self._own[name]
 
-    def given(self, name: str, values: Any, stream: int) -> int:
+    def given(self, name: str, values: Any) -> int:
         """Return the address of numbers that somebody gives: an array on the device stays where it is."""
         own = self._own[name]
-        if hasattr(values, "__dlpack_device__") and int(values.__dlpack_device__()[0]) == KDL_CUDA:
-            address, self._guests[name] = guest(name, values, self._gpu, own.shape, own.dtype, stream)
+        if is_guest(values):
+            address, self._guests[name] = guest(name, values, self._gpu, own.shape, own.dtype, self._stream)
             return address
         self._arrays[name][:] = values
-        own.write(self._arrays[name], stream)
+        own.write(self._arrays[name])
         return own.address
 
     def fetch(self, *names: str) -> None:
         """Bring arrays to the processor."""
         for name in names:
-            self._arrays[name][:] = self._own[name].read(self._stream)
+            self._arrays[name][:] = self._own[name].read()
 
     def send(self, *names: str) -> None:
         """Bring them back."""
         for name in names:
-            self._own[name].write(self._arrays[name], self._stream)
+            self._own[name].write(self._arrays[name])
 
 
 class ThreadedLanes:
@@ -249,7 +258,7 @@ class ThreadedLanes:
             lanes=count, program_step=1, curve_rows=len(numbers.curve), **self._at.addresses)
         self.tell(torque=0.0)
         if self.text.way == PULSES_BY_ARCS:
-            self._at.call(0, "servotwin_prepare", self._of, count, 0)
+            self._at.call(0, "servotwin_prepare", self._of, count)
         elif self.text.way == PULSES_BY_LEGS:
             self._of.left = None  # all lanes, not those of a list
 
@@ -265,51 +274,51 @@ class ThreadedLanes:
         found.view(self.text.real)[:] = tiles.view(np.float64)
         return found
 
-    def tell(self, command: Any = None, torque: Any = None, *, kind: int = FOLLOWED, mask: Any = None,
-             stream: Any = None) -> None:
+    def put_on(self, stream: Any) -> None:
+        """Let work be on a stream from now on: a handle, or one of another library; on a GPU, else there is none."""
+        self._at.put_on(stream_of(stream))
+
+    def tell(self, command: Any = None, torque: Any = None, *, kind: int = FOLLOWED, mask: Any = None) -> None:
         """Give lanes commands of a kind, and torques beside their loads [N m]; they stay until others come.
 
         A lane that gets a command which its servo does not take has failed. `mask` tells which lanes are meant, all
-        unless given: numbers of 8 bits. On a GPU, here and in all that follows, the work is put on a `stream`; arrays
-        that are there already are read in place, and then nothing is allocated and nothing waits.
+        unless given: numbers of 8 bits. On a GPU, here and in all that follows, the work is put on the stream
+        (`put_on`); arrays that are there already are read in place, and then nothing is allocated and nothing waits.
         """
-        self._do("tell", stream, kind, command=command, torque=torque, mask=mask)
+        self._do("tell", kind, command=command, torque=torque, mask=mask)
 
-    def advance(self, duration: float, command: Any = None, torque: Any = None, *, kind: int = FOLLOWED,
-                stream: Any = None) -> None:
+    def advance(self, duration: float, command: Any = None, torque: Any = None, *, kind: int = FOLLOWED) -> None:
         """Advance all lanes by a time [s], under commands and torques as `tell` takes them, or those before."""
         if command is not None or torque is not None:
-            self.tell(command, torque, kind=kind, stream=stream)
-        on = stream_of(stream)
+            self.tell(command, torque, kind=kind)
         self._of.duration = duration
-        self._at.clear("count", on)
+        self._at.clear("count")
         for k in range(len(self._texts) - 1):
             if k == 0 or self._at.any_left():
-                self._at.call(k, "servotwin_advance", self._of, self._numbers.count, on)
+                self._at.call(k, "servotwin_advance", self._of, self._numbers.count)
 
-    def begin(self, angle: Any = None, *, mask: Any = None, stream: Any = None) -> None:
+    def begin(self, angle: Any = None, *, mask: Any = None) -> None:
         """Put lanes to rest at an angle [rad], or where they have no error where that is nan, and their clocks to 0.
 
         Noise continues where it was.
         """
-        self._do("begin", stream, angle=angle, mask=mask)
+        self._do("begin", angle=angle, mask=mask)
 
-    def impose(self, *, angle: Any = None, speed: Any = None, inertia: Any = None, mask: Any = None,
-               stream: Any = None) -> None:
+    def impose(self, *, angle: Any = None, speed: Any = None, inertia: Any = None, mask: Any = None) -> None:
         """Impose angles [rad], speeds [rad/s] and inertias of loads [kg m²] as `VectorSimulator.set` does; nan: not."""
-        self._do("impose", stream, angle=angle, speed=speed, inertia=inertia, mask=mask)
+        self._do("impose", angle=angle, speed=speed, inertia=inertia, mask=mask)
 
-    def look(self, *, stream: Any = None) -> Any:
+    def look(self) -> Any:
         """Return what shows, shape (`threads.SEEN`, lanes), in place."""
-        self._do("look", stream)
+        self._do("look")
         return self.array("seen")
 
-    def _do(self, entry: str, stream: Any, kind: int = FOLLOWED, **given: Any) -> None:
+    def _do(self, entry: str, kind: int = FOLLOWED, **given: Any) -> None:
         """Let all lanes go through an entry beside time, with what is given, and without what is None."""
-        on, self._of.kind = stream_of(stream), kind
+        self._of.kind = kind
         for name, values in given.items():
-            setattr(self._of, name, None if values is None else self._at.given(name, values, on))
-        self._at.call(len(self._texts) - 1, f"servotwin_{entry}", self._of, self._numbers.count, on)
+            setattr(self._of, name, None if values is None else self._at.given(name, values))
+        self._at.call(len(self._texts) - 1, f"servotwin_{entry}", self._of, self._numbers.count)
 
     @property
     def left(self) -> int:

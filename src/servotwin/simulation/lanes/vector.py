@@ -75,6 +75,8 @@ class VectorSimulator:
         Of what is integrated, as in `Simulator` [rad].
     watch_supply : bool
         Whether `lowest_voltage` is kept, for which lanes go from event to event: it takes six times as long.
+    device : str
+        "cpu", or "cuda" with or without ":" and the number of a GPU, where `VectorSimulatorOnGpu` has the lanes.
 
     Raises
     ------
@@ -92,11 +94,29 @@ class VectorSimulator:
     ([0.5, 0.58, 0.67], [0.4, 0.4, 0.4])
     """
 
+    def __new__(cls, model: Model, lanes: int, *, device: str = "cpu", **_: Any) -> VectorSimulator:
+        """Return a simulator for a device, which `__init__` fills."""
+        if cls is VectorSimulator and device != "cpu":
+            from servotwin.simulation.lanes.vector_gpu import VectorSimulatorOnGpu
+
+            cls = VectorSimulatorOnGpu
+        return object.__new__(cls)
+
     def __init__(
         self, model: Model, lanes: int, *, load: loads.Load | loads.Part | list[Any] | None = None,
         parameters: Mapping[str, Any] | None = None, bus: Any = None, dtype: DTypeLike = "float64",
         threads: int | None = None, seed: int = 0, accuracy: float = ACCURACY, watch_supply: bool = False,
+        device: str = "cpu",
     ) -> None:
+        numbers = self._laid_out(model, lanes, load, parameters, bus, seed, accuracy)
+        self._store = Store(numbers, real_type(dtype),
+                            _whole("threads", threads, 1) if threads is not None else workers_of(None),
+                            own_threads(os.getpid()), bool(watch_supply))
+        self._entry: CEntry | None = None
+
+    def _laid_out(self, model: Model, lanes: int, load: Any, parameters: Mapping[str, Any] | None, bus: Any, seed: int,
+                  accuracy: float) -> LaneNumbers:
+        """Return the numbers of the lanes, or raise InputError."""
         if LAWS.get(type(model), "voltage") == "voltage":
             raise InputError("model of a VectorSimulator", got=model,
                              allowed=" or ".join(kind.__name__ for kind, law in LAWS.items() if law != "voltage"))
@@ -110,10 +130,7 @@ class VectorSimulator:
         if inputs.count != count:
             raise InputError("numbers of lanes", got=f"lanes: {count}, parameters or loads: {inputs.count}",
                              allowed="arrays of one number for each lane")
-        self._store = Store(LaneNumbers(inputs, accuracy_of(accuracy), supplies), real_type(dtype),
-                            _whole("threads", threads, 1) if threads is not None else workers_of(None),
-                            own_threads(os.getpid()), bool(watch_supply))
-        self._entry: CEntry | None = None
+        return LaneNumbers(inputs, accuracy_of(accuracy), supplies)
 
     @property
     def _numbers(self) -> LaneNumbers:
@@ -193,9 +210,7 @@ class VectorSimulator:
         InputError
             On bad input, before any lane moves; names lane and argument. A lane that fails later says so in `status`.
         """
-        if not (type(duration) is float or is_finite(duration)) or not 0.0 <= duration <= LONGEST:
-            raise InputError("advance(duration)", got=duration,
-                             allowed=f"a number of seconds, from 0 to {LONGEST:.0e} in one call")
+        check_duration(duration)
         store = self._store
         if store.numbers.recorded:
             store.numbers.check_recorded(self.time, float(duration))
@@ -308,14 +323,11 @@ class VectorSimulator:
             None if value is None else numbers_of(name, value, which) for name, value in (
                 ("output_angle", output_angle), ("output_speed", output_speed), ("load_inertia", load_inertia),
                 ("bus_voltage", bus_voltage)))
-        if inertia is not None:
-            _check_lanes("load_inertia", inertia, which, inertia >= 0.0, "at least 0 kg m²")
+        self._check_imposed(angle, inertia, which)
         if bus is not None:
             _check_lanes("bus_voltage", bus, which, bus > 0.0, "a positive voltage")
             _check_lanes("bus_voltage", bus, which, self._numbers.supplies.bus_of[which] < 0,
                          "nothing: what all on its bus draw decides it")
-        if angle is not None:
-            self._numbers.check_angles(angle, which)
         anew = bool(parameters) and not self._numbers.retuned(which, parameters or {})
         if anew and parameters:
             part = self._numbers.repacked(which, parameters)
@@ -331,6 +343,12 @@ class VectorSimulator:
             self._store.impose(which, angle, speed)
         if torque is not None:
             self._store.enable(which, torque)
+
+    def _check_imposed(self, angle: Array | None, inertia: Array | None, which: NDArray[np.int64]) -> None:
+        if inertia is not None:
+            _check_lanes("load_inertia", inertia, which, inertia >= 0.0, "at least 0 kg m²")
+        if angle is not None:
+            self._numbers.check_angles(angle, which)
 
     # --- memory -------------------------------------------------------------------------------------------------------
 
@@ -348,14 +366,17 @@ class VectorSimulator:
         InputError
             If it is the memory of another model or of another number of lanes.
         """
+        self._check_memory(memory)
+        self._store.fresh[0] = 0
+        self._store.restore(memory)
+
+    def _check_memory(self, memory: Any) -> None:
         kind = type(self._numbers.model).__name__
         if not isinstance(memory, VectorMemory):
             raise InputError("restore(memory)", got=memory, allowed="what save() has returned")
         if memory.model != kind or len(memory.records) != len(self):
             raise InputError("restore(memory)", got=f"{len(memory.records)} lanes of {memory.model}",
                              allowed=f"{len(self)} lanes of {kind}")
-        self._store.fresh[0] = 0
-        self._store.restore(memory)
 
     # --- from C -------------------------------------------------------------------------------------------------------
 
@@ -390,6 +411,13 @@ class VectorSimulator:
         if type(torque) is float and math.isfinite(torque):
             return torque
         return numbers_of("external_torque", torque, np.arange(len(self)))
+
+
+def check_duration(duration: float) -> None:
+    """Raise InputError if a call cannot advance by this [s]."""
+    if not (type(duration) is float or is_finite(duration)) or not 0.0 <= duration <= LONGEST:
+        raise InputError("advance(duration)", got=duration,
+                         allowed=f"a number of seconds, from 0 to {LONGEST:.0e} in one call")
 
 
 def _first_command(model: Model) -> Signal:
