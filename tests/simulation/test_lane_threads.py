@@ -16,8 +16,10 @@ from servotwin.errors import InputError
 from servotwin.models.engine.one_lane import BY_ARCS, COMMAND_ANGLE, PULSE_WIDTH, Stand, pulses
 from servotwin.models.state.modes import Vector
 from servotwin.models.terms.frame import AT_START
+from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.stops import Stops
 from servotwin.simulation.compile import threads
+from servotwin.simulation.compile.standalone import Standalone
 from servotwin.simulation.compile.threads import PULSES_BY_ARCS, PULSES_BY_LEGS, SEEN, TICKS, LaneText
 from servotwin.simulation.lanes.lane_threads import ThreadedLanes, text_of
 from servotwin.simulation.start import Status
@@ -292,6 +294,17 @@ def test_ptx_of_floats_calls_nothing_and_has_no_doubles(case):
     assert ".f64" not in found
     assert len(found) <= 3e5
     assert ".f64" in threads.ptx(LaneText(text.way, text.flags, False))
+
+
+def test_numbers_that_act_in_nothing_have_no_place_in_a_thread():
+    own = text_of(made("arcs", 2)[0]._numbers, "float64")
+    assert {("heat.C_w", "Heat", "C_w"), ("motor.L", "Motor", "L")} <= set(threads._numbers_of(Numbers, ""))
+    structs = {name: body for body, name in re.findall(r"typedef struct \{([^{}]*)\} (\w+);", own.text)}
+    assert not structs["Heat"].strip()
+    assert "L;" not in structs["Motor"]
+    read = Standalone({}, unstored=frozenset({("Motor", "K"), ("Heat", "C_w")}))
+    read.add(own.recipe, threads._signatures(own))
+    assert read.types.missed == {("Motor", "K")}  # which is read: such a text is none
 
 
 def test_the_text_in_plain_python_is_the_same():

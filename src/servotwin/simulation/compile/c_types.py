@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -96,9 +96,21 @@ _ROUNDED = ("whole(FLOOR(", "whole(CEIL(")
 
 
 class Types:
-    """Structs, tables and small functions that a text needs, in the order in which they are asked for."""
+    """Structs, tables and small functions that a text needs, in the order in which they are asked for.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    unstored : set of tuple of str
+        Elements of named tuples, by the names of both, that no struct has: nothing may read them.
+
+    Attributes
+    ----------
+    missed : set of tuple of str
+        Those of them that something reads all the same: such a text is none.
+    """
+
+    def __init__(self, unstored: frozenset[tuple[str, str]] = frozenset()) -> None:
+        self.unstored, self.missed = unstored, set[tuple[str, str]]()
         self.structs: list[str] = []
         self.tables: list[str] = []
         self.helpers: list[str] = []
@@ -157,8 +169,8 @@ class Types:
 
     def _tuple(self, kind: Tuple) -> str:
         if kind not in self._names:
-            elements = [self.declared(each, self.field(kind, k)) for k, each in enumerate(kind.elements)]
-            if not elements:
+            elements = [self.declared(each, self.field(kind, k)) for k, each in self._stored(kind, kind.elements)]
+            if not kind.elements:
                 body = "char nothing;"
             elif kind.uniform:
                 body = f"{self.declared(kind.elements[0], 'v')}[{len(elements)}];"
@@ -167,6 +179,11 @@ class Types:
             self._names[kind] = name = self.fresh(self._wanted.get(kind) or kind.name or f"tuple_{len(elements)}")
             self.structs.append(f"typedef struct {{ {body} }} {name};")
         return self._names[kind]
+
+    def _stored(self, kind: Tuple, values: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+        """Return the values of the elements that a struct has, with their places."""
+        return ((k, x) for k, x in enumerate(values)
+                if not kind.fields or (kind.name, kind.fields[k]) not in self.unstored)
 
     @staticmethod
     def field(kind: Tuple, place: int) -> str:
@@ -201,11 +218,13 @@ class Types:
 
     def made(self, kind: Tuple, parts: list[str]) -> str:
         """Return a tuple of these values."""
-        inner = ", ".join(parts) or "0"
+        inner = ", ".join(x for _, x in self._stored(kind, parts)) or ("" if parts else "0")
         return f"(({self.of(kind)}){{{{{inner}}}}})" if kind.uniform else f"(({self.of(kind)}){{{inner}}})"
 
     def part(self, text: str, kind: Tuple, place: int) -> str:
         """Return an element of a tuple."""
+        if kind.fields and (kind.name, kind.fields[place]) in self.unstored:
+            self.missed.add((kind.name, kind.fields[place]))
         return member(text, f"v[{place}]" if kind.uniform else self.field(kind, place))
 
     def converted(self, text: str, kind: Kind | None, to: Kind | None) -> str:
@@ -284,7 +303,8 @@ class Types:
             return self.literal(value)[1:-1].removeprefix(f"({self.of(kind)})")  # the table says its type
         if not isinstance(kind, Tuple):
             return self.literal(value)
-        inner = ", ".join(self._initial(each, x) for each, x in zip(kind.elements, value, strict=True)) or "0"
+        inner = ", ".join(self._initial(kind.elements[k], x) for k, x in self._stored(kind, value))
+        inner = inner or ("" if kind.elements else "0")
         return f"{{{{{inner}}}}}" if kind.uniform else f"{{{inner}}}"
 
 

@@ -289,9 +289,9 @@ class Printer:
     """
 
     def __init__(self, vector: frozenset[str], in_any_order: frozenset[str], called: frozenset[str],
-                 inlined: frozenset[str] = frozenset()) -> None:
+                 inlined: frozenset[str] = frozenset(), unstored: frozenset[tuple[str, str]] = frozenset()) -> None:
         self.vector, self.in_any_order, self.called, self.inlined = vector, in_any_order, called, inlined
-        self.types = Types()
+        self.types = Types(unstored)
         self.functions: list[str] = []
         self._names: dict[Specialised, str] = {}
 

@@ -38,11 +38,14 @@ class Standalone:
         Structs that others see, by their names, each after those in it.
     floats : bool
         Whether numbers have 32 bits; recipes have to say so too.
+    unstored : set of tuple of str
+        Elements of named tuples that no struct has, as `Types` takes them.
     """
 
-    def __init__(self, public: Mapping[str, Kind], *, floats: bool = False) -> None:
+    def __init__(self, public: Mapping[str, Kind], *, floats: bool = False,
+                 unstored: frozenset[tuple[str, str]] = frozenset()) -> None:
         self._floats = floats
-        self._printer = Printer(frozenset(), frozenset(), frozenset(), _ONCE)
+        self._printer = Printer(frozenset(), frozenset(), frozenset(), _ONCE, unstored)
         for name, kind in public.items():
             self.types.call(kind, name)
         self._public = len(self.types.structs)

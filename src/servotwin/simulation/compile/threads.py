@@ -406,10 +406,36 @@ def _signatures(own: LaneText) -> dict[str, tuple[Kind, ...]]:
 _RINGS = re.compile(rf"\b(float|double) ({'|'.join(RINGS)})\[{WAITING}\];")
 
 
+def _kernels(own: LaneText, signatures: Mapping[str, tuple[Kind, ...]]) -> tuple[Standalone, dict[str, str]]:
+    """Return the kernels of a text, and the names of its entries; numbers that act in nothing have no place.
+
+    A struct whose address is taken is in the memory of the thread, with all that it has.
+    """
+    acting, idle = set[tuple[str, str]](), set[tuple[str, str]]()
+    for path, name, field in _numbers_of(Numbers, ""):
+        (idle if path in own.recipe.absent else acting).add((name, field))
+    missed = set[tuple[str, str]]()
+    while True:
+        text = Standalone({}, floats=own.floats, unstored=frozenset(idle - acting - missed))
+        names = text.add(own.recipe, signatures)
+        if not text.types.missed:
+            return text, names
+        missed |= text.types.missed
+
+
+def _numbers_of(kind: Any, path: str) -> Iterator[tuple[str, str, str]]:
+    """Return the numbers of a servo: the path of each, and the names of its tuple and of itself in that."""
+    for name, hint in fields_of(kind):
+        if hasattr(hint, "_fields"):
+            yield from _numbers_of(hint, f"{path}{name}.")
+        else:
+            yield path + name, kind.__name__, name
+
+
 @cache
 def _printed(own: LaneText) -> str:
-    text, signatures = Standalone({}, floats=own.floats), _signatures(own)
-    names = text.add(own.recipe, signatures)
+    signatures = _signatures(own)
+    text, names = _kernels(own, signatures)
     (entry, kinds), *_ = signatures.items()
     types, by_ticks = text.types, own.way == TICKS
     reals, wholes = columns(own.way)
