@@ -36,7 +36,7 @@ __all__ = [
     "Arm", "AwayFromLimits", "CommandMap", "DriveState", "JointError", "JointPath", "LeastMotion", "LeastTorque",
     "Motion", "Mount", "Odometry", "Pose", "PurePursuit", "Recipe", "Record", "Replay", "RobotRun",
     "RobotValidation", "ServoActuated", "ServoDrive", "ServoRecord", "Sizing", "SpeedMap", "TaskMetrics", "TaskRun",
-    "ToolPath", "WaypointRun", "contour_error", "follow", "ideal_task", "ideal_waypoints", "joint_names",
+    "ToolPath", "WarpDrive", "WaypointRun", "contour_error", "follow", "ideal_task", "ideal_waypoints", "joint_names",
     "joint_ranges", "mobile_robot", "read_motion", "recipe_of", "robot_model", "round_of", "run_motion", "run_task",
     "run_waypoints", "scara", "sizing_of", "task_path", "two_link", "unequal_servos", "validate_robot",
     "wheel_servo", "wheel_speed_of", "worn",
@@ -48,4 +48,8 @@ def __getattr__(name: str) -> Any:
         from servotwin.robots.gym import ServoActuated
 
         return ServoActuated
+    if name == "WarpDrive":
+        from servotwin.robots.warp_drive import WarpDrive
+
+        return WarpDrive
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -11,10 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.models.terms.elastic import Elastic
-from servotwin.models.terms.play import Play
-from servotwin.models.terms.shaft import Shaft
-from servotwin.models.terms.stops import Stops
 from servotwin.simulation.compile.calls import program, tick_address
 from servotwin.simulation.compile.layout import GIVEN, HANDLE, MESSAGES, STAGES, TICK, VERSION
 from servotwin.simulation.lanes.whole_runs import Piece, piece_of
@@ -25,7 +21,6 @@ if TYPE_CHECKING:
     from servotwin.simulation.lanes.store import Store
 
 Array = NDArray[np.float64]
-_INSIDE = 1e-9  # of a range whose ends are not possible themselves
 _WORDS: dict[str, Any] = {  # the rest are addresses
     "version": ctypes.c_int64, "lanes": ctypes.c_int64, "duration": ctypes.c_double}
 
@@ -164,27 +159,15 @@ class CEntry:
         InputError
             If a servo takes none of this kind.
         """
-        kind = GIVEN.index(name)
-        gain, offset, low, high, least, most = self._store.numbers.translate.table()[kind].T
-        if np.isnan(gain).any():
-            raise InputError(f"{name} of lane {np.isnan(gain).argmax()}", allowed="no command of this kind")
-        ends = np.sort([(least - offset) / gain, (most - offset) / gain], axis=0)
-        inside = _INSIDE * (ends[1] - ends[0])
-        inside[~np.isfinite(inside)] = 0.0
-        return np.maximum(low, ends[0] + inside), np.minimum(high, ends[1] - inside)
+        return self._store.numbers.command_ends(name)
 
     def travel(self) -> tuple[Array, Array]:
         """Return the stops of each lane [rad]; infinite where there are none."""
-        stops = self._store.numbers.now(Stops)
-        return np.array(stops.lower), np.array(stops.upper)
+        return self._store.numbers.travel()
 
     def own_inertia(self) -> Array:
         """Return of each lane what turns with the output without its load, the motor included unless it has play."""
-        numbers = self._store.numbers
-        shaft, apart = numbers.now(Shaft), (numbers.now(Play).half > 0.0) | (numbers.now(Elastic).k > 0.0)
-        known = numbers.imposed.load_inertia
-        load = np.where(np.isnan(known), numbers.load_total, known)
-        return np.asarray(np.where(apart, shaft.J_out, shaft.J) - load)
+        return self._store.numbers.own_inertia()
 
     # --- what C works on ----------------------------------------------------------------------------------------------
 

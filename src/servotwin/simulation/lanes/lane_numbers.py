@@ -27,10 +27,12 @@ from servotwin.models.terms.firmware import Firmware
 from servotwin.models.terms.frame import Chip
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.play import Play
+from servotwin.models.terms.shaft import Shaft
 from servotwin.models.terms.stops import Stops
 from servotwin.models.terms.wiring import PULSE_RANGE, TRAVEL_SLACK
 from servotwin.simulation.bus import Supplies, check_rigid
 from servotwin.simulation.compile import kernels
+from servotwin.simulation.compile.layout import GIVEN
 from servotwin.simulation.lanes.forms import TICKS
 from servotwin.simulation.lanes.inputs import LOAD_NAMES, LaneInputs, lanes_of
 from servotwin.simulation.lanes.packed import Packed, Torques
@@ -55,6 +57,9 @@ class _Scale(NamedTuple):
     offset: Any
     low: float
     high: float
+
+
+_INSIDE = 1e-9  # of a range whose ends are not possible themselves
 
 
 class _Bounds(NamedTuple):
@@ -494,6 +499,33 @@ class LaneNumbers:
             k = int(np.argmin(good))
             raise InputError(f"output_angle of lane {which[k]}", got=float(angle[k]),
                              allowed=f"{lower[k]:.6g} to {upper[k]:.6g} rad, between the stops")
+
+    def command_ends(self, name: str) -> tuple[Array, Array]:
+        """Return the lowest and highest command of each lane, of the kind `name`.
+
+        Raises
+        ------
+        InputError
+            If a servo takes none of this kind.
+        """
+        gain, offset, low, high, least, most = self.translate.table()[GIVEN.index(name)].T
+        if np.isnan(gain).any():
+            raise InputError(f"{name} of lane {np.isnan(gain).argmax()}", allowed="no command of this kind")
+        ends = np.sort([(least - offset) / gain, (most - offset) / gain], axis=0)
+        inside = _INSIDE * (ends[1] - ends[0])
+        inside[~np.isfinite(inside)] = 0.0
+        return np.maximum(low, ends[0] + inside), np.minimum(high, ends[1] - inside)
+
+    def travel(self) -> tuple[Array, Array]:
+        """Return the stops of each lane [rad]; infinite where there are none."""
+        stops = self.now(Stops)
+        return np.array(stops.lower), np.array(stops.upper)
+
+    def own_inertia(self) -> Array:
+        """Return of each lane what turns with the output without its load, the motor included unless it has play."""
+        shaft, apart = self.now(Shaft), (self.now(Play).half > 0.0) | (self.now(Elastic).k > 0.0)
+        load = np.where(np.isnan(self.imposed.load_inertia), self.load_total, self.imposed.load_inertia)
+        return np.asarray(np.where(apart, shaft.J_out, shaft.J) - load)
 
     def check_recorded(self, now: Array, duration: float) -> None:
         """Raise LoadError if a recorded torque ends before lanes that advance by a duration [s] do; names the lane."""

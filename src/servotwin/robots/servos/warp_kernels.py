@@ -1,0 +1,117 @@
+"""Kernels of `WarpDrive`: how each servo meets its joint in each world, and the torque that the joint gets.
+
+Warp reads types from annotations, so that these stay as they are.
+"""
+
+import warp as wp
+
+
+@wp.kernel
+def free_forces(passive: wp.array2d[float], bias: wp.array2d[float], applied: wp.array2d[float],
+                constraint: wp.array2d[float], actuator: wp.array2d[float], found: wp.array2d[float]):
+    """Add up all forces but those of contacts and actuators now, of which the last step's stand in their place."""
+    world, dof = wp.tid()
+    found[world, dof] = (passive[world, dof] - bias[world, dof] + applied[world, dof] + constraint[world, dof]
+                         + actuator[world, dof])
+
+
+@wp.kernel
+def take_away(speed_at: wp.array[int], applied: wp.array2d[float]):
+    """Take the torques of the last step away."""
+    world, k = wp.tid()
+    applied[world, speed_at[k]] = 0.0
+
+
+@wp.kernel
+def keep_row(solved: wp.array2d[float], speed_at: wp.array[int], k: int, found: wp.array3d[float]):
+    """Keep the accelerations of all joints with servos under one newton metre at one of them."""
+    world, n = wp.tid()
+    found[world, k, n] = solved[world, speed_at[n]]
+
+
+@wp.kernel
+def meet(qpos: wp.array2d[float], qvel: wp.array2d[float], ctrl: wp.array2d[float], free: wp.array2d[float],
+         per_torque: wp.array3d[float], torque: wp.array2d[float], which: wp.array[int], angle_at: wp.array[int],
+         speed_at: wp.array[int], command_at: wp.array[int], numbers: wp.array2d[float], count: int,
+         joints: int, met: wp.array2d[float], angle: wp.array[float], speed: wp.array[float],
+         inertia: wp.array[float], against: wp.array[float], command: wp.array[float]):
+    """Find what each servo meets at its shaft: angle, speed, inertia beyond its own, torque; and its command."""
+    world, n = wp.tid()
+    k = which[n]
+    lane = world * count + n
+    gain = numbers[k, 0]
+    a = free[world, speed_at[k]]
+    for other in range(joints):
+        if other != k:
+            a += per_torque[world, k, other] * torque[world, other]
+    met[world, k] = a
+    J = 1.0 / per_torque[world, k, k]
+    angle[lane] = wp.clamp((qpos[world, angle_at[k]] - numbers[k, 1]) / gain, numbers[k, 2], numbers[k, 3])
+    speed[lane] = qvel[world, speed_at[k]] / gain
+    inertia[lane] = wp.max(J * gain * gain - numbers[k, 4], 0.0)
+    against[lane] = -J * gain * a
+    if command_at[k] >= 0:
+        asked = wp.clamp(ctrl[world, command_at[k]], numbers[k, 5], numbers[k, 6])
+        place = numbers[k, 8] + numbers[k, 7] * asked
+        command[lane] = wp.clamp((place - numbers[k, 10]) / numbers[k, 9], numbers[k, 11], numbers[k, 12])
+
+
+@wp.kernel
+def find_lack(qvel: wp.array2d[float], free: wp.array2d[float], per_torque: wp.array3d[float], met: wp.array2d[float],
+         which: wp.array[int], speed_at: wp.array[int], numbers: wp.array2d[float], count: int, timestep: float,
+         speed: wp.array[float], torque: wp.array2d[float], wanted: wp.array2d[float]):
+    """Find the torque of each servo, and the acceleration that its joint lacks to gain the speed that it has gained."""
+    world, n = wp.tid()
+    k = which[n]
+    dof = speed_at[k]
+    gained = (speed[world * count + n] * numbers[k, 0] - qvel[world, dof]) / timestep
+    torque[world, k] = (gained - met[world, k]) / per_torque[world, k, k]
+    wanted[world, k] = gained - free[world, dof]
+
+
+@wp.kernel
+def push(per_torque: wp.array3d[float], speed_at: wp.array[int], count: int, wanted: wp.array2d[float],
+         applied: wp.array2d[float]):
+    """Find the torques by which joints get the accelerations that they lack, by Cholesky's factors in their place."""
+    world = wp.tid()
+    for i in range(count):
+        for j in range(i + 1):
+            left = per_torque[world, i, j]
+            for m in range(j):
+                left -= per_torque[world, i, m] * per_torque[world, j, m]
+            if i == j:
+                per_torque[world, i, i] = wp.sqrt(left)
+            else:
+                per_torque[world, i, j] = left / per_torque[world, j, j]
+    for i in range(count):
+        left = wanted[world, i]
+        for m in range(i):
+            left -= per_torque[world, i, m] * wanted[world, m]
+        wanted[world, i] = left / per_torque[world, i, i]
+    for k in range(count):
+        i = count - 1 - k
+        left = wanted[world, i]
+        for m in range(i + 1, count):
+            left -= per_torque[world, m, i] * wanted[world, m]
+        wanted[world, i] = left / per_torque[world, i, i]
+        applied[world, speed_at[i]] = wanted[world, i]
+
+
+@wp.kernel
+def place(qpos: wp.array2d[float], mask: wp.array[wp.uint8], which: wp.array[int], angle_at: wp.array[int],
+          speed_at: wp.array[int], numbers: wp.array2d[float], rest: wp.array[float], count: int,
+          torque: wp.array2d[float], applied: wp.array2d[float], angle: wp.array[float], command: wp.array[float],
+          lanes: wp.array[wp.uint8]):
+    """Find where servos of some worlds begin, with the command that lets them stay; their torques are taken away."""
+    world, n = wp.tid()
+    k = which[n]
+    lane = world * count + n
+    lanes[lane] = mask[world]
+    if mask[world] != wp.uint8(0):
+        at = wp.clamp((qpos[world, angle_at[k]] - numbers[k, 1]) / numbers[k, 0], numbers[k, 2], numbers[k, 3])
+        angle[lane] = at
+        command[lane] = rest[k]
+        if wp.isnan(rest[k]):
+            command[lane] = wp.clamp(at, numbers[k, 11], numbers[k, 12])
+        applied[world, speed_at[k]] = 0.0
+        torque[world, k] = 0.0

@@ -1,0 +1,156 @@
+"""`WarpDrive` in MuJoCo Warp itself, beside `ServoDrive` with steps so short that nothing changes any more."""
+
+import mujoco
+import numpy as np
+import pytest
+
+import servotwin as st
+from servotwin.errors import InputError, UnknownNameError
+from servotwin.robots import ServoDrive, WarpDrive
+
+mjw = pytest.importorskip("mujoco_warp", reason="mujoco-warp is not installed")
+wp = pytest.importorskip("warp")
+wp.set_device("cpu")
+pytestmark = pytest.mark.slow
+SERVO = st.PulseServo(st.load_servo("hitec-hs-755hb"))
+BUS = st.DigitalServo(st.load_servo("feetech-sts3215-12v").replace({"gear.backlash": 0.0}))
+LINK = """<body pos="{at} 0 0"><joint name="{name}" axis="0 -1 0"/>
+<geom type="capsule" fromto="0 0 0 .1 0 0" size=".01" mass="{mass}"/>"""
+WORLD = """<mujoco><option timestep="{step}"/><worldbody>{floor}<body pos="0 0 .1">{links}</body></worldbody>
+<actuator>{actuators}</actuator></mujoco>"""
+FLOOR = '<geom type="plane" size="1 1 .1"/>'
+
+
+def arm(step, masses=(0.2,), floor="", actuators=True):
+    """Return a chain of links, each with a joint a, b, ..., as an MjModel."""
+    names, links = "abc"[:len(masses)], ""
+    for name, mass in reversed(list(zip(names, masses, strict=True))):
+        links = LINK.format(at=0 if name == "a" else 0.1, name=name, mass=mass) + links + "</body>"
+    own = "".join(f'<position joint="{name}" kp="1"/>' for name in names) if actuators else ""
+    return mujoco.MjModel.from_xml_string(WORLD.format(step=step, floor=floor, links=links, actuators=own))
+
+
+def sines(time, count):
+    return [0.6 + 0.3 * np.sin(4 * time), 0.3 * np.cos(5 * time), 0.3 * np.sin(6 * time)][:count]
+
+
+def by_servo_drive(servo, masses, step, duration, goals=sines, floor=""):
+    model = arm(step, masses, floor)
+    drive = ServoDrive(model, dict.fromkeys("abc"[:len(masses)], servo))
+    data = mujoco.MjData(model)
+    data.qpos[:] = 0.3
+    drive.reset(data)
+    angles = []
+    for k in range(round(duration / step)):
+        data.ctrl[:] = goals(k * step, len(masses))
+        drive.step(data)
+        angles.append(data.qpos.copy())
+    return np.array(angles)
+
+
+def by_warp(servo, masses, step, duration, goals=sines, floor=""):
+    """Return angles in the second of two worlds, speeds at the end, and the drive."""
+    model = arm(step, masses, floor)
+    drive = WarpDrive(model, dict.fromkeys("abc"[:len(masses)], servo), worlds=2)
+    start = mujoco.MjData(model)
+    start.qpos[:] = 0.3
+    own, data = mjw.put_model(model), mjw.put_data(model, start, nworld=2)
+    drive.attach(own)
+    angles = []
+    for k in range(round(duration / step)):
+        data.ctrl.assign(np.tile(np.float32(goals(k * step, len(masses))), (2, 1)))
+        mjw.step(own, data)
+        angles.append(data.qpos.numpy()[1].copy())
+    return np.array(angles), data.qvel.numpy()[1], drive
+
+
+def off(servo, masses, step, fine=2.5e-4):
+    """Return how far joints are off [rad rms]."""
+    true = by_servo_drive(servo, masses, fine, 0.8)
+    found, _, _ = by_warp(servo, masses, step, 0.8)
+    each = round(step / fine)
+    return np.sqrt(np.mean((found - true[each - 1::each]) ** 2, axis=0))
+
+
+@pytest.mark.parametrize(("servo", "masses", "bar"), [
+    (SERVO, (0.2,), 2e-3), (BUS, (0.2,), 2e-3), (SERVO, (0.1, 0.08, 0.05), 2e-3), (BUS, (0.1, 0.08, 0.05), 2e-3)],
+    ids=["pulses", "bus", "three joints", "three joints on a bus"])
+def test_joints_are_those_of_servo_drive_by_steps_of_first_order(servo, masses, bar):
+    at_two, at_four = off(servo, masses, 2e-3), off(servo, masses, 4e-3)
+    assert at_two.max() <= bar
+    assert at_four.max() >= 1.4 * at_two.max()
+
+
+def test_an_arm_that_lies_on_the_floor_is_at_rest_where_servo_drive_leaves_it():
+    def down(time, count):
+        return [-0.2, 0.0, 0.0][:count]
+
+    masses = (0.1, 0.08)
+    true = by_servo_drive(BUS, masses, 2e-3, 2.0, down, FLOOR)
+    found, speeds, drive = by_warp(BUS, masses, 2e-3, 2.0, down, FLOOR)
+    assert found[-1] == pytest.approx(true[-1], abs=0.02)  # within what dry friction holds
+    assert np.abs(speeds).max() <= 1e-3
+    assert np.isfinite(drive.torque.numpy()).all()
+
+
+def test_worlds_are_reset_by_a_mask_and_do_not_touch_each_other():
+    model = arm(2e-3)
+    drive = WarpDrive(model, {"a": SERVO}, worlds=3)
+    own, data = mjw.put_model(model), mjw.put_data(model, mujoco.MjData(model), nworld=3)
+    drive.attach(own)
+    rng = np.random.default_rng(0)
+    data.ctrl.assign(np.full((3, 1), 0.8, np.float32))
+    for k in range(60):
+        mjw.step(own, data)
+        if k % 7 == 3:
+            mask = rng.random(3) < 0.5
+            mask[0] = False
+            before = data.qpos.numpy().copy()
+            mjw.reset_data(own, data, wp.array(mask, dtype=bool))
+            drive.reset(data, mask)
+            data.ctrl.assign(np.full((3, 1), 0.8, np.float32))
+            assert np.array_equal(data.qpos.numpy()[~mask], before[~mask])
+            assert not drive.torque.numpy()[mask].any()
+    model = arm(2e-3)
+    alone = WarpDrive(model, {"a": SERVO})
+    own, one = mjw.put_model(model), mjw.put_data(model, mujoco.MjData(model), nworld=1)
+    alone.attach(own)
+    one.ctrl.assign(np.full((1, 1), 0.8, np.float32))
+    for _ in range(60):
+        mjw.step(own, one)
+    assert data.qpos.numpy()[0, 0] == pytest.approx(one.qpos.numpy()[0, 0], abs=1e-6)
+
+
+def test_joints_without_an_actuator_are_told_by_name():
+    model = arm(2e-3, actuators=False)
+    drive = WarpDrive(model, {"a": SERVO}, worlds=2)
+    own, data = mjw.put_model(model), mjw.put_data(model, mujoco.MjData(model), nworld=2)
+    drive.attach(own)
+    drive.reset(data)
+    drive.command({"a": [0.3, 0.7]})
+    for _ in range(300):
+        mjw.step(own, data)
+    assert data.qpos.numpy()[:, 0] == pytest.approx([0.3, 0.7], abs=0.03)
+
+
+def test_data_of_other_worlds_are_refused():
+    model = arm(2e-3)
+    drive = WarpDrive(model, {"a": SERVO}, worlds=2)
+    own, data = mjw.put_model(model), mjw.put_data(model, mujoco.MjData(model), nworld=3)
+    drive.attach(own)
+    with pytest.raises(InputError, match="^data of a WarpDrive: got '3 worlds of 1 degrees of freedom', allowed: 2 of 1"):
+        mjw.step(own, data)
+
+
+@pytest.mark.parametrize(("call", "error", "words"), [
+    (lambda model: WarpDrive("arm.xml", {"a": SERVO}), InputError, "^model of a WarpDrive: got 'str'"),
+    (lambda model: WarpDrive(model, {}), InputError, "^servos of a WarpDrive"),
+    (lambda model: WarpDrive(model, {"z": SERVO}), (InputError, UnknownNameError), "z"),
+    (lambda model: WarpDrive(model, {"a": SERVO}, worlds=0), InputError, "^worlds: got 0"),
+    (lambda model: WarpDrive(model, {"a": st.DigitalServo(st.load_servo("feetech-sts3215-12v"))}), InputError,
+     "^servo of joint a of a WarpDrive: got 'play'"),
+    (lambda model: WarpDrive(model, {"a": SERVO}).command({"a": 0.3}), InputError, "^command of joint a")])
+def test_mistakes_are_said_in_a_line(call, error, words):
+    with pytest.raises(error, match=words) as caught:
+        call(arm(2e-3))
+    assert "\n" not in str(caught.value)
