@@ -138,7 +138,7 @@ def test_data_of_other_worlds_are_refused():
     drive = WarpDrive(model, {"a": SERVO}, worlds=2)
     own, data = mjw.put_model(model), mjw.put_data(model, mujoco.MjData(model), nworld=3)
     drive.attach(own)
-    with pytest.raises(InputError, match=r"^data of a WarpDrive: got '3 worlds of 1 degrees of freedom', allowed: 2 of"):
+    with pytest.raises(InputError, match=r"^data of a WarpDrive: got '3 worlds of 1 degrees of freedom', allowed: 2"):
         mjw.step(own, data)
 
 
