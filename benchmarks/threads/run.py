@@ -22,8 +22,8 @@ from common import best
 
 from servotwin.errors import ServotwinError
 from servotwin.simulation.compile import threads
-from servotwin.simulation.compile.cuda import Gpu
 from servotwin.simulation.compile.threads import PULSES_BY_ARCS, PULSES_BY_LEGS, LaneText
+from servotwin.simulation.lanes.cuda import Gpu
 from servotwin.simulation.lanes.lane_threads import ThreadedLanes, text_of
 
 LANES, FRAME = 512, 0.02

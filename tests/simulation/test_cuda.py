@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from servotwin.errors import InputError, ServotwinError
-from servotwin.simulation.compile import cuda, threads
-from servotwin.simulation.compile.cuda import Gpu, stream_of
+from servotwin.simulation.compile import threads
+from servotwin.simulation.lanes import cuda
+from servotwin.simulation.lanes.cuda import Gpu, stream_of
 from servotwin.simulation.lanes.lane_threads import ThreadedLanes
 from simulation.test_lane_threads import CASES, made, on_device
 

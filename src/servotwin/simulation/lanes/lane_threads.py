@@ -50,8 +50,8 @@ from servotwin.models.terms.shaft import Shaft
 from servotwin.models.terms.wiring import Wiring
 from servotwin.simulation.compile import threads
 from servotwin.simulation.compile.c_types import identifier
-from servotwin.simulation.compile.cuda import Gpu, GpuArray, guest, is_guest, stream_of
 from servotwin.simulation.compile.threads import PULSES_BY_ARCS, PULSES_BY_LEGS, RINGS, SEEN, TICKS, LaneText
+from servotwin.simulation.lanes.cuda import Gpu, GpuArray, guest, is_guest, stream_of
 from servotwin.simulation.lanes.forms import WORDS, Terms
 from servotwin.simulation.lanes.whole_runs import nothing_yet, taken
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models.engine.memory import ACCURACY, Memories
 from servotwin.models.engine.one_lane import COMMAND_ANGLE, FOLLOWED, PULSE_WIDTH
-from servotwin.simulation.compile.cuda import GpuArray, is_guest
 from servotwin.simulation.compile.threads import SEEN
 from servotwin.simulation.lanes.batch import Failure
+from servotwin.simulation.lanes.cuda import GpuArray, is_guest
 from servotwin.simulation.lanes.inputs import pick
 from servotwin.simulation.lanes.lane_threads import ThreadedLanes
 from servotwin.simulation.lanes.many import real_type
