@@ -6,7 +6,7 @@ import pytest
 
 import servotwin as st
 from servotwin.errors import InputError, UnknownNameError
-from servotwin.robots import ServoDrive, WarpDrive
+from servotwin.robots import Mount, ServoDrive, WarpDrive
 
 mjw = pytest.importorskip("mujoco_warp", reason="mujoco-warp is not installed")
 wp = pytest.importorskip("warp")
@@ -14,6 +14,7 @@ wp.set_device("cpu")
 pytestmark = pytest.mark.slow
 SERVO = st.PulseServo(st.load_servo("hitec-hs-755hb"))
 BUS = st.DigitalServo(st.load_servo("feetech-sts3215-12v").replace({"gear.backlash": 0.0}))
+TURNED = Mount(SERVO, zero=1.6, direction=-1, ratio=1.5)
 LINK = """<body pos="{at} 0 0"><joint name="{name}" axis="0 -1 0"/>
 <geom type="capsule" fromto="0 0 0 .1 0 0" size=".01" mass="{mass}"/>"""
 WORLD = """<mujoco><option timestep="{step}"/><worldbody>{floor}<body pos="0 0 .1">{links}</body></worldbody>
@@ -72,12 +73,12 @@ def off(servo, masses, step, fine=2.5e-4):
     return np.sqrt(np.mean((found - true[each - 1::each]) ** 2, axis=0))
 
 
-@pytest.mark.parametrize(("servo", "masses", "bar"), [
-    (SERVO, (0.2,), 2e-3), (BUS, (0.2,), 2e-3), (SERVO, (0.1, 0.08, 0.05), 2e-3), (BUS, (0.1, 0.08, 0.05), 2e-3)],
-    ids=["pulses", "bus", "three joints", "three joints on a bus"])
-def test_joints_are_those_of_servo_drive_by_steps_of_first_order(servo, masses, bar):
+@pytest.mark.parametrize(("servo", "masses"), [
+    (SERVO, (0.2,)), (BUS, (0.2,)), (TURNED, (0.2,)), (SERVO, (0.1, 0.08, 0.05)), (BUS, (0.1, 0.08, 0.05))],
+    ids=["pulses", "bus", "by a gear, the other way round", "three joints", "three joints on a bus"])
+def test_joints_are_those_of_servo_drive_by_steps_of_first_order(servo, masses):
     at_two, at_four = off(servo, masses, 2e-3), off(servo, masses, 4e-3)
-    assert at_two.max() <= bar
+    assert at_two.max() <= 2e-3
     assert at_four.max() >= 1.4 * at_two.max()
 
 
@@ -107,7 +108,7 @@ def test_worlds_are_reset_by_a_mask_and_do_not_touch_each_other():
             mask[0] = False
             before = data.qpos.numpy().copy()
             mjw.reset_data(own, data, wp.array(mask, dtype=bool))
-            drive.reset(data, mask)
+            drive.reset(data, mask if k % 2 else wp.array(mask, dtype=bool))
             data.ctrl.assign(np.full((3, 1), 0.8, np.float32))
             assert np.array_equal(data.qpos.numpy()[~mask], before[~mask])
             assert not drive.torque.numpy()[mask].any()
@@ -127,6 +128,11 @@ def test_joints_without_an_actuator_are_told_by_name():
     own, data = mjw.put_model(model), mjw.put_data(model, mujoco.MjData(model), nworld=2)
     drive.attach(own)
     drive.reset(data)
+    for wrong, words in (([0.3, 0.7, 0.1], "an array of shape"), (np.nan, "got nan")):
+        with pytest.raises(InputError, match=f"^command of joint a.*{words}"):
+            drive.command({"a": wrong})
+    with pytest.raises(InputError, match=r"^worlds of a WarpDrive: got 'an array of shape \(3,\)', allowed: a"):
+        drive.reset(data, np.ones(3, bool))
     drive.command({"a": [0.3, 0.7]})
     for _ in range(300):
         mjw.step(own, data)

@@ -229,6 +229,26 @@ def test_what_a_servo_does_not_take_fails_its_lane_and_no_other(kind, command, a
     assert np.isfinite(np.delete(own.array("reals")[:2], 2, 1)).all()
 
 
+@pytest.mark.parametrize("case", ["arcs", pytest.param("goals", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("call", "name", "value"), [
+    ("tell", "torque", np.nan), ("tell", "torque", np.inf), ("impose", "inertia", np.inf), ("impose", "inertia", -1.0)])
+def test_what_is_no_number_fails_its_lane_and_no_other(case, call, name, value):
+    sims, *_ = made(case, 5)
+    own, _ = entered(sims)
+    own.tell(sims._store.command)
+    values = np.full(5, 1e-3)
+    values[2] = value
+    getattr(own, call)(**{name: values})
+    own.advance(0.05)
+    assert own.status.tolist() == [0, 0, Status.REFUSED.code, 0, 0]
+    assert np.isfinite(own.column("stand.y.q")).tolist() == [True, True, False, True, True]
+    own.begin()
+    assert (own.status[2] == 0) == (call == "impose")  # a torque stays until another comes
+    own.tell(torque=0.0)
+    own.begin()
+    assert not own.status.any()
+
+
 def test_twenty_ticks_are_a_frame():
     sims, low, high, rng = made("arcs")
     (whole, _), (parts, _) = entered(sims), entered(sims)

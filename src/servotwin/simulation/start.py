@@ -93,7 +93,7 @@ class Status(Enum):
     CHATTER = 3, "events follow each other without time going on"
     TOO_FAST = 4, "it oscillates too fast to be followed"
     CROWDED = 5, "frames follow each other faster than the chip decides: a third decision would have to wait"
-    REFUSED = 6, "a command, or an angle to begin at, is none that the servo takes"
+    REFUSED = 6, "a command, a torque, or what another simulator imposes is nothing that the servo takes"
 
     def __init__(self, code: int, message: str) -> None:
         self.code = code

@@ -16,9 +16,11 @@ from servotwin.robots.servos.command_map import CommandMap, told
 from servotwin.robots.servos.mount import Joint, Mount, joints_of, treat_friction
 from servotwin.robots.servos.servo_groups import check_options, maps_of, put_into_model
 from servotwin.simulation import VectorSimulator
+from servotwin.simulation.lanes.vector import numbers_of
 
 if TYPE_CHECKING:
     from servotwin.models import Model
+
 
 class _Crew:
     """Servos of one model: a lane for each of its joints in each world, world after world."""
@@ -123,7 +125,10 @@ class WarpDrive:
         groups = dict[Any, list[int]]()
         for k, joint in enumerate(own):
             groups.setdefault(joint.mount.model, []).append(k)
-        self._crews = [_Crew(of, which, worlds, str(self._device), seed) for of, which in groups.items()]
+        self._crews = []
+        for of, which in groups.items():
+            self._crews.append(_Crew(of, which, worlds, str(self._device), seed))
+            seed += worlds * len(which)  # each lane has its own
         numbers = self._numbers(own, maps)
         put_into_model(mujoco, model, own, numbers[:, 4] / numbers[:, 0] ** 2)
         self._lay_out(own, numbers, int(model.nv))
@@ -228,14 +233,23 @@ class WarpDrive:
         Parameters
         ----------
         data : mujoco_warp.Data
-        worlds : warp.array of uint8, or array of bool, shape (worlds,), optional
-            Which; all unless given.
+        worlds : warp.array or array of bool, shape (worlds,), optional
+            Which, as `mujoco_warp.reset_data` takes it; all unless given.
+
+        Raises
+        ------
+        InputError
+            If it is no such mask.
         """
         wp = self._wp
         with wp.ScopedDevice(self._device):
-            if worlds is None:
-                worlds = np.ones(self.worlds, np.uint8)
-            mask = worlds if isinstance(worlds, wp.array) else wp.array(np.asarray(worlds, np.uint8), dtype=wp.uint8)
+            mask = np.ones(self.worlds, np.bool_) if worlds is None else worlds
+            if not isinstance(mask, wp.array):
+                mask = np.asarray(mask)
+            if mask.shape != (self.worlds,) or mask.dtype not in (np.bool_, wp.bool):
+                raise InputError("worlds of a WarpDrive", got=f"an array of shape {mask.shape}",
+                                 allowed=f"a mask of bool, shape ({self.worlds},)")
+            mask = mask if isinstance(mask, wp.array) else wp.array(mask, dtype=wp.bool)
             for crew in self._crews:
                 wp.launch(self._kernels.place, dim=(self.worlds, len(crew.which)), inputs=[
                     data.qpos, mask, crew.places, self._angle_at, self._speed_at, self._numbers_of, self._rest,
@@ -245,14 +259,21 @@ class WarpDrive:
         self._begun = True
 
     def command(self, places: Mapping[str, Any]) -> None:
-        """Tell joints without an actuator where to go [rad, m], a number or an array (worlds,) each."""
+        """Tell joints without an actuator where to go [rad, m], a number or an array (worlds,) each.
+
+        Raises
+        ------
+        InputError
+            If one has none, or has an actuator, whose `ctrl` says so; or a place is not finite.
+        """
         for name, values in places.items():
             k = self.joints.index(name) if name in self.joints else -1
             if k < 0 or self._has_actuator[k]:
                 raise InputError(f"command of joint {name}", allowed="joints with a servo and without an actuator")
             crew = next(crew for crew in self._crews if k in crew.which)
             gain, zero, low, high = self._table[k, [9, 10, 11, 12]]
-            column = np.broadcast_to(np.clip((np.asarray(values, np.float64) - zero) / gain, low, high), self.worlds)
+            place = numbers_of(f"command of joint {name}", values, np.arange(self.worlds))
+            column = np.clip((place - zero) / gain, low, high)
             lanes = crew.lanes["command"].numpy().reshape(self.worlds, -1).copy()
             lanes[:, crew.which.index(k)] = column
             crew.lanes["command"].assign(lanes.ravel())

@@ -98,7 +98,7 @@ def push(per_torque: wp.array3d[float], speed_at: wp.array[int], count: int, wan
 
 
 @wp.kernel
-def place(qpos: wp.array2d[float], mask: wp.array[wp.uint8], which: wp.array[int], angle_at: wp.array[int],
+def place(qpos: wp.array2d[float], mask: wp.array[wp.bool], which: wp.array[int], angle_at: wp.array[int],
           speed_at: wp.array[int], numbers: wp.array2d[float], rest: wp.array[float], count: int,
           torque: wp.array2d[float], applied: wp.array2d[float], angle: wp.array[float], command: wp.array[float],
           lanes: wp.array[wp.uint8]):
@@ -106,8 +106,9 @@ def place(qpos: wp.array2d[float], mask: wp.array[wp.uint8], which: wp.array[int
     world, n = wp.tid()
     k = which[n]
     lane = world * count + n
-    lanes[lane] = mask[world]
-    if mask[world] != wp.uint8(0):
+    lanes[lane] = wp.uint8(0)
+    if mask[world]:
+        lanes[lane] = wp.uint8(1)
         at = wp.clamp((qpos[world, angle_at[k]] - numbers[k, 1]) / numbers[k, 0], numbers[k, 2], numbers[k, 3])
         angle[lane] = at
         command[lane] = rest[k]

@@ -169,41 +169,49 @@ _TICKS = Template('''    real piece[7] = {0, of->followed[lane], 0, 0, 0, 0, 0};
     const int32_t status = (int32_t)gone.f1;
     stand = gone.f0;''')
 _PREPARE = Template('''
-INLINED void prepared(const lane_table *of, int32_t lane) {
+INLINED void prepare(const lane_table *of, int32_t lane) {
     const int64_t tile = lane / $tile;
     $prepare(($numbers *)(uintptr_t)of->numbers + tile, ($arcs *)(uintptr_t)of->arcs + tile, lane % $tile);
 }
+''')
+_FOR_ALL = Template('''
 #if defined(__NVPTX__)
-void servotwin_prepare(const lane_table of) {
+void servotwin_$entry(const lane_table of) {
     const int32_t k = THREAD;
     if (k < of.lanes)
-        prepared(&of, k);
+        $entry(&of, k);
 }
 #else
-EXPORTED void servotwin_prepare(const lane_table *of, int64_t first, int64_t last) {
+EXPORTED void servotwin_$entry(const lane_table *of, int64_t first, int64_t last) {
     for (int64_t k = first; k < last; k++)
-        prepared(of, (int32_t)k);
+        $entry(of, (int32_t)k);
 }
 #endif
 ''')
 _BESIDE = Template('''
+#define FINITE(x) ((x) - (x) == 0)
 INLINED void lose(const lane_table *of, int32_t lane) {
     const int64_t n = of->lanes;
     real *reals = of->reals + lane;
-    of->status[lane] = $refused;
+    if (of->status[lane] == 0)
+        of->status[lane] = $refused;
 $lose
 }
 INLINED void tell(const lane_table *of, int32_t lane) {
+    const int64_t n = of->lanes;
     if (of->mask && !of->mask[lane])
         return;
-    if (of->torque)
-        of->total[lane] = of->bare[lane] + of->torque[lane];
+    if (of->torque) {
+        of->total[lane] = $load_torque + of->torque[lane];
+        if (!FINITE(of->total[lane]))
+            lose(of, lane);
+    }
     if (of->command) {
         const int64_t tile = lane / $tile;
         const real followed =
             $follow(of->kind, ($wirings *)(uintptr_t)of->wirings + tile, lane % $tile, of->command[lane]);
         of->followed[lane] = followed;
-        if (followed != followed && of->status[lane] == 0)
+        if (followed != followed)
             lose(of, lane);
     }
 }
@@ -219,7 +227,7 @@ INLINED void begin(const lane_table *of, int32_t lane) {
     const real command = of->followed[lane];
     const $stand stand = $begin(($numbers *)(uintptr_t)of->numbers + tile, wiring, j, curve, command,
         of->angle ? of->angle[lane] : NAN);
-    if (command != command || stand.y.q != stand.y.q) {
+    if (command != command || stand.y.q != stand.y.q || !FINITE(of->total[lane])) {
         lose(of, lane);
         return;
     }
@@ -235,7 +243,7 @@ INLINED void look(const lane_table *of, int32_t lane) {
     $state
 $loads
 $rings    const $observed shown = $look(($numbers *)(uintptr_t)of->numbers + tile, j, curve,
-        of->total[lane], of->bare[3 * n + lane], $memory);
+        of->total[lane], $reduction, $memory);
     const int lost = of->status[lane] != 0;
 $shown
 }
@@ -247,56 +255,22 @@ INLINED void impose(const lane_table *of, int32_t lane) {
     if ((of->mask && !of->mask[lane]) || of->status[lane] != 0)
         return;
     $numbers *numbers = ($numbers *)(uintptr_t)of->numbers + tile;
-    if (of->inertia && of->inertia[lane] >= 0) {
-        $hang(numbers, j, of->bare[n + lane], of->bare[2 * n + lane], of->inertia[lane]);
+    if (of->inertia && of->inertia[lane] == of->inertia[lane]) {
+        if (of->inertia[lane] < 0 || !FINITE(of->inertia[lane])) {
+            lose(of, lane);
+            return;
+        }
+        $hang(numbers, j, $output_inertia, $motor_inertia, of->inertia[lane]);
 $prepared    }
     $stand stand = {0};
 $stand_loads
     stand = $impose(numbers, j, &stand, of->angle ? of->angle[lane] : NAN, of->speed ? of->speed[lane] : NAN);
 $stand_stores
 }
-#if defined(__NVPTX__)
-void servotwin_tell(const lane_table of) {
-    const int32_t k = THREAD;
-    if (k < of.lanes)
-        tell(&of, k);
-}
-void servotwin_begin(const lane_table of) {
-    const int32_t k = THREAD;
-    if (k < of.lanes)
-        begin(&of, k);
-}
-void servotwin_look(const lane_table of) {
-    const int32_t k = THREAD;
-    if (k < of.lanes)
-        look(&of, k);
-}
-void servotwin_impose(const lane_table of) {
-    const int32_t k = THREAD;
-    if (k < of.lanes)
-        impose(&of, k);
-}
-#else
-EXPORTED void servotwin_tell(const lane_table *of, int64_t first, int64_t last) {
-    for (int64_t k = first; k < last; k++)
-        tell(of, (int32_t)k);
-}
-EXPORTED void servotwin_begin(const lane_table *of, int64_t first, int64_t last) {
-    for (int64_t k = first; k < last; k++)
-        begin(of, (int32_t)k);
-}
-EXPORTED void servotwin_look(const lane_table *of, int64_t first, int64_t last) {
-    for (int64_t k = first; k < last; k++)
-        look(of, (int32_t)k);
-}
-EXPORTED void servotwin_impose(const lane_table *of, int64_t first, int64_t last) {
-    for (int64_t k = first; k < last; k++)
-        impose(of, (int32_t)k);
-}
-#endif
 ''')
-BARE = ("torque", "output_inertia", "motor_inertia", "reduction", "period")
+BARE = ("load_torque", "output_inertia", "motor_inertia", "reduction", "period")
 """Columns of what lanes are beside their tiles: of the load, of the shaft without it, and of frames or ticks."""
+_ENTRIES_BESIDE = ("tell", "begin", "impose", "look")
 SEEN = (*Observed._fields, "time")
 """Columns of what shows of lanes."""
 _THREAD = '''
@@ -371,7 +345,7 @@ class LaneText:
 def entries(own: LaneText) -> tuple[str, ...]:
     """Return the names of a text's functions, which are kernels on a GPU."""
     if own.beside:
-        return tuple(f"servotwin_{entry}" for entry in ("tell", "begin", "impose", "look"))
+        return tuple(f"servotwin_{entry}" for entry in _ENTRIES_BESIDE)
     return ("servotwin_advance", "servotwin_prepare") if own.way == PULSES_BY_ARCS else ("servotwin_advance",)
 
 
@@ -468,7 +442,7 @@ def _advancing(own: LaneText, words: dict[str, Any], names: Mapping[str, str], t
     else:
         words = words | {"arcs": types.record(_tile(ArcNumbers)), "chips": types.record(_tile(Chip))}
     if own.way == PULSES_BY_ARCS:
-        prepare = _PREPARE.substitute(words, prepare=names["prepare"])
+        prepare = _PREPARE.substitute(words, prepare=names["prepare"]) + _FOR_ALL.substitute(entry="prepare")
     lane = _LANE.substitute(words, call=(_TICKS if own.way == TICKS else _PULSES).substitute(words))
     many, kth = ("(of.left ? *of.count : of.lanes)", "(of.left ? of.left[k] : k)") if words["by"] else ("of.lanes", "k")
     return _AROUND.substitute(lane=lane + prepare, many=many, kth=kth)
@@ -478,12 +452,13 @@ def _beside(words: dict[str, Any], names: Mapping[str, str], places: Sequence[tu
     """Return the functions that let lanes begin, and look at them; noise continues where it was."""
     begun = dict(_numbers_in("firm", control.AT_START)) if by_ticks else dict(_numbers_in("now", frame.AT_START))
     kept = ("firm.draws", "now.draws")
-    time = f"stand.frames * of->bare[{BARE.index('period')} * n + lane] + stand.time"
+    bare = {name: f"of->bare[{k} * n + lane]" for k, name in enumerate(BARE)}
+    time = f"stand.frames * {bare['period']} + stand.time"
     shown = [f"shown.{identifier(name)}" for name in Observed._fields]
     prepared = "" if "prepare" not in names else (
         f"        {names['prepare']}(numbers, ({words['arcs']} *)(uintptr_t)of->arcs + tile, j);\n")
     return _BESIDE.substitute(
-        words, **{entry: names[entry] for entry in ("follow", "begin", "impose", "hang")}, prepared=prepared,
+        words, **bare, **{entry: names[entry] for entry in ("follow", "begin", "impose", "hang")}, prepared=prepared,
         look=words["entry"], observed=words["gone"],
         memory="&stand, &firm" if by_ticks else "&stand, &now",
         rings=f"    firm.duties = of->rings + {2 * WAITING}LL * lane, firm.coming = firm.duties + {WAITING};\n"
@@ -491,7 +466,8 @@ def _beside(words: dict[str, Any], names: Mapping[str, str], places: Sequence[tu
         begun=_lines(f"{place} = {begun.get(path, path)};" for path, place in places if path not in kept),
         stand_loads=_lines(f"{path} = {place};" for path, place in places if path.startswith("stand.")),
         stand_stores=_lines(f"{place} = {path};" for path, place in places if path.startswith("stand.")),
-        shown=_lines(f"seen[{k} * n] = lost ? NAN : {value};" for k, value in enumerate((*shown, time))))
+        shown=_lines(f"seen[{k} * n] = lost ? NAN : {value};" for k, value in enumerate((*shown, time)))
+    ) + "".join(_FOR_ALL.substitute(entry=entry) for entry in _ENTRIES_BESIDE)
 
 
 def _lines(lines: Iterable[str]) -> str:

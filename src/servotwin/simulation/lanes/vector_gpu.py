@@ -43,7 +43,8 @@ class VectorSimulatorOnGpu(VectorSimulator):
     Signals are arrays on the GPU, in place: their numbers change with the next call.
 
     Pulse servos and digital ones advance so that neither heat nor inductance, spring, pendulum, fading friction,
-    regulator, recorded torque or shared supply has a part; others are refused by name.
+    regulator, recorded torque or shared supply has a part; others are refused by name. `threads` and `accuracy` say
+    nothing here: a thread has one lane, and nothing is integrated.
 
     Raises
     ------
@@ -119,8 +120,7 @@ class VectorSimulatorOnGpu(VectorSimulator):
         which = None if is_guest(lanes) else pick(lanes, len(self))
         command, kind = self._command(pulse_width, command_angle, command_voltage, which)
         angle = self._spread("output_angle", output_angle, which)
-        if which is not None and isinstance(angle, np.ndarray):
-            self._numbers.check_angles(angle[which], which)
+        self._check_given(angle, None, which)
         mask = self._mask(lanes, which)
         self._on(stream)
         if command is not None:
@@ -138,9 +138,7 @@ class VectorSimulatorOnGpu(VectorSimulator):
         given = {name: self._spread(argument, value, which) for name, argument, value in (
             ("angle", "output_angle", output_angle), ("speed", "output_speed", output_speed),
             ("inertia", "load_inertia", load_inertia))}
-        if which is not None:
-            angle, _, inertia = (x[which] if isinstance(x, np.ndarray) else None for x in given.values())
-            self._check_imposed(angle, inertia, which)
+        self._check_given(given["angle"], given["inertia"], which)
         mask = self._mask(lanes, which)
         self._on(stream)
         self._lanes.impose(**given, mask=mask)
@@ -235,6 +233,12 @@ class VectorSimulatorOnGpu(VectorSimulator):
         places = np.arange(len(self)) if which is None else which
         found[places] = numbers_of(name, values, places)
         return found
+
+    def _check_given(self, angle: Any, inertia: Any, which: NDArray[np.int64] | None) -> None:
+        """Check numbers that are not on the GPU: of some lanes, or of all where a mask there says of which."""
+        places = np.arange(len(self)) if which is None else which
+        angle, inertia = (x[places] if isinstance(x, np.ndarray) else None for x in (angle, inertia))
+        self._check_imposed(angle, inertia, places)
 
     def _mask(self, lanes: Any, which: NDArray[np.int64] | None) -> Any:
         if lanes is None or which is None:
