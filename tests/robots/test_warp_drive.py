@@ -82,16 +82,17 @@ def test_joints_are_those_of_servo_drive_by_steps_of_first_order(servo, masses):
     assert at_four.max() >= 1.4 * at_two.max()
 
 
-def test_an_arm_that_lies_on_the_floor_is_at_rest_where_servo_drive_leaves_it():
-    def down(time, count):
-        return [-0.2, 0.0, 0.0][:count]
+def test_an_arm_that_presses_on_the_floor_rests_where_servo_drive_has_it():
+    def into_the_floor(time, count):
+        return [-0.9, 0.0][:count]
 
     masses = (0.1, 0.08)
-    true = by_servo_drive(BUS, masses, 2e-3, 2.0, down, FLOOR)
-    found, speeds, drive = by_warp(BUS, masses, 2e-3, 2.0, down, FLOOR)
-    assert found[-1] == pytest.approx(true[-1], abs=0.02)  # within what dry friction holds
+    true = by_servo_drive(BUS, masses, 2e-3, 1.0, into_the_floor, FLOOR)
+    found, speeds, drive = by_warp(BUS, masses, 2e-3, 1.0, into_the_floor, FLOOR)
+    assert found[-1, 0] > -0.6  # the floor holds it
+    assert np.abs(found - true).max() <= 8e-3
     assert np.abs(speeds).max() <= 1e-3
-    assert np.isfinite(drive.torque.numpy()).all()
+    assert (drive.torque.numpy() < -2.0).all()  # N m
 
 
 def test_worlds_are_reset_by_a_mask_and_do_not_touch_each_other():

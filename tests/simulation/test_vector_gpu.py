@@ -89,6 +89,15 @@ def test_arrays_of_the_gpu_are_taken_in_place_and_nothing_is_allocated(shared):
     assert np.isnan(seen).tolist() == mask.tolist()
 
 
+def test_numbers_beside_a_mask_of_the_gpu_are_checked(shared):
+    _, there = both(shared)
+    mask = Guest(np.ones(LANES, bool))
+    for call, name, value in ((there.set, "load_inertia", -1.0), (there.reset, "output_angle", 9.0)):
+        with pytest.raises(InputError, match=f"^{name} of lane 0: got {value}"):
+            call(**{name: value}, lanes=mask)
+    assert not there.status.read().any()
+
+
 def test_what_was_saved_continues_there_and_on_the_processor(driver):
     here, there = both(driver, parameters=NUMBERS)
     angles = np.linspace(0.3, 1.2, LANES)
