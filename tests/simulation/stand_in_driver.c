@@ -17,7 +17,7 @@ enum { INVALID = 1, NO_MEMORY = 2, NO_CONTEXT = 201, BAD_IMAGE = 200, NOT_FOUND 
 int64_t *stand_in_state(void) { return &stand_in.version; }
 void stand_in_library(const char *path) { strncpy(libraries[coming++ % NAMES], path, sizeof *libraries - 1); }
 
-#define IN_CONTEXT if (stand_in.contexts != 1) return NO_CONTEXT
+#define IN_CONTEXT if (stand_in.contexts < 1) return NO_CONTEXT /* they nest where memory is collected within a call */
 int cuInit(unsigned flags) { return flags ? INVALID : 0; }
 int cuDriverGetVersion(int *version) { return *version = (int)stand_in.version, 0; }
 int cuDeviceGetCount(int *count) { return *count = (int)stand_in.devices, 0; }
