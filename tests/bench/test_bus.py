@@ -351,6 +351,22 @@ def test_a_servo_that_falls_silent_ends_the_run_and_the_others_go_limp(kind):
 
 
 @DIALECTS
+def test_an_answer_that_comes_late_is_none_to_the_next_question(kind):
+    def late(frame):
+        time.sleep(0.03)
+        return frame
+
+    with peers.Bus(kind, [1], peers.Fixed(STILL)) as peer:
+        peer.harm = late
+        rig = rig_on(peer, patience=0.02)
+        peer.harm = lambda frame: frame
+        memory = bytes(peer.servos[1].memory)
+        rig.close()
+    known = MODELS[kind.protocol, kind.number].family.registers
+    assert rig.facts()["registers"] == tables.decoded(known, dict(enumerate(memory)))
+
+
+@DIALECTS
 @pytest.mark.parametrize("harm", ["lost", "flipped"])
 def test_damaged_answers_are_gaps_and_never_rows(kind, harm):
     draw = random.Random(1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -182,8 +183,8 @@ class Dialect:
         Its packet handler.
     receive : callable
         From port to (packet, result).
-    id_at, error_at, data_at, extra : int
-        Places in an answer, and its bytes beside the data.
+    id_at, length_at, error_at, data_at, extra : int
+        Places in an answer, and what its length counts beside the data.
     refused : int
         Bits of the status byte that say that nothing was done.
     sync_read : callable, optional
@@ -195,6 +196,7 @@ class Dialect:
     handler: Any
     receive: Callable[[BusPort], tuple[Any, int]]
     id_at: int
+    length_at: int
     error_at: int
     data_at: int
     extra: int
@@ -248,9 +250,10 @@ class SdkWire:
     def read(self, servo: int, address: int, size: int) -> Answer:
         """Ask a servo for a block of its registers."""
         error = 0
-        for _ in self._tries():
+        for late in self._tries():
             found = self._asked(servo, address, size)
             if servo in found:
+                self._pass_over(late)
                 return found[servo]
             error = self._last_error
         raise BenchError(f"servo {servo} at {self.name}", f"it refuses to tell its registers from {address} on"
@@ -269,17 +272,19 @@ class SdkWire:
     def write(self, servo: int, address: int, data: bytes) -> None:
         """Write into a servo's registers, and see that it arrived."""
         refused = False
-        for _ in self._tries():
+        for late in self._tries():
             try:
                 result, error = self._dialect.handler.writeTxRx(self._ready(), servo, address, len(data), list(data))
             except _BROKEN:
                 continue
             refused = result == 0
             if refused and not error & self._dialect.refused:
+                self._pass_over(2 * late)
                 return
             # it may be set to answer questions only
             if not refused and servo in (found := self._asked(servo, address, len(data))):
                 if found[servo].data == data:
+                    self._pass_over(2 * late)
                     return
                 refused = True
         raise BenchError(f"servo {servo} at {self.name}", f"it does not take what is written into register {address}"
@@ -309,6 +314,16 @@ class SdkWire:
         finally:
             self.port.patience = usual
 
+    def _pass_over(self, late: int) -> None:
+        """Let late answers to earlier questions come: no packet has the address that it answers."""
+        if late:
+            self.port.setPacketTimeout(0)
+        for _ in range(late):
+            if self.port.isPacketTimeout():
+                break
+            with contextlib.suppress(*_BROKEN):
+                self._dialect.receive(self.port)
+
     def _asked(self, servo: int, address: int, size: int) -> dict[int, Answer]:
         self._dialect.handler.readTx(self._ready(), servo, address, size)
         return self._hear([servo], size)
@@ -336,7 +351,7 @@ class SdkWire:
             except _BROKEN:
                 continue
             self._last_error = error
-            if servo in servos and len(data) == size and len(packet) >= size + self._dialect.extra:
+            if servo in servos and len(data) == size == packet[self._dialect.length_at] - self._dialect.extra:
                 found[servo] = Answer(data, error, self.port.sent, time.perf_counter())
         return found
 
@@ -362,7 +377,8 @@ def dynamixel_wire(backend: Backend, protocol: int = 2, *, baud: int = 1_000_000
 
 def _one(handler: Any) -> Dialect:
     # of the status byte: range, checksum, instruction
-    return Dialect(handler, handler.rxPacket, id_at=2, error_at=4, data_at=5, extra=6, refused=8 | 16 | 64)
+    return Dialect(handler, handler.rxPacket, id_at=2, length_at=3, error_at=4, data_at=5, extra=2,
+                   refused=8 | 16 | 64)
 
 
 def _two(handler: Any) -> Dialect:
@@ -378,7 +394,8 @@ def _two(handler: Any) -> Dialect:
         return {int(one): int(said[0]) for one, said in found.items()}
 
     # of the status byte: all but the alert
-    return Dialect(handler, receive, id_at=4, error_at=8, data_at=9, extra=11, refused=127, sync_read=ask, sweep=sweep)
+    return Dialect(handler, receive, id_at=4, length_at=5, error_at=8, data_at=9, extra=4, refused=127, sync_read=ask,
+                   sweep=sweep)
 
 
 # --- Servos of Feetech (STS, SMS), through Feetech's package ----------------------------------------------------------
@@ -400,5 +417,6 @@ def feetech_wire(backend: Backend, *, baud: int = 1_000_000, patience: float = P
     def ask(port: BusPort, address: int, size: int, ids: list[int]) -> int:
         return int(handler.syncReadTx(port, address, size, ids, len(ids)))
 
-    dialect = Dialect(handler, handler.rxPacket, id_at=2, error_at=4, data_at=5, extra=6, refused=0, sync_read=ask)
+    dialect = Dialect(handler, handler.rxPacket, id_at=2, length_at=3, error_at=4, data_at=5, extra=2, refused=0,
+                      sync_read=ask)
     return SdkWire(backend, dialect, baud=baud, patience=patience)
