@@ -109,7 +109,7 @@ def test_worlds_are_reset_by_a_mask_and_do_not_touch_each_other():
             mask[0] = False
             before = data.qpos.numpy().copy()
             mjw.reset_data(own, data, wp.array(mask, dtype=bool))
-            drive.reset(data, mask if k % 2 else wp.array(mask, dtype=bool))
+            drive.reset(mask if k % 2 else wp.array(mask, dtype=bool))
             data.ctrl.assign(np.full((3, 1), 0.8, np.float32))
             assert np.array_equal(data.qpos.numpy()[~mask], before[~mask])
             assert not drive.torque.numpy()[mask].any()
@@ -128,16 +128,64 @@ def test_joints_without_an_actuator_are_told_by_name():
     drive = WarpDrive(model, {"a": SERVO}, worlds=2)
     own, data = mjw.put_model(model), mjw.put_data(model, mujoco.MjData(model), nworld=2)
     drive.attach(own)
-    drive.reset(data)
     for wrong, words in (([0.3, 0.7, 0.1], "an array of shape"), (np.nan, "got nan")):
         with pytest.raises(InputError, match=f"^command of joint a.*{words}"):
             drive.command({"a": wrong})
     with pytest.raises(InputError, match=r"^worlds of a WarpDrive: got 'an array of shape \(3,\)', allowed: a"):
-        drive.reset(data, np.ones(3, bool))
+        drive.reset(np.ones(3, bool))
     drive.command({"a": [0.3, 0.7]})
     for _ in range(300):
         mjw.step(own, data)
     assert data.qpos.numpy()[:, 0] == pytest.approx([0.3, 0.7], abs=0.03)
+
+
+def test_a_model_that_was_there_before_gets_rotors_and_no_other_force():
+    def run(late):
+        model = arm(2e-3, (0.2, 0.1))
+        own = mjw.put_model(model) if late else None
+        drive = WarpDrive(model, {"a": BUS, "b": BUS})
+        own = own or mjw.put_model(model)
+        drive.attach(own)
+        data = mjw.put_data(model, mujoco.MjData(model), nworld=1)
+        data.ctrl.assign(np.full((1, 2), 0.5, np.float32))
+        for _ in range(100):
+            mjw.step(own, data)
+        return data.qpos.numpy()
+
+    assert np.array_equal(run(late=True), run(late=False))
+
+
+def test_what_looks_at_a_state_lets_no_time_pass():
+    def run(looks):
+        model = arm(2e-3)
+        drive = WarpDrive(model, {"a": BUS}, worlds=2)
+        own, data = mjw.put_model(model), mjw.put_data(model, mujoco.MjData(model), nworld=2)
+        drive.attach(own)
+        for k in range(150):
+            data.ctrl.assign(np.full((2, 1), 0.8 if k < 90 else 0.2, np.float32))
+            if k == 40:
+                mask = wp.array(np.array([False, True]), dtype=bool)
+                mjw.reset_data(own, data, mask)
+                drive.reset(mask)
+            for _ in range(looks * (k % 3)):
+                mjw.forward(own, data)
+            mjw.step(own, data)
+        return data.qpos.numpy()
+
+    assert run(looks=1) == pytest.approx(run(looks=0), abs=2e-5)
+
+
+def test_what_lanes_remembered_is_put_back_on_a_gpu_by_columns_and_by_rings():
+    from servotwin.robots.trainers import warp_kernels as kernels
+
+    again, servos, lanes = wp.array(np.array([False, True]), dtype=wp.bool), 3, 6
+    for shape, each, lane_of in (((4, lanes), 0, lambda at: at[1]), ((lanes, 2, 5), 10, lambda at: at[0])):
+        for kernel, dtype in ((kernels.take_reals_back, np.float32), (kernels.take_wholes_back, np.int32)):
+            before, now = (np.arange(np.prod(shape)).astype(dtype) + shift for shift in (0, 1000))
+            given = wp.array(now)
+            wp.launch(kernel, dim=now.size, inputs=[again, servos, lanes, each, wp.array(before), given])
+            back = np.array([lane_of(at) >= servos for at in np.ndindex(shape)])
+            assert np.array_equal(given.numpy(), np.where(back, before, now))
 
 
 def test_data_of_other_worlds_are_refused():

@@ -178,6 +178,11 @@ def test_it_goes_on_from_what_was_saved(servo, kind, changes):
             one_of.advance(0.003, external_torque=0.02)
         ends.append(one_of["output_angle"])
     np.testing.assert_allclose(ends[0], ends[1], rtol=0.0, atol=1e-12)
+    sims.restore(memory, lanes=[False, True, False, True])
+    np.testing.assert_array_equal(sims["output_angle"][::2], ends[0][::2])
+    for _ in range(30):
+        sims.advance(0.003, external_torque=0.02)
+    np.testing.assert_allclose(sims["output_angle"][1::2], ends[0][1::2], rtol=0.0, atol=1e-12)
     assert np.ptp(WIDTHS) > 0.0
     assert pickle.dumps(memory) == pickle.dumps(memory)
 

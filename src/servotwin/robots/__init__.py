@@ -49,7 +49,7 @@ def __getattr__(name: str) -> Any:
 
         return ServoActuated
     if name == "WarpDrive":
-        from servotwin.robots.servos.warp_drive import WarpDrive
+        from servotwin.robots.trainers.warp_drive import WarpDrive
 
         return WarpDrive
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

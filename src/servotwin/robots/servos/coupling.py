@@ -22,7 +22,7 @@ from servotwin.robots.places import load_mujoco
 _TERMS = 5  # of the polynomial of an equality
 _ROUNDS = 50  # of Newton's method
 _CLOSE = 1e-12  # rad or m
-_FORCES = ("gaintype", "biastype", "gainprm", "biasprm", "armature", "damping", "dampingpoly")  # of an actuator
+FORCES = ("gaintype", "biastype", "gainprm", "biasprm", "armature", "damping", "dampingpoly")  # of an actuator
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -186,7 +186,7 @@ def other_actuators(model: Any) -> list[tuple[str, str]]:
 
 def silence(model: Any, actuator: int) -> None:
     """Take away all force of an actuator."""
-    for field in _FORCES:
+    for field in FORCES:
         if hasattr(model, f"actuator_{field}"):
             getattr(model, f"actuator_{field}")[actuator] = 0
 

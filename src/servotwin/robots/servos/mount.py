@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from servotwin.parameters.groups import Supply
 
 SERVOS = (AveragedServo, BoundedServo, PulseServo, PulseServoInductive, DigitalServo)
-_PASSIVE = {"dof_damping": "damping", "dof_frictionloss": "friction loss"}
+PASSIVE = {"dof_damping": "damping", "dof_frictionloss": "friction loss"}
 
 
 @dataclass(frozen=True)
@@ -160,11 +160,11 @@ def treat_friction(model: Any, joints: list[Joint], friction: str) -> None:
         raise InputError("joint_friction", got=friction, allowed="'refuse', 'clear' or 'keep'")
     dofs = [joint.speed_at for joint in joints]
     if friction == "clear":
-        for field in _PASSIVE:
+        for field in PASSIVE:
             getattr(model, field)[dofs] = 0.0
     if friction != "refuse":
         return
-    for field, word in _PASSIVE.items():
+    for field, word in PASSIVE.items():
         own = [f"{joint.name} {getattr(model, field)[joint.speed_at]:g}" for joint in joints
                if (getattr(model, field)[joint.speed_at] != 0.0).any()]
         if own:

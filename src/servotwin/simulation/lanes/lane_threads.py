@@ -61,7 +61,7 @@ if TYPE_CHECKING:
 _BY_ARCS = STRAIGHT | DRY | AT_STOPS | SHOWN | PULSES | SLACK | STEPS | TABLE
 _BY_LEGS = _BY_ARCS | DROPS | SILENCE | PLAY | TWO_BODIES | BY_SHARE
 _BY_TICKS = _BY_LEGS & ~PULSES | PROGRAM | PWM | ONE_WAY | AT_COMMANDS | BEYOND
-_REMEMBERED = ("reals", "wholes", "rings", "status")
+REMEMBERED = ("reals", "wholes", "rings", "status")
 PLAIN_REGISTERS, MOST_REGISTERS = 128, 168  # of a thread by arcs, and by anything else: more threads, or no spills
 Arrays = Mapping[str, NDArray[Any]]
 _WORDS = WORDS | {ON_Q: "a load that hangs on the angle"}
@@ -363,7 +363,7 @@ class ThreadedLanes:
 
     def put(self, which: NDArray[np.int64], memories: Memories) -> None:
         """Let some lanes remember what records say."""
-        self._at.fetch(*_REMEMBERED)
+        self._at.fetch(*REMEMBERED)
         rows, period = memories.rows, self._period[which]
         point = rows["point"]
         time = rows["frames"] * rows["beat"] + point["time"]
@@ -381,7 +381,7 @@ class ThreadedLanes:
         else:
             self._set(which, "now", self._chips_at(rows, frames, shift))
         self._arrays["status"][which] = 0
-        self._at.send(*_REMEMBERED)
+        self._at.send(*REMEMBERED)
 
     def _chips_at(self, rows: Any, frames: NDArray[np.int64], shift: NDArray[np.float64]) -> Any:
         """Return what chips remember, by times since the latest edge."""
@@ -394,7 +394,7 @@ class ThreadedLanes:
 
     def memories(self, which: NDArray[np.int64]) -> Memories:
         """Return what some lanes remember, as records."""
-        self._at.fetch(*_REMEMBERED)
+        self._at.fetch(*REMEMBERED)
         rest = nothing_yet(1)
         put_started(rest, 0, NOWHERE, RIGID)
         found = taken(rest, np.zeros(len(which), np.int64))

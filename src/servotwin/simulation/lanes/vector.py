@@ -356,17 +356,28 @@ class VectorSimulator:
         """Return all that the lanes remember, as it is now; picklable."""
         return self._store.save()
 
-    def restore(self, memory: VectorMemory) -> None:
+    def restore(self, memory: VectorMemory, *, lanes: Any = None) -> None:
         """Go back to what was saved, here or in another simulator of this model with as many lanes.
 
         Parameters, inertias and bus voltages that were set belong to the simulator: they stay as they are.
 
+        Parameters
+        ----------
+        memory : VectorMemory
+        lanes : sequence of int, mask or slice, optional
+            Lanes that go back; all unless given.
+
         Raises
         ------
         InputError
-            If it is the memory of another model or of another number of lanes.
+            If it is the memory of another model or of another number of lanes, or some lanes of those on shared
+            supplies are to go back.
         """
         self._check_memory(memory)
+        if lanes is not None:
+            if self._numbers.supplies.lanes:
+                raise InputError("restore(lanes=...)", got="lanes on shared supplies", allowed="all lanes at once")
+            memory = self.save().with_lanes(memory, pick(lanes, len(self)))
         self._store.fresh[0] = 0
         self._store.restore(memory)
 

@@ -15,7 +15,7 @@ from servotwin.simulation.compile.threads import SEEN
 from servotwin.simulation.lanes.batch import Failure
 from servotwin.simulation.lanes.cuda import GpuArray, is_guest
 from servotwin.simulation.lanes.inputs import pick
-from servotwin.simulation.lanes.lane_threads import ThreadedLanes
+from servotwin.simulation.lanes.lane_threads import REMEMBERED, ThreadedLanes
 from servotwin.simulation.lanes.many import real_type
 from servotwin.simulation.lanes.vector import VectorSimulator, check_duration, numbers_of
 from servotwin.simulation.lanes.whole_runs import VectorMemory
@@ -197,13 +197,19 @@ class VectorSimulatorOnGpu(VectorSimulator):
                             torque, status, np.where(status != 0, time, 0.0), np.zeros(count),
                             self._numbers.columns.numbers.copy(), None)
 
-    def restore(self, memory: VectorMemory) -> None:
+    def restore(self, memory: VectorMemory, *, lanes: Any = None) -> None:
         """Go back to what was saved; as `VectorSimulator.restore`."""
         self._check_memory(memory)
+        if lanes is not None:
+            memory = self.save().with_lanes(memory, pick(lanes, len(self)))
         self._fresh = False
         self._lanes.put(np.arange(len(self)), Memories(memory.records, memory.firms))
         self._lanes.status.write(memory.status.astype(np.int32))
         self._lanes.tell(memory.command, memory.torque)
+
+    def columns(self) -> dict[str, GpuArray]:
+        """Return all that the lanes remember, in place: the last axis is that of lanes, of `rings` the first."""
+        return {name: self._lanes.array(name) for name in REMEMBERED}
 
     # --- arguments ----------------------------------------------------------------------------------------------------
 

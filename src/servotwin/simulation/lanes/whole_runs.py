@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from servotwin.models.engine.batch import tiles
 from servotwin.models.engine.lanes import Lanes, Outputs
 from servotwin.models.engine.memory import NONE_YET, Memories, Memory
-from servotwin.models.state.records import record_of, room
+from servotwin.models.state.records import TILE, record_of, room
 from servotwin.models.terms.control import Firm
 from servotwin.simulation.compile import Recipe, kernels
 from servotwin.simulation.lanes.forms import (
@@ -124,6 +124,16 @@ class VectorMemory:
     work: Array
     numbers: NDArray[Any]
     common: Common | None = None
+
+    def with_lanes(self, other: VectorMemory, which: Indices) -> VectorMemory:
+        """Return this with some lanes as another memory has them."""
+        found = replace(self, **{one.name: getattr(self, one.name).copy() for one in fields(self)
+                                 if one.name not in ("model", "common")})
+        for name in ("records", "firms", "command", "torque", "status", "ended", "work"):
+            getattr(found, name)[which] = getattr(other, name)[which]
+        into, own = (one.numbers.view(np.float64).reshape(len(one.numbers), -1, TILE) for one in (found, other))
+        into[which // TILE, :, which % TILE] = own[which // TILE, :, which % TILE]
+        return found
 
 
 class Piece(NamedTuple):

@@ -99,10 +99,9 @@ def push(per_torque: wp.array3d[float], speed_at: wp.array[int], count: int, wan
 
 @wp.kernel
 def place(qpos: wp.array2d[float], mask: wp.array[wp.bool], which: wp.array[int], angle_at: wp.array[int],
-          speed_at: wp.array[int], numbers: wp.array2d[float], rest: wp.array[float], count: int,
-          torque: wp.array2d[float], applied: wp.array2d[float], angle: wp.array[float], command: wp.array[float],
-          lanes: wp.array[wp.uint8]):
-    """Find where servos of some worlds begin, with the command that lets them stay; their torques are taken away."""
+          numbers: wp.array2d[float], rest: wp.array[float], count: int, angle: wp.array[float],
+          command: wp.array[float], hold: wp.array[float], lanes: wp.array[wp.uint8]):
+    """Find where servos of some worlds begin, with the command that lets them stay, and holds unless one was given."""
     world, n = wp.tid()
     k = which[n]
     lane = world * count + n
@@ -111,8 +110,54 @@ def place(qpos: wp.array2d[float], mask: wp.array[wp.bool], which: wp.array[int]
         lanes[lane] = wp.uint8(1)
         at = wp.clamp((qpos[world, angle_at[k]] - numbers[k, 1]) / numbers[k, 0], numbers[k, 2], numbers[k, 3])
         angle[lane] = at
-        command[lane] = rest[k]
+        hold[lane] = rest[k]
         if wp.isnan(rest[k]):
-            command[lane] = wp.clamp(at, numbers[k, 11], numbers[k, 12])
-        applied[world, speed_at[k]] = 0.0
-        torque[world, k] = 0.0
+            hold[lane] = wp.clamp(at, numbers[k, 11], numbers[k, 12])
+        if wp.isnan(command[lane]):
+            command[lane] = hold[lane]
+
+
+@wp.kernel
+def begin_anew(mask: wp.array[wp.bool], which: wp.array[int], count: int, fresh: wp.array[wp.bool],
+               torque: wp.array2d[float], command: wp.array[float]):
+    """Note worlds whose servos begin anew, and take their torques and commands away."""
+    world, n = wp.tid()
+    if mask[world]:
+        fresh[world] = True
+        torque[world, which[n]] = 0.0
+        command[world * count + n] = wp.nan
+
+
+@wp.kernel
+def compare(time: wp.array[float], before: wp.array[float], again: wp.array[wp.bool]):
+    """Find the worlds whose time has not passed since the last call."""
+    world = wp.tid()
+    again[world] = time[world] == before[world]
+    before[world] = time[world]
+
+
+@wp.func
+def world_of(k: int, count: int, lanes: int, each: int):
+    """Return the world of a number that a lane remembers: of a column, or of so many that stand together."""
+    lane = k % lanes
+    if each > 0:
+        lane = k / each
+    return lane / count
+
+
+@wp.kernel
+def take_reals_back(again: wp.array[wp.bool], count: int, lanes: int, each: int, before: wp.array[float],
+                    now: wp.array[float]):
+    """Let numbers of some worlds be what they were before."""
+    k = wp.tid()
+    if again[world_of(k, count, lanes, each)]:
+        now[k] = before[k]
+
+
+@wp.kernel
+def take_wholes_back(again: wp.array[wp.bool], count: int, lanes: int, each: int, before: wp.array[int],
+                     now: wp.array[int]):
+    """Let whole numbers of some worlds be what they were before."""
+    k = wp.tid()
+    if again[world_of(k, count, lanes, each)]:
+        now[k] = before[k]

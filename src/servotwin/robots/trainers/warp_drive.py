@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,13 +14,17 @@ from servotwin.models.terms.elastic import Elastic
 from servotwin.models.terms.play import Play
 from servotwin.robots.places import load_mujoco
 from servotwin.robots.servos.command_map import CommandMap, told
-from servotwin.robots.servos.mount import Joint, Mount, joints_of, treat_friction
+from servotwin.robots.servos.coupling import FORCES
+from servotwin.robots.servos.mount import PASSIVE, Joint, Mount, joints_of, treat_friction
 from servotwin.robots.servos.servo_groups import check_options, maps_of, put_into_model
 from servotwin.simulation import VectorSimulator
 from servotwin.simulation.lanes.vector import numbers_of
 
 if TYPE_CHECKING:
     from servotwin.models import Model
+
+
+_WEIGHTS = ("dof_invweight0", "body_invweight0", "tendon_invweight0")  # of the model at rest, in its constraints
 
 
 class _Crew:
@@ -29,6 +34,8 @@ class _Crew:
     ends: tuple[float, float, float, float]  # of its travel [rad] and of its commands, which floats may be beyond
     places: Any  # of its joints among all
     lanes: dict[str, Any]  # arrays of what lanes are given
+    before: Any = None  # what lanes remembered before the last step
+    hold: Any  # commands to stay where lanes begin
     mask: Any
 
     def __init__(self, model: Model, which: list[int], worlds: int, device: str, seed: int) -> None:
@@ -48,14 +55,42 @@ class _Crew:
         self.sims.advance(timestep, external_torque=against, **{self.kind: command})
         return self.sims["output_speed"]
 
+    def rewind(self, again: Any, wp: Any, kernels: Any) -> None:
+        """Let worlds whose time has not passed since stand as before the last step."""
+        if self._here:
+            lanes = np.flatnonzero(np.repeat(again.numpy(), len(self.which)))
+            if lanes.size:
+                self.sims.restore(self.before, lanes=lanes)
+            return
+        for name, column, before in self._columns(wp):
+            each = column.size // self.mask.size if name == "rings" else 0
+            back = kernels.take_reals_back if column.dtype is wp.float32 else kernels.take_wholes_back
+            wp.launch(back, dim=column.size, inputs=[again, len(self.which), self.mask.size, each, before, column])
+
+    def keep(self, wp: Any) -> None:
+        """Keep how lanes stand before a step."""
+        if self._here:
+            self.before = self.sims.save()
+            return
+        for _, column, before in self._columns(wp):
+            wp.copy(before, column)
+
+    def _columns(self, wp: Any) -> Iterator[tuple[str, Any, Any]]:
+        """Yield the name of each array that lanes remember on a GPU, the array, and its numbers before the last step."""
+        now = {name: wp.from_dlpack(column).flatten() for name, column in self.sims.columns().items()}
+        self.before = self.before or {name: wp.clone(column) for name, column in now.items()}
+        return ((name, column, self.before[name]) for name, column in now.items())
+
     def begin(self, stream: Any) -> None:
         """Put those of the mask to rest."""
         if not self._here:
             self.sims.reset(output_angle=self.lanes["angle"], lanes=self.mask, stream=stream,
-                            **{self.kind: self.lanes["command"]})
+                            **{self.kind: self.hold})
             return
         which = np.flatnonzero(self.mask.numpy())
-        angle, command = self._within(self.lanes["angle"].numpy()[which], self.lanes["command"].numpy()[which])
+        if not which.size:
+            return
+        angle, command = self._within(self.lanes["angle"].numpy()[which], self.hold.numpy()[which])
         self.sims.reset(output_angle=angle, lanes=which, **{self.kind: command})
 
     def _within(self, angle: Any, command: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -71,12 +106,13 @@ class WarpDrive:
     `ServoDrive`. In each step a servo meets the inertia 1/(M⁻¹)ᵢᵢ and the acceleration that its joint would have
     without it, by contacts and other servos as they were a step before; the torques that let the joints gain the
     speeds that the servos gain are in `qfrc_applied` for the step, where nobody else may put any for these joints. That
-    is of first order in the step. A servo whose gear has play or a spring is refused.
+    is of first order in the step. Where `forward` is called too, servos advance once in a step all the same: a world
+    whose time has not passed begins the step anew. A servo whose gear has play or a spring is refused.
 
     Parameters
     ----------
     model : MjModel
-        It is changed, before `mujoco_warp.put_model` takes it: armature of these joints, and gains of their actuators.
+        It is changed: armature of these joints, and gains of their actuators.
     servos : mapping of str to Model or Mount
         By the name of the joint.
     worlds : int
@@ -92,6 +128,8 @@ class WarpDrive:
     ----------
     joints : tuple of str
         Names of the joints, in the order of `torque`.
+    servos : mapping of str to Model or Mount
+        As given.
     torque : warp.array, shape (worlds, joints)
         Of the servos in the latest step, at the joints [N m].
 
@@ -119,6 +157,7 @@ class WarpDrive:
         check_options(mujoco, model, own)
         maps = maps_of(model, own, controls)
         treat_friction(model, own, joint_friction)
+        self._model, self.servos = model, dict(servos)
         self.joints, self.worlds = tuple(joint.name for joint in own), worlds
         self._device = self._wp.get_device(device)
         self._timestep = float(model.opt.timestep)
@@ -166,6 +205,8 @@ class WarpDrive:
             self._angle_at = whole([joint.angle_at for joint in own])
             self._speed_at = whole([joint.speed_at for joint in own])
             self._command_at = whole([joint.command_at for joint in own])
+            self._fresh, self._again = (wp.zeros(worlds, dtype=wp.bool) for _ in range(2))
+            self._time = wp.full(worlds, math.nan, dtype=float)
             self.torque, self._met, self._wanted = (wp.zeros((worlds, count), dtype=float) for _ in range(3))
             self._per_torque = wp.zeros((worlds, count, count), dtype=float)
             self._forces, self._free, self._solved = (wp.zeros((worlds, nv), dtype=float) for _ in range(3))
@@ -180,15 +221,37 @@ class WarpDrive:
                 crew.mask = wp.zeros(worlds * len(crew.which), dtype=wp.uint8)
                 crew.lanes = {name: wp.zeros(worlds * len(crew.which), dtype=float)
                               for name in ("angle", "speed", "inertia", "against", "command")}
-        self._begun = False
+                crew.hold = wp.zeros_like(crew.lanes["command"])
+                crew.keep(wp)  # a captured graph cannot ask for memory
+        self.reset()
+        self._changed = [joint.speed_at for joint in own], [joint.actuator for joint in own if joint.actuator >= 0]
 
     @property
     def _stream(self) -> Any:
         return None if self._device.is_cpu else self._wp.get_stream(self._device)
 
     def attach(self, model: Any) -> None:
-        """Let MuJoCo Warp's model call the servos in each step."""
+        """Let MuJoCo Warp's model call the servos in each step, before a CUDA graph of a step is captured.
+
+        What the drive changed in the MjModel is changed in this one too, should it have been made before.
+        """
+        dofs, actuators = self._changed
+        for field in ("dof_armature", *PASSIVE):
+            self._carry(model, field, dofs)
+        for field in FORCES:
+            self._carry(model, f"actuator_{field}", actuators)
+        for field in _WEIGHTS:
+            self._carry(model, field, slice(None))
         model.callback.control = self.control
+
+    def _carry(self, model: Any, field: str, places: Any) -> None:
+        array = getattr(model, field, None)
+        if array is None or not array.size or not hasattr(self._model, field):
+            return
+        values, own = array.numpy(), getattr(self._model, field)
+        rows = own[places].reshape(own[places].shape[:1] + values.shape[array.ndim:])
+        values[(..., places) + (slice(None),) * (values.ndim - array.ndim)] = rows
+        array.assign(values)
 
     def control(self, model: Any, data: Any) -> None:
         """Let all servos advance by a step, and put their torques into the data: what `attach` lets the model call."""
@@ -197,9 +260,16 @@ class WarpDrive:
         if (data.nworld, model.nv) != (worlds, self._forces.shape[1]):
             raise InputError("data of a WarpDrive", got=f"{data.nworld} worlds of {model.nv} degrees of freedom",
                              allowed=f"{worlds} of {self._forces.shape[1]}")
-        if not self._begun:
-            self.reset(data)
         with wp.ScopedDevice(self._device):
+            wp.launch(kernels.compare, dim=worlds, inputs=[data.time, self._time, self._again])
+            for crew in self._crews:
+                crew.rewind(self._again, wp, kernels)
+                wp.launch(kernels.place, dim=(worlds, len(crew.which)), inputs=[
+                    data.qpos, self._fresh, crew.places, self._angle_at, self._numbers_of, self._rest,
+                    len(crew.which), crew.lanes["angle"], crew.lanes["command"], crew.hold, crew.mask])
+                crew.begin(self._stream)
+                crew.keep(wp)
+            self._fresh.zero_()
             wp.launch(kernels.take_away, dim=(worlds, count), inputs=[self._speed_at, data.qfrc_applied])
             wp.launch(kernels.free_forces, dim=self._forces.shape, inputs=[
                 data.qfrc_passive, data.qfrc_bias, data.qfrc_applied, data.qfrc_constraint, data.qfrc_actuator],
@@ -227,12 +297,11 @@ class WarpDrive:
             self._speed_at, self._command_at, self._numbers_of, len(crew.which), len(self.joints)],
             outputs=[self._met, *crew.lanes.values()])
 
-    def reset(self, data: Any, worlds: Any = None) -> None:
-        """Put servos to rest where their joints are, with the command to stay there, in some worlds or in all.
+    def reset(self, worlds: Any = None) -> None:
+        """Put servos to rest where the next step finds their joints, with the command to stay there.
 
         Parameters
         ----------
-        data : mujoco_warp.Data
         worlds : warp.array or array of bool, shape (worlds,), optional
             Which, as `mujoco_warp.reset_data` takes it; all unless given.
 
@@ -251,12 +320,8 @@ class WarpDrive:
                                  allowed=f"a mask of bool, shape ({self.worlds},)")
             mask = mask if isinstance(mask, wp.array) else wp.array(mask, dtype=wp.bool)
             for crew in self._crews:
-                wp.launch(self._kernels.place, dim=(self.worlds, len(crew.which)), inputs=[
-                    data.qpos, mask, crew.places, self._angle_at, self._speed_at, self._numbers_of, self._rest,
-                    len(crew.which), self.torque, data.qfrc_applied, crew.lanes["angle"], crew.lanes["command"],
-                    crew.mask])
-                crew.begin(self._stream)
-        self._begun = True
+                wp.launch(self._kernels.begin_anew, dim=(self.worlds, len(crew.which)), inputs=[
+                    mask, crew.places, len(crew.which), self._fresh, self.torque, crew.lanes["command"]])
 
     def command(self, places: Mapping[str, Any]) -> None:
         """Tell joints without an actuator where to go [rad, m], a number or an array (worlds,) each.
@@ -285,6 +350,6 @@ def _load_warp() -> tuple[Any, Any, Any]:
         import warp
     except ImportError as error:
         raise MissingExtraError(error.name or "mujoco_warp", "warp") from None
-    from servotwin.robots.servos import warp_kernels
+    from servotwin.robots.trainers import warp_kernels
 
     return warp, mujoco_warp, warp_kernels
