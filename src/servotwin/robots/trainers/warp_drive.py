@@ -233,7 +233,7 @@ class WarpDrive:
     def attach(self, model: Any) -> None:
         """Let MuJoCo Warp's model call the servos in each step, before a CUDA graph of a step is captured.
 
-        What the drive changed in the MjModel is changed in this one too, should it have been made before.
+        All changes of the MjModel are made in this one too, which may have been put before it was changed.
         """
         dofs, actuators = self._changed
         for field in ("dof_armature", *PASSIVE):
