@@ -9,15 +9,15 @@ from servotwin.errors import InputError
 from servotwin.robots import Mount, WarpDrive
 
 pytest.importorskip("mjlab", reason="mjlab is not installed: it needs a MuJoCo and an environment of its own")
-import mujoco_warp as mjw  # noqa: E402
-import torch  # noqa: E402
-import warp as wp  # noqa: E402
-from mjlab.actuator import BuiltinPositionActuatorCfg  # noqa: E402
-from mjlab.entity import EntityArticulationInfoCfg, EntityCfg  # noqa: E402
-from mjlab.scene import Scene, SceneCfg  # noqa: E402
-from mjlab.sim import MujocoCfg, Simulation, SimulationCfg  # noqa: E402
+import mujoco_warp as mjw
+import torch
+import warp as wp
+from mjlab.actuator import BuiltinPositionActuatorCfg
+from mjlab.entity import EntityArticulationInfoCfg, EntityCfg
+from mjlab.scene import Scene, SceneCfg
+from mjlab.sim import MujocoCfg, Simulation, SimulationCfg
 
-from servotwin.robots.trainers.mjlab import ServoActuatorCfg  # noqa: E402
+from servotwin.robots.trainers.mjlab import ServoActuatorCfg
 
 pytestmark = pytest.mark.slow
 SERVO = st.PulseServo(st.load_servo("hitec-hs-755hb"))
@@ -57,7 +57,7 @@ def run(scene, sim, steps, first=0):
 
 @pytest.mark.parametrize("groups", [
     [ServoActuatorCfg(target_names_expr=(".*",), servo=BUS)],
-    [ServoActuatorCfg(target_names_expr=("elbow",), servo=BUS), ServoActuatorCfg(target_names_expr=("shoulder",), servo=BUS)]],
+    [ServoActuatorCfg(target_names_expr=(name,), servo=BUS) for name in ("elbow", "shoulder")]],
     ids=["one group", "two groups"])
 def test_an_arm_is_that_of_warp_drive(groups):
     scene, sim = scene_of(*groups)
@@ -106,7 +106,7 @@ def test_a_delay_of_mjlab_delays_the_command():
 
 
 @pytest.mark.parametrize(("make", "error", "words"), [
-    (lambda: ServoActuatorCfg(target_names_expr=(".*",), servo=SERVO, armature=0.1), InputError, "^armature of a Servo"),
+    (lambda: ServoActuatorCfg(target_names_expr=(".*",), servo=SERVO, armature=0.1), InputError, "^armature of a S"),
     (lambda: scene_of(ServoActuatorCfg(target_names_expr=(".*",), servo="sts3215")), InputError, "^servo of"),
     (lambda: scene_of(ServoActuatorCfg(target_names_expr=("knee",), servo=SERVO)), ValueError, "knee"),
     (lambda: scene_of(ServoActuatorCfg(target_names_expr=(".*",), servo=Mount(SERVO), joint_friction="none")),

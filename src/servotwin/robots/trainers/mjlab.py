@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from servotwin.errors import InputError, MissingExtraError, UnknownNameError
+from servotwin.errors import InputError, MissingExtraError
 from servotwin.robots.places import load_mujoco
 from servotwin.robots.servos.mount import Mount, joints_of, treat_friction
 from servotwin.robots.trainers.warp_drive import WarpDrive

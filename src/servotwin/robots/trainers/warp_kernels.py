@@ -141,8 +141,8 @@ def world_of(k: int, count: int, lanes: int, each: int):
     """Return the world of a number that a lane remembers: of a column, or of so many that stand together."""
     lane = k % lanes
     if each > 0:
-        lane = k / each
-    return lane / count
+        lane = k // each
+    return lane // count
 
 
 @wp.kernel
@@ -161,3 +161,74 @@ def take_wholes_back(again: wp.array[wp.bool], count: int, lanes: int, each: int
     k = wp.tid()
     if again[world_of(k, count, lanes, each)]:
         now[k] = before[k]
+
+
+# --- Joints of Newton: arrays of all worlds in one row, inverse inertias by articulation ------------------------------
+
+@wp.kernel
+def gather(positions: wp.array[float], velocities: wp.array[float], targets: wp.array[float],
+           position_at: wp.array[wp.uint32], velocity_at: wp.array[wp.uint32], target_at: wp.array[wp.uint32],
+           count: int, angle: wp.array2d[float], speed: wp.array2d[float], goal: wp.array2d[float]):
+    """Gather angles, speeds and targets of joints with servos, world after world."""
+    k = wp.tid()
+    world, n = k // count, k % count
+    angle[world, n] = positions[position_at[k]]
+    speed[world, n] = velocities[velocity_at[k]]
+    goal[world, n] = targets[target_at[k]]
+
+
+@wp.kernel
+def gather_inverse(inverse: wp.array3d[float], articulation: wp.array[int], local: wp.array[int], count: int,
+                   per_torque: wp.array3d[float]):
+    """Gather the accelerations of joints under one newton metre at one of them; none across articulations."""
+    k, n = wp.tid()
+    world = k // count
+    other = world * count + n
+    found = float(0.0)  # noqa: UP018  a variable, in Warp's words
+    if articulation[k] == articulation[other]:
+        found = inverse[articulation[k], local[k], local[other]]
+    per_torque[world, k % count, n] = found
+
+
+@wp.kernel
+def free_by_forces(inverse: wp.array3d[float], articulation: wp.array[int], local: wp.array[int],
+                   start: wp.array[int], dofs: wp.array[int], gravity: wp.array[float], coriolis: wp.array[float],
+                   others: wp.array[float], count: int, free: wp.array2d[float]):
+    """Find the accelerations of joints by all forces but those of servos."""
+    k = wp.tid()
+    tree = articulation[k]
+    a = float(0.0)  # noqa: UP018
+    for j in range(dofs[tree]):
+        force = -gravity[start[tree] + j] - coriolis[start[tree] + j]
+        if others:
+            force += others[start[tree] + j]
+        a += inverse[tree, local[k], j] * force
+    free[k // count, k % count] = a
+
+
+@wp.kernel
+def free_by_acceleration(qacc: wp.array2d[float], dof: wp.array2d[int], per_torque: wp.array3d[float],
+                         torque: wp.array2d[float], count: int, free: wp.array2d[float]):
+    """Find them by the accelerations of the last step, less what the servos' torques had given."""
+    k = wp.tid()
+    world, n = k // count, k % count
+    a = qacc[world, dof[world, n]]
+    for other in range(count):
+        a -= per_torque[world, n, other] * torque[world, other]
+    free[world, n] = a
+
+
+@wp.kernel
+def any_of_world(mask: wp.array[wp.bool], count: int, worlds: wp.array[wp.bool]):
+    """Find the worlds in which one of so many joints is of a mask."""
+    k = wp.tid()
+    if mask[k]:
+        worlds[k // count] = True
+
+
+@wp.kernel
+def take(worlds: wp.array[wp.bool], others: wp.array2d[float], free: wp.array2d[float]):
+    """Take the accelerations of joints in some worlds from elsewhere."""
+    world, n = wp.tid()
+    if worlds[world]:
+        free[world, n] = others[world, n]

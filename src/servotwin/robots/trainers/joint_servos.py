@@ -1,0 +1,301 @@
+"""Servos at joints in many worlds, as an engine meets them that solves for the joints itself: a lane for each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import InputError, MissingExtraError
+from servotwin.models.terms.elastic import Elastic
+from servotwin.models.terms.play import Play
+from servotwin.robots.servos.command_map import CommandMap, told
+from servotwin.robots.servos.mount import Joint, Mount
+from servotwin.simulation import VectorSimulator
+from servotwin.simulation.lanes.vector import numbers_of
+
+if TYPE_CHECKING:
+    from servotwin.models import Model
+
+
+class _Crew:
+    """Servos of one model: a lane for each of its joints in each world, world after world."""
+
+    kind: str  # of its commands
+    ends: tuple[float, float, float, float]  # of its travel [rad] and of its commands, which floats may be beyond
+    places: Any  # of its joints among all
+    lanes: dict[str, Any]  # arrays of what lanes are given
+    before: Any = None  # what lanes remembered before the last step
+    hold: Any  # commands to stay where lanes begin
+    mask: Any
+
+    def __init__(self, model: Model, which: list[int], worlds: int, device: str, seed: int) -> None:
+        self.which, self._here = which, device == "cpu"
+        lanes = worlds * len(which)
+        self.sims: Any = VectorSimulator(model, lanes, seed=seed) if self._here else VectorSimulator(
+            model, lanes, seed=seed, dtype="float32", device=device)
+
+    def advance(self, duration: float, stream: Any) -> Any:
+        """Advance by a step [s] from where the joints are; return the speeds after it."""
+        angle, speed, inertia, against, command = (
+            array.numpy() if self._here else array for array in self.lanes.values())
+        if self._here:
+            angle, command = self._within(angle, command)
+        more = {} if self._here else {"stream": stream}
+        self.sims.set(output_angle=angle, output_speed=speed, load_inertia=inertia, **more)
+        self.sims.advance(duration, external_torque=against, **{self.kind: command})
+        return self.sims["output_speed"]
+
+    def rewind(self, again: Any, wp: Any, kernels: Any) -> None:
+        """Let worlds whose time has not passed since stand as before the last step."""
+        if self._here:
+            lanes = np.flatnonzero(np.repeat(again.numpy(), len(self.which)))
+            if lanes.size:
+                self.sims.restore(self.before, lanes=lanes)
+            return
+        for name, column, before in self._columns(wp):
+            each = column.size // self.mask.size if name == "rings" else 0
+            back = kernels.take_reals_back if column.dtype is wp.float32 else kernels.take_wholes_back
+            wp.launch(back, dim=column.size, inputs=[again, len(self.which), self.mask.size, each, before, column])
+
+    def keep(self, wp: Any) -> None:
+        """Keep how lanes stand before a step."""
+        if self._here:
+            self.before = self.sims.save()
+            return
+        for _, column, before in self._columns(wp):
+            wp.copy(before, column)
+
+    def _columns(self, wp: Any) -> Iterator[tuple[str, Any, Any]]:
+        """Yield name, array and numbers before the last step of all that lanes remember on a GPU."""
+        now = {name: wp.from_dlpack(column).flatten() for name, column in self.sims.columns().items()}
+        self.before = self.before or {name: wp.clone(column) for name, column in now.items()}
+        return ((name, column, self.before[name]) for name, column in now.items())
+
+    def begin(self, stream: Any) -> None:
+        """Put those of the mask to rest."""
+        if not self._here:
+            self.sims.reset(output_angle=self.lanes["angle"], lanes=self.mask, stream=stream,
+                            **{self.kind: self.hold})
+            return
+        which = np.flatnonzero(self.mask.numpy())
+        if not which.size:
+            return
+        angle, command = self._within(self.lanes["angle"].numpy()[which], self.hold.numpy()[which])
+        self.sims.reset(output_angle=angle, lanes=which, **{self.kind: command})
+
+    def _within(self, angle: Any, command: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        lower, upper, low, high = self.ends
+        return np.clip(angle.astype(np.float64), lower, upper), np.clip(command.astype(np.float64), low, high)
+
+
+class JointServos:
+    """Servos at joints in many worlds, on the device of Warp.
+
+    In a step a servo meets the inertia 1/(M⁻¹)ᵢᵢ and the acceleration that its joint would have without it, with other
+    servos' torques as they were a step before. The torques let the joints gain the speeds that the servos gain.
+
+    Parameters
+    ----------
+    own : sequence of Joint
+        Joints with their servos, in the order of all that follows.
+    maps : sequence of CommandMap
+        Of their controls.
+    worlds : int
+    device : warp.Device
+    seed : int
+        Of all noise.
+    name : str
+        Of what they belong to, for words.
+
+    Attributes
+    ----------
+    torque : warp.array, shape (worlds, joints)
+        Of the servos in the latest step, at the joints [N m].
+    armature : ndarray, shape (joints,)
+        Inertia of rotor and gear at each joint [kg m²].
+
+    Raises
+    ------
+    InputError
+        If a gear has play or a spring.
+    """
+
+    def __init__(self, own: Sequence[Joint], maps: Sequence[CommandMap], worlds: int, device: Any, seed: int,
+                 name: str) -> None:
+        self._wp, self._kernels = load_warp()
+        self.names, self.worlds, self._device, self._name = [joint.name for joint in own], worlds, device, name
+        groups = dict[Any, list[int]]()
+        for k, joint in enumerate(own):
+            groups.setdefault(joint.mount.model, []).append(k)
+        self._crews = []
+        for of, which in groups.items():
+            self._crews.append(_Crew(of, which, worlds, str(device), seed))
+            seed += worlds * len(which)  # each lane has its own
+        self._table, self._has_actuator = self._numbers(own, maps), [joint.command_at >= 0 for joint in own]
+        self.armature = self._table[:, 4] / self._table[:, 0] ** 2
+        self._lay_out(own)
+
+    def _check_gears(self, joint: str, numbers: Any) -> None:
+        for kind, part, word in ((Play, "half", "play"), (Elastic, "k", "an elastic gear")):
+            if getattr(numbers.now(kind), part)[0] > 0.0:
+                raise InputError(f"servo of joint {joint} of {self._name}", got=word,
+                                 allowed="a rigid gear (gear.backlash = 0): contacts of teeth and of the robot, each "
+                                         "a step late, would not come to rest; ServoDrive has them")
+
+    def _numbers(self, own: Sequence[Joint], maps: Sequence[CommandMap]) -> NDArray[np.float64]:
+        """Return a row for each joint: gain, zero, stops, own inertia, control and its map, command and its ends."""
+        found = np.zeros((len(own), 13))
+        for crew in self._crews:
+            numbers = crew.sims._numbers
+            lower, upper = numbers.travel()
+            self._check_gears(own[crew.which[0]].name, numbers)
+            for k in crew.which:
+                mount, one, how = own[k].mount, maps[k], told(own[k].mount)
+                low, high = numbers.command_ends(how.kind)
+                found[k] = (mount.gain, mount.zero, lower[0], upper[0], numbers.own_inertia()[0], one.low, one.high,
+                            one.scale, one.offset, how.gain, how.zero, low[0], high[0])
+                crew.kind, crew.ends = how.kind, (lower[0], upper[0], low[0], high[0])
+        return found
+
+    def _lay_out(self, own: Sequence[Joint]) -> None:
+        wp, count, worlds = self._wp, len(own), self.worlds
+        with wp.ScopedDevice(self._device):
+            def whole(values: list[int]) -> Any:
+                return wp.array(np.array(values, np.int32), dtype=int)
+
+            self._numbers_of = wp.array(self._table.astype(np.float32), dtype=float)
+            self._angle_at = whole([joint.angle_at for joint in own])
+            self.speed_at = whole([joint.speed_at for joint in own])
+            self._command_at = whole([joint.command_at for joint in own])
+            self._fresh = wp.zeros(worlds, dtype=wp.bool)
+            self.torque, self._met, self._wanted = (wp.zeros((worlds, count), dtype=float) for _ in range(3))
+            self._rest = wp.array(np.array([told(joint.mount).rest for joint in own], np.float32), dtype=float)
+            for crew in self._crews:
+                crew.places = whole(crew.which)
+                crew.mask = wp.zeros(worlds * len(crew.which), dtype=wp.uint8)
+                crew.lanes = {name: wp.zeros(worlds * len(crew.which), dtype=float)
+                              for name in ("angle", "speed", "inertia", "against", "command")}
+                crew.hold = wp.zeros_like(crew.lanes["command"])
+                crew.keep(wp)  # a captured graph cannot ask for memory
+        self.reset()
+
+    @property
+    def _stream(self) -> Any:
+        return None if self._device.is_cpu else self._wp.get_stream(self._device)
+
+    def reset(self, worlds: Any = None) -> None:
+        """Let servos begin anew in the next step, at rest where their joints are, in worlds of a mask or in all.
+
+        Raises
+        ------
+        InputError
+            If it is no mask of worlds.
+        """
+        wp = self._wp
+        with wp.ScopedDevice(self._device):
+            mask = np.ones(self.worlds, np.bool_) if worlds is None else worlds
+            if not isinstance(mask, wp.array):
+                mask = np.asarray(mask)
+            if mask.shape != (self.worlds,) or mask.dtype not in (np.bool_, wp.bool):
+                raise InputError(f"worlds of {self._name}", got=f"an array of shape {mask.shape}",
+                                 allowed=f"a mask of bool, shape ({self.worlds},)")
+            mask = mask if isinstance(mask, wp.array) else wp.array(mask, dtype=wp.bool)
+            for crew in self._crews:
+                wp.launch(self._kernels.begin_anew, dim=(self.worlds, len(crew.which)), inputs=[
+                    mask, crew.places, len(crew.which), self._fresh, self.torque, crew.lanes["command"]])
+
+    def begin(self, angle: Any, again: Any = None) -> None:
+        """Let servos begin that are to, where joints are, and those of some worlds stand as before the last step.
+
+        Parameters
+        ----------
+        angle : warp.array, shape (worlds, coordinates)
+        again : warp.array of bool, shape (worlds,), optional
+            Worlds in which the last step counts no more.
+        """
+        wp, kernels = self._wp, self._kernels
+        for crew in self._crews:
+            if again is not None:
+                crew.rewind(again, wp, kernels)
+            wp.launch(kernels.place, dim=(self.worlds, len(crew.which)), inputs=[
+                angle, self._fresh, crew.places, self._angle_at, self._numbers_of, self._rest, len(crew.which),
+                crew.lanes["angle"], crew.lanes["command"], crew.hold, crew.mask])
+            crew.begin(self._stream)
+            if again is not None:
+                crew.keep(wp)
+        self._fresh.zero_()
+
+    def advance(self, duration: float, angle: Any, speed: Any, control: Any, free: Any, per_torque: Any,
+                into: Any) -> None:
+        """Advance all servos by a step [s], and put torques that give the joints their speeds in place.
+
+        Parameters
+        ----------
+        duration : float
+        angle, speed, control : warp.array, shape (worlds, ...)
+            Of joints and their commands, of which the joints have places.
+        free : warp.array, shape (worlds, ...)
+            Accelerations without these servos, in places of speeds.
+        per_torque : warp.array, shape (worlds, joints, joints)
+            Acceleration of each under one newton metre at one of them: the block of M⁻¹. Factored in place.
+        into : warp.array, shape (worlds, ...)
+            Torques, in places of speeds.
+        """
+        wp, kernels, count = self._wp, self._kernels, len(self.names)
+        for crew in self._crews:
+            wp.launch(kernels.meet, dim=(self.worlds, len(crew.which)), inputs=[
+                angle, speed, control, free, per_torque, self.torque, crew.places, self._angle_at, self.speed_at,
+                self._command_at, self._numbers_of, len(crew.which), count],
+                outputs=[self._met, *crew.lanes.values()])
+        for crew in self._crews:
+            reached = crew.advance(duration, self._stream)
+            after = wp.array(reached, dtype=float) if self._device.is_cpu else wp.from_dlpack(reached)
+            wp.launch(kernels.find_lack, dim=(self.worlds, len(crew.which)), inputs=[
+                speed, free, per_torque, self._met, crew.places, self.speed_at, self._numbers_of, len(crew.which),
+                duration, after], outputs=[self.torque, self._wanted])
+        wp.launch(kernels.push, dim=self.worlds, inputs=[per_torque, self.speed_at, count, self._wanted, into])
+
+    def command(self, places: Mapping[str, Any]) -> None:
+        """Tell joints without an actuator where to go [rad, m], a number or an array (worlds,) each.
+
+        Raises
+        ------
+        InputError
+            If one has none, or has an actuator, whose `ctrl` says so; or a place is not finite.
+        """
+        for name, values in places.items():
+            k = self.names.index(name) if name in self.names else -1
+            if k < 0 or self._has_actuator[k]:
+                raise InputError(f"command of joint {name}", allowed="joints with a servo and without an actuator")
+            crew = next(crew for crew in self._crews if k in crew.which)
+            gain, zero, low, high = self._table[k, [9, 10, 11, 12]]
+            place = numbers_of(f"command of joint {name}", values, np.arange(self.worlds))
+            column = np.clip((place - zero) / gain, low, high)
+            lanes = crew.lanes["command"].numpy().reshape(self.worlds, -1).copy()
+            lanes[:, crew.which.index(k)] = column
+            crew.lanes["command"].assign(lanes.ravel())
+
+
+def armature_of(mount: Mount) -> float:
+    """Return the inertia of rotor and gear at the joint of a mount [kg m²]."""
+    return float(VectorSimulator(mount.model, 1)._numbers.own_inertia()[0]) / mount.gain ** 2
+
+
+def load_warp() -> tuple[Any, Any]:
+    """Return Warp and the kernels.
+
+    Raises
+    ------
+    MissingExtraError
+        If Warp is not installed.
+    """
+    try:
+        import warp
+    except ImportError:
+        raise MissingExtraError("warp", "warp") from None
+    from servotwin.robots.trainers import warp_kernels
+
+    return warp, warp_kernels
