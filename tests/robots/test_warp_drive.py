@@ -5,8 +5,11 @@ import numpy as np
 import pytest
 
 import servotwin as st
+from robots.test_contacts import biped
+from robots.test_energy import LEGS, quadruped
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.robots import Mount, ServoDrive, WarpDrive
+from servotwin.robots.mjcf_models import JOINTS, so101
 
 mjw = pytest.importorskip("mujoco_warp", reason="mujoco-warp is not installed")
 wp = pytest.importorskip("warp")
@@ -93,6 +96,55 @@ def test_an_arm_that_presses_on_the_floor_rests_where_servo_drive_has_it():
     assert np.abs(found - true).max() <= 8e-3
     assert np.abs(speeds).max() <= 1e-3
     assert (drive.torque.numpy() < -2.0).all()  # N m
+
+
+def test_an_so101_is_that_of_servo_drive():
+    def at(step):
+        model = mujoco.MjModel.from_xml_string(so101())
+        model.opt.timestep, model.opt.integrator = step, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        return model, mujoco.MjData(model)
+
+    def places(k, step):
+        return 0.4 * np.sin(np.arange(2.0, 8.0) * k * step)
+
+    servos, (model, data), true = dict.fromkeys(JOINTS, BUS), at(2.5e-4), []
+    drive = ServoDrive(model, servos, joint_friction="clear")
+    drive.reset(data)
+    for k in range(4000):
+        drive.command(data, dict(zip(JOINTS, places(k, 2.5e-4), strict=True)))
+        drive.step(data)
+        true.append(data.qpos[:6].copy())
+    model, start = at(2e-3)
+    drive = WarpDrive(model, servos, joint_friction="clear")
+    own, data = mjw.put_model(model), mjw.put_data(model, start, nworld=1)
+    drive.attach(own)
+    found = []
+    for k in range(500):
+        drive.command(dict(zip(JOINTS, places(k, 2e-3), strict=True)))
+        mjw.step(own, data)
+        found.append(data.qpos.numpy()[0, :6].copy())
+    assert np.sqrt(np.mean((np.array(found) - true[7::8]) ** 2, axis=0)).max() <= 5e-3
+
+
+@pytest.mark.parametrize("drop", [0.0, 0.05])
+@pytest.mark.parametrize(("robot", "joints", "angles"), [
+    (lambda: biped(0.12).compile(), ["hip0", "hip1"], [0.0, 0.0]),
+    (lambda: mujoco.MjModel.from_xml_string(quadruped(2e-3, "implicitfast", 100)), LEGS, [0.5, -1.0] * 4)],
+    ids=["biped", "quadruped"])
+def test_legs_stand_and_rest(robot, joints, angles, drop):
+    model = robot()
+    drive = WarpDrive(model, dict.fromkeys(joints, BUS))
+    start = mujoco.MjData(model)
+    start.qpos[2] += drop
+    start.qpos[7:] = angles
+    own, data = mjw.put_model(model), mjw.put_data(model, start, nworld=1)
+    drive.attach(own)
+    for _ in range(750):
+        mjw.step(own, data)
+    place = data.qpos.numpy()[0]
+    assert 2.0 * (place[4]**2 + place[5]**2) <= 1e-4  # upright
+    assert start.qpos[2] - drop - 5e-3 <= place[2] <= start.qpos[2] - drop
+    assert np.abs(data.qvel.numpy()).max() <= 1e-3
 
 
 def test_worlds_are_reset_by_a_mask_and_do_not_touch_each_other():
