@@ -6,7 +6,6 @@ import pytest
 
 import servotwin as st
 from robots.test_contacts import biped
-from robots.test_energy import LEGS, quadruped
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.robots import Mount, ServoDrive, WarpDrive
 from servotwin.robots.mjcf_models import JOINTS, so101
@@ -70,8 +69,8 @@ def by_warp(servo, masses, step, duration, goals=sines, floor=""):
 
 def off(servo, masses, step, fine=2.5e-4):
     """Return how far joints are off [rad rms]."""
-    true = by_servo_drive(servo, masses, fine, 0.8)
-    found, _, _ = by_warp(servo, masses, step, 0.8)
+    true = by_servo_drive(servo, masses, fine, 0.5)
+    found, _, _ = by_warp(servo, masses, step, 0.5)
     each = round(step / fine)
     return np.sqrt(np.mean((found - true[each - 1::each]) ** 2, axis=0))
 
@@ -110,7 +109,7 @@ def test_an_so101_is_that_of_servo_drive():
     servos, (model, data), true = dict.fromkeys(JOINTS, BUS), at(2.5e-4), []
     drive = ServoDrive(model, servos, joint_friction="clear")
     drive.reset(data)
-    for k in range(4000):
+    for k in range(2400):
         drive.command(data, dict(zip(JOINTS, places(k, 2.5e-4), strict=True)))
         drive.step(data)
         true.append(data.qpos[:6].copy())
@@ -119,31 +118,24 @@ def test_an_so101_is_that_of_servo_drive():
     own, data = mjw.put_model(model), mjw.put_data(model, start, nworld=1)
     drive.attach(own)
     found = []
-    for k in range(500):
+    for k in range(300):
         drive.command(dict(zip(JOINTS, places(k, 2e-3), strict=True)))
         mjw.step(own, data)
         found.append(data.qpos.numpy()[0, :6].copy())
     assert np.sqrt(np.mean((np.array(found) - true[7::8]) ** 2, axis=0)).max() <= 5e-3
 
 
-@pytest.mark.parametrize("drop", [0.0, 0.05])
-@pytest.mark.parametrize(("robot", "joints", "angles"), [
-    (lambda: biped(0.12).compile(), ["hip0", "hip1"], [0.0, 0.0]),
-    (lambda: mujoco.MjModel.from_xml_string(quadruped(2e-3, "implicitfast", 100)), LEGS, [0.5, -1.0] * 4)],
-    ids=["biped", "quadruped"])
-def test_legs_stand_and_rest(robot, joints, angles, drop):
-    model = robot()
-    drive = WarpDrive(model, dict.fromkeys(joints, BUS))
-    start = mujoco.MjData(model)
-    start.qpos[2] += drop
-    start.qpos[7:] = angles
+def test_legs_that_fall_stand_and_rest():
+    model = biped(0.12).compile()
+    drive, start = WarpDrive(model, {"hip0": BUS, "hip1": BUS}), mujoco.MjData(model)
+    start.qpos[2] += 0.05
     own, data = mjw.put_model(model), mjw.put_data(model, start, nworld=1)
     drive.attach(own)
-    for _ in range(750):
+    for _ in range(500):
         mjw.step(own, data)
     place = data.qpos.numpy()[0]
     assert 2.0 * (place[4]**2 + place[5]**2) <= 1e-4  # upright
-    assert start.qpos[2] - drop - 5e-3 <= place[2] <= start.qpos[2] - drop
+    assert 0.115 <= place[2] <= 0.12
     assert np.abs(data.qvel.numpy()).max() <= 1e-3
 
 

@@ -6,18 +6,15 @@ import math
 from dataclasses import MISSING
 from typing import Any
 
-from servotwin.errors import InputError, MissingExtraError
+import torch
+import warp as wp
+from isaaclab.actuators import ActuatorBase, ActuatorBaseCfg
+from isaaclab.utils import configclass
+
+from servotwin.errors import InputError
 from servotwin.robots.servos.command_map import CommandMap
 from servotwin.robots.servos.mount import Joint, Mount
 from servotwin.robots.trainers.joint_servos import JointServos, armature_of
-
-try:
-    import torch
-    import warp as wp
-    from isaaclab.actuators import ActuatorBase, ActuatorBaseCfg
-    from isaaclab.utils import configclass
-except ImportError as error:
-    raise MissingExtraError(error.name or "isaaclab", "isaaclab") from None
 
 _FRICTION = ("friction", "dynamic_friction", "viscous_friction")
 _NUMBERS = ("armature", "effort_limit", "velocity_limit", *_FRICTION)  # of Isaac Lab's own actuators

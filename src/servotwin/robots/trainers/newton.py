@@ -167,7 +167,7 @@ class DriveServo(DriveBase):
         ----------
         model : newton.Model
         actuator : newton.actuators.Actuator
-            Whose drive this is.
+            The one that has this drive.
         state : newton.State
         solver : newton.solvers.SolverMuJoCo, optional
             Accelerations are those of its last step less what the servos gave, with contacts and all else.
