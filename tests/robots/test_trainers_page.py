@@ -37,7 +37,8 @@ def test_code_runs_and_prints_what_it_says(block):
 
 @pytest.mark.parametrize("name", ["mjlab", "newton"])
 def test_a_trainer_that_is_not_installed_is_named_with_its_extra(name, monkeypatch):
-    monkeypatch.setitem(sys.modules, name, None)
+    for part in (name, f"{name}.actuator"):
+        monkeypatch.setitem(sys.modules, part, None)
     monkeypatch.delitem(sys.modules, f"servotwin.robots.trainers.{name}", raising=False)
     with pytest.raises(MissingExtraError, match=rf"is needed for this: pip install 'servotwin\[(warp|{name})\]'"):
         import_module(f"servotwin.robots.trainers.{name}")
