@@ -160,6 +160,8 @@ def test_what_is_missing_is_said_in_a_line():
     newton.solvers.SolverMuJoCo.register_custom_attributes(builder)
     builder.add_mjcf(arm())
     add_servos(builder, {"shoulder": st.DigitalServo(st.load_servo("feetech-sts3215-12v"))})
+    with pytest.raises(InputError, match=r"^servos of a robot: got 'a second time'"):
+        add_servos(builder, {"elbow": SERVO})
     with pytest.raises(InputError, match=r"^servo of joint shoulder of a robot: got 'play'"):
         builder.finalize(device="cpu")
     run = Run({"shoulder": SERVO, "elbow": SERVO})

@@ -70,7 +70,7 @@ class _Crew:
 
     def _columns(self, wp: Any) -> Iterator[tuple[str, Any, Any]]:
         """Yield name, array and numbers before the last step of all that lanes remember on a GPU."""
-        now = {name: wp.from_dlpack(column).flatten() for name, column in self.sims.columns().items()}
+        now = {name: wp.from_dlpack(column).flatten() for name, column in self.sims.columns().items() if column.nbytes}
         self.before = self.before or {name: wp.clone(column) for name, column in now.items()}
         return ((name, column, self.before[name]) for name, column in now.items())
 

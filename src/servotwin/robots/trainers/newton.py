@@ -63,6 +63,9 @@ def add_servos(builder: Any, servos: Mapping[str, Model | Mount], *, joint_frict
         raise InputError("joint_friction", got=joint_friction, allowed="'refuse', 'clear' or 'keep'")
     if not isinstance(servos, Mapping) or not servos:
         raise InputError("servos of a robot", got=servos, allowed="a mapping of joints to models")
+    if any(entry.drive_class is DriveServo for entry in builder.actuator_entries.values()):
+        raise InputError("servos of a robot", got="a second time", allowed="all of a robot at once: its joints act on "
+                         "each other")
     mounts = [given if isinstance(given, Mount) else Mount(given) for given in servos.values()]
     places = [_place(builder, name) for name in servos]
     robot = _Robot(list(servos), mounts, seed)
