@@ -104,6 +104,13 @@ def test_joints_are_those_of_servo_drive_by_steps_of_first_order(servo, more):
     assert at_four >= 1.4 * at_two
 
 
+def test_servos_vary_from_environment_to_environment():
+    actuator = actuator_of(envs=4, vary={"output_inertia": "uniform:30%"})
+    assert actuator.armature.shape == (4, 2)
+    assert len(torch.unique(actuator.armature)) == 8
+    assert len(torch.unique(actuator_of(envs=4).armature)) == 1
+
+
 def test_environments_are_reset_by_number():
     actuator = actuator_of(envs=3)
 

@@ -98,6 +98,21 @@ def test_a_look_at_the_state_lets_no_time_pass_and_worlds_are_reset_by_number():
     assert run(scene, sim, 120)[-1] == pytest.approx(plain[-1], abs=1e-5)
 
 
+def test_servos_vary_from_world_to_world_by_the_seed_of_pytorch():
+    def ends(seed, **more):
+        torch.manual_seed(seed)
+        groups = [ServoActuatorCfg(target_names_expr=("elbow",), servo=SERVO),
+                  ServoActuatorCfg(target_names_expr=("shoulder",), servo=SERVO, **more)]
+        return run(*scene_of(*groups), 100)[-1]
+
+    vary = {"output_inertia": "uniform:30%", "friction.coulomb_torque_forward": "uniform:30%"}
+    found = ends(1, vary=vary)
+    assert np.ptp(ends(1), axis=0).max() == 0.0
+    assert np.ptp(found[:, 0]) > 1e-3
+    assert np.array_equal(ends(1, vary=vary), found)
+    assert not np.array_equal(ends(2, vary=vary), found)
+
+
 def test_a_delay_of_mjlab_delays_the_command():
     scene, sim = scene_of(ServoActuatorCfg(target_names_expr=(".*",), servo=SERVO, delay_min_lag=5, delay_max_lag=5))
     late = run(scene, sim, 100)

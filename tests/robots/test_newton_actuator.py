@@ -50,12 +50,12 @@ def by_servo_drive(servos, step, duration, goals=goals, floor=""):
 class Run:
     """Arms in worlds of Newton, by a solver of it."""
 
-    def __init__(self, servos, worlds=2, solver="SolverMuJoCo", floor=""):
+    def __init__(self, servos, worlds=2, solver="SolverMuJoCo", floor="", **more):
         robot, scene = newton.ModelBuilder(), newton.ModelBuilder()
         for builder in (robot, scene):
             newton.solvers.SolverMuJoCo.register_custom_attributes(builder)
         robot.add_mjcf(arm(floor=floor))
-        add_servos(robot, servos)
+        add_servos(robot, servos, **more)
         scene.replicate(robot, worlds)
         self.model, self.worlds = scene.finalize(device="cpu"), worlds
         self.solver = getattr(newton.solvers, solver)(self.model)
@@ -136,6 +136,15 @@ def test_worlds_begin_anew_by_a_mask_and_do_not_touch_each_other():
     for _ in range(66 - latest):
         expected = late.step(2e-3, [0.8, 0.2])
     assert angles[1] == pytest.approx(expected[0], abs=1e-4)
+
+
+def test_servos_vary_from_world_to_world():
+    run = Run({"shoulder": SERVO, "elbow": SERVO}, vary={"elbow": {"motor.torque_constant": "uniform:20%"}})
+    for _ in range(40):
+        angles = run.step(2e-3, [0.5, 0.5])
+    assert abs(angles[0, 1] - angles[1, 1]) > 1e-3
+    with pytest.raises(InputError, match=r"^vary of a robot's servos: got 'the inertia of rotors'"):
+        Run({"shoulder": SERVO, "elbow": SERVO}, vary={"output_inertia": "uniform:20%"})
 
 
 @pytest.mark.parametrize(("own", "servos", "options", "error", "words"), [

@@ -9,6 +9,7 @@ from robots.test_contacts import biped
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.robots import Mount, ServoDrive, WarpDrive
 from servotwin.robots.mjcf_models import JOINTS, so101
+from servotwin.studies.plan import drawn_parameters
 
 mjw = pytest.importorskip("mujoco_warp", reason="mujoco-warp is not installed")
 wp = pytest.importorskip("warp")
@@ -139,6 +140,29 @@ def test_legs_that_fall_stand_and_rest():
     assert np.abs(data.qvel.numpy()).max() <= 1e-3
 
 
+@pytest.mark.parametrize("vary", [
+    {"friction.coulomb_torque_forward": "uniform:30%", "electronics.deadband": "uniform:4us..16us"},
+    {"output_inertia": "uniform:40%", "stops.upper_angle": "uniform:0.3..0.5"}])
+def test_a_servo_that_varies_is_that_of_its_own_numbers(vary):
+    def last(servo, worlds, **more):
+        model = arm(2e-3)
+        drive = WarpDrive(model, {"a": servo}, worlds, **more)
+        own, data = mjw.put_model(model), mjw.put_data(model, mujoco.MjData(model), nworld=worlds)
+        drive.attach(own)
+        data.ctrl.assign(np.full((worlds, 1), 0.6, np.float32))
+        for _ in range(120):
+            mjw.step(own, data)
+        return data.qpos.numpy()[:, 0]
+
+    found = last(SERVO, 3, vary=vary, seed=5)
+    drawn = drawn_parameters(vary, SERVO, 3, 5)
+    assert np.ptp(found) > 1e-3
+    for world in range(3):
+        servo = SERVO.servo.replace({name: float(values[world]) for name, values in drawn.items()})
+        assert found[world] == pytest.approx(last(st.PulseServo(servo), 1)[0], abs=2e-5)
+    assert np.array_equal(last(SERVO, 3, vary={"a": vary}, seed=5), found)
+
+
 def test_worlds_are_reset_by_a_mask_and_do_not_touch_each_other():
     model = arm(2e-3)
     drive = WarpDrive(model, {"a": SERVO}, worlds=3)
@@ -246,6 +270,9 @@ def test_data_of_other_worlds_are_refused():
     (lambda model: WarpDrive(model, {}), InputError, "^servos of a WarpDrive"),
     (lambda model: WarpDrive(model, {"z": SERVO}), (InputError, UnknownNameError), "z"),
     (lambda model: WarpDrive(model, {"a": SERVO}, worlds=0), InputError, "^worlds: got 0"),
+    (lambda model: WarpDrive(model, {"a": SERVO}, vary=3), InputError, "^vary: got 'int'"),
+    (lambda model: WarpDrive(model, {"a": SERVO}, vary={"z": {}}), UnknownNameError, "^unknown joint with a servo"),
+    (lambda model: WarpDrive(model, {"a": BUS}, vary={"gear.backlash": "uniform:1deg..2deg"}), InputError, "'play'"),
     (lambda model: WarpDrive(model, {"a": st.DigitalServo(st.load_servo("feetech-sts3215-12v"))}), InputError,
      "^servo of joint a of a WarpDrive: got 'play'"),
     (lambda model: WarpDrive(model, {"a": SERVO}).command({"a": 0.3}), InputError, "^command of joint a")])

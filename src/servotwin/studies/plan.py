@@ -197,6 +197,21 @@ def drawn(distributions: Mapping[str, Distribution], lanes: int, seed: int, samp
             for name, distribution in distributions.items()}
 
 
+def drawn_parameters(vary: Mapping[str, Distribution | str], model: Model, lanes: int, seed: int) -> dict[str, Column]:
+    """Return the parameters of lanes, as `simulate_many` takes them, that follow from what is drawn, within ranges.
+
+    Raises
+    ------
+    InputError
+        Or one of its kinds, if a name or a distribution is not possible.
+    """
+    load = as_load(None)
+    columns = drawn(distributions_of(vary, model, load, truncate=True), lanes, seed, "random")
+    check_ranges(columns, model, load, advice="")
+    together = Together(model)
+    return {**together.read(columns), **together.follow(columns)}
+
+
 def noise_seeds(lanes: int, seed: int) -> NDArray[np.int64]:
     """Return the seed of each lane's noise; lane k has the same whatever the number of lanes."""
     return _stream(seed, "noise").integers(2**63, size=lanes, dtype=np.int64)

@@ -14,7 +14,7 @@ from isaaclab.utils import configclass
 from servotwin.errors import InputError
 from servotwin.robots.servos.command_map import CommandMap
 from servotwin.robots.servos.mount import Joint, Mount
-from servotwin.robots.trainers.joint_servos import JointServos, armature_of
+from servotwin.robots.trainers.joint_servos import JointServos, armature_of, varied
 
 _FRICTION = ("friction", "dynamic_friction", "viscous_friction")
 _NUMBERS = ("armature", "effort_limit", "velocity_limit", *_FRICTION)  # of Isaac Lab's own actuators
@@ -50,7 +50,9 @@ class ServoActuator(ActuatorBase):
         joints = [Joint(name, mount, k, k, k, -1, k) for k, name in enumerate(self.joint_names)]
         maps = [CommandMap(name, -math.inf, math.inf) for name in self.joint_names]
         self._servos = JointServos(joints, maps, self._num_envs, wp.get_device(str(self._device)),
-                                   torch.initial_seed() % 2**32, "a ServoActuator")
+                                   torch.initial_seed() % 2**32, "a ServoActuator",
+                                   varied(cfg.vary, self.joint_names))
+        self.armature = torch.as_tensor(self._servos.armature, dtype=torch.float32, device=self._device)
         self.torque = wp.to_torch(self._servos.torque)  # of the servos in the latest step
         self._per_torque: Any = None
 
@@ -111,6 +113,9 @@ class ServoActuatorCfg(ActuatorBaseCfg):
         The servo at each of these joints.
     timestep : float
         Of physics [s]: `SimulationCfg.dt`.
+    vary : mapping, optional
+        Distributions of the servo's numbers that vary from environment to environment, as of `sweep`; drawn by
+        PyTorch's seed.
     armature_in_mass_matrix : bool
         Whether the mass matrix that `meet` gets has the armature on its diagonal; assumed: it has. Compare it with that
         of a joint whose armature is 0.
@@ -119,6 +124,7 @@ class ServoActuatorCfg(ActuatorBaseCfg):
     class_type: type = ServoActuator
     servo: Any = MISSING
     timestep: Any = MISSING
+    vary: Any = None
     armature_in_mass_matrix: bool = True
     stiffness: float | None = None
     damping: float | None = None

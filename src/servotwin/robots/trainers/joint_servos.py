@@ -8,41 +8,46 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.errors import InputError, MissingExtraError
+from servotwin.errors import InputError, MissingExtraError, UnknownNameError
 from servotwin.models.terms.elastic import Elastic
 from servotwin.models.terms.play import Play
 from servotwin.robots.servos.command_map import CommandMap, told
 from servotwin.robots.servos.mount import Joint, Mount
 from servotwin.simulation import VectorSimulator
 from servotwin.simulation.lanes.vector import numbers_of
+from servotwin.studies.plan import drawn_parameters
 
 if TYPE_CHECKING:
     from servotwin.models import Model
+    from servotwin.studies import Distribution
+
+    Vary = Mapping[str, Distribution | str]
 
 
 class _Crew:
     """Servos of one model: a lane for each of its joints in each world, world after world."""
 
     kind: str  # of its commands
-    ends: tuple[float, float, float, float]  # of its travel [rad] and of its commands, which floats may be beyond
+    ends: NDArray[np.float64]  # of each lane: of its travel [rad] and of its commands, which floats may be beyond
     places: Any  # of its joints among all
     lanes: dict[str, Any]  # arrays of what lanes are given
     before: Any = None  # what lanes remembered before the last step
     hold: Any  # commands to stay where lanes begin
     mask: Any
 
-    def __init__(self, model: Model, which: list[int], worlds: int, device: str, seed: int) -> None:
+    def __init__(self, model: Model, which: list[int], worlds: int, device: str, seed: int, vary: Vary) -> None:
         self.which, self._here = which, device == "cpu"
         lanes = worlds * len(which)
-        self.sims: Any = VectorSimulator(model, lanes, seed=seed) if self._here else VectorSimulator(
-            model, lanes, seed=seed, dtype="float32", device=device)
+        parameters = drawn_parameters(vary, model, lanes, seed)
+        more: Any = {} if self._here else {"dtype": "float32", "device": device}
+        self.sims: Any = VectorSimulator(model, lanes, seed=seed, parameters=parameters, **more)
 
     def advance(self, duration: float, stream: Any) -> Any:
         """Advance by a step [s] from where the joints are; return the speeds after it."""
         angle, speed, inertia, against, command = (
             array.numpy() if self._here else array for array in self.lanes.values())
         if self._here:
-            angle, command = self._within(angle, command)
+            angle, command = self._within(angle, command, slice(None))
         more = {} if self._here else {"stream": stream}
         self.sims.set(output_angle=angle, output_speed=speed, load_inertia=inertia, **more)
         self.sims.advance(duration, external_torque=against, **{self.kind: command})
@@ -83,11 +88,11 @@ class _Crew:
         which = np.flatnonzero(self.mask.numpy())
         if not which.size:
             return
-        angle, command = self._within(self.lanes["angle"].numpy()[which], self.hold.numpy()[which])
+        angle, command = self._within(self.lanes["angle"].numpy()[which], self.hold.numpy()[which], which)
         self.sims.reset(output_angle=angle, lanes=which, **{self.kind: command})
 
-    def _within(self, angle: Any, command: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        lower, upper, low, high = self.ends
+    def _within(self, angle: Any, command: Any, which: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        lower, upper, low, high = self.ends[:, which]
         return np.clip(angle.astype(np.float64), lower, upper), np.clip(command.astype(np.float64), low, high)
 
 
@@ -109,12 +114,14 @@ class JointServos:
         Of all noise.
     name : str
         Of what they belong to, for words.
+    vary : sequence of mapping, optional
+        Of each joint: distributions of numbers that vary from world to world, by their dotted names, as of `sweep`.
 
     Attributes
     ----------
     torque : warp.array, shape (worlds, joints)
         Of the servos in the latest step, at the joints [N m].
-    armature : ndarray, shape (joints,)
+    armature : ndarray, shape (worlds, joints)
         Inertia of rotor and gear at each joint [kg m²].
 
     Raises
@@ -124,40 +131,43 @@ class JointServos:
     """
 
     def __init__(self, own: Sequence[Joint], maps: Sequence[CommandMap], worlds: int, device: Any, seed: int,
-                 name: str) -> None:
+                 name: str, vary: Sequence[Vary] | None = None) -> None:
         self._wp, self._kernels = load_warp()
         self.names, self.worlds, self._device, self._name = [joint.name for joint in own], worlds, device, name
         groups = dict[Any, list[int]]()
-        for k, joint in enumerate(own):
-            groups.setdefault(joint.mount.model, []).append(k)
+        varied = [{}] * len(own) if vary is None else vary
+        for k, (joint, one) in enumerate(zip(own, varied, strict=True)):
+            groups.setdefault((joint.mount.model, tuple(sorted(one.items()))), []).append(k)
         self._crews = []
-        for of, which in groups.items():
-            self._crews.append(_Crew(of, which, worlds, str(device), seed))
+        for (of, _), which in groups.items():
+            self._crews.append(_Crew(of, which, worlds, str(device), seed, varied[which[0]]))
             seed += worlds * len(which)  # each lane has its own
         self._table, self._has_actuator = self._numbers(own, maps), [joint.command_at >= 0 for joint in own]
-        self.armature = self._table[:, 4] / self._table[:, 0] ** 2
+        self.armature = self._table[:, :, 4] / self._table[:, :, 0] ** 2
         self._lay_out(own)
 
     def _check_gears(self, joint: str, numbers: Any) -> None:
         for kind, part, word in ((Play, "half", "play"), (Elastic, "k", "an elastic gear")):
-            if getattr(numbers.now(kind), part)[0] > 0.0:
+            if (getattr(numbers.now(kind), part) > 0.0).any():
                 raise InputError(f"servo of joint {joint} of {self._name}", got=word,
                                  allowed="a rigid gear (gear.backlash = 0): contacts of teeth and of the robot, each "
                                          "a step late, would not come to rest; ServoDrive has them")
 
     def _numbers(self, own: Sequence[Joint], maps: Sequence[CommandMap]) -> NDArray[np.float64]:
-        """Return a row for each joint: gain, zero, stops, own inertia, control and its map, command and its ends."""
-        found = np.zeros((len(own), 13))
+        """Return of each joint in each world: gain, zero, stops, own inertia, control and its map, command and ends."""
+        found = np.zeros((self.worlds, len(own), 13))
         for crew in self._crews:
             numbers = crew.sims._numbers
-            lower, upper = numbers.travel()
             self._check_gears(own[crew.which[0]].name, numbers)
-            for k in crew.which:
+            crew.kind = told(own[crew.which[0]].mount).kind
+            crew.ends = np.array([*numbers.travel(), *numbers.command_ends(crew.kind)])
+            lower, upper, low, high, inertia = (
+                column.reshape(self.worlds, -1).T for column in (*crew.ends, numbers.own_inertia()))
+            for n, k in enumerate(crew.which):
                 mount, one, how = own[k].mount, maps[k], told(own[k].mount)
-                low, high = numbers.command_ends(how.kind)
-                found[k] = (mount.gain, mount.zero, lower[0], upper[0], numbers.own_inertia()[0], one.low, one.high,
-                            one.scale, one.offset, how.gain, how.zero, low[0], high[0])
-                crew.kind, crew.ends = how.kind, (lower[0], upper[0], low[0], high[0])
+                found[:, k] = np.stack(np.broadcast_arrays(
+                    mount.gain, mount.zero, lower[n], upper[n], inertia[n], one.low, one.high, one.scale, one.offset,
+                    how.gain, how.zero, low[n], high[n]), axis=1)
         return found
 
     def _lay_out(self, own: Sequence[Joint]) -> None:
@@ -271,12 +281,34 @@ class JointServos:
             if k < 0 or self._has_actuator[k]:
                 raise InputError(f"command of joint {name}", allowed="joints with a servo and without an actuator")
             crew = next(crew for crew in self._crews if k in crew.which)
-            gain, zero, low, high = self._table[k, [9, 10, 11, 12]]
+            gain, zero, low, high = self._table[:, k, [9, 10, 11, 12]].T
             place = numbers_of(f"command of joint {name}", values, np.arange(self.worlds))
             column = np.clip((place - zero) / gain, low, high)
             lanes = crew.lanes["command"].numpy().reshape(self.worlds, -1).copy()
             lanes[:, crew.which.index(k)] = column
             crew.lanes["command"].assign(lanes.ravel())
+
+
+def varied(vary: Mapping[str, Any] | None, joints: Sequence[str]) -> list[Vary]:
+    """Return what varies at each joint, where that is given for all of them, or for some by their names.
+
+    Raises
+    ------
+    InputError
+        If it is no mapping, or a name is none of a joint with a servo.
+    """
+    if not isinstance(vary or {}, Mapping):
+        raise InputError("vary", got=type(vary).__name__, allowed="a mapping of dotted names to distributions, or of "
+                         "joints to such mappings")
+    given = vary or {}
+    if not any(isinstance(one, Mapping) for one in given.values()):
+        return [given] * len(joints)
+    for name, one in given.items():
+        if name not in joints:
+            raise UnknownNameError("joint with a servo", name, list(joints))
+        if not isinstance(one, Mapping):
+            raise InputError(f"vary of joint {name}", got=one, allowed="a mapping of dotted names to distributions")
+    return [given.get(name, {}) for name in joints]
 
 
 def armature_of(mount: Mount) -> float:

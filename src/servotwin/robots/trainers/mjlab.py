@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -43,6 +44,8 @@ class ServoActuatorCfg(ActuatorCfg):
         The servo at each of these joints.
     joint_friction : {"refuse", "clear", "keep"}
         Of the joints themselves, as of `ServoDrive`.
+    vary : mapping, optional
+        Distributions of the servo's numbers that vary from world to world, as of `sweep`; drawn by PyTorch's seed.
 
     Raises
     ------
@@ -54,6 +57,7 @@ class ServoActuatorCfg(ActuatorCfg):
 
     servo: Model | Mount
     joint_friction: str = "refuse"
+    vary: Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
         """Check."""
@@ -96,7 +100,7 @@ class ServoActuator(Actuator[ServoActuatorCfg]):
     def initialize(self, mj_model: Any, model: Any, data: Any, device: str) -> None:
         """Put the servos beside those that the scene has already."""
         super().initialize(mj_model, model, data, device)
-        model = model.struct  # mjlab's bridge to tensors stands before it
+        bridge, model = model, model.struct  # mjlab's bridge to tensors stands before it
         mujoco, own = load_mujoco(), {}
         for actuator in self._global_ctrl_ids.tolist():
             joint = int(mj_model.actuator_trnid[actuator, 0])
@@ -107,9 +111,11 @@ class ServoActuator(Actuator[ServoActuatorCfg]):
             raise InputError("callback.control of the scene's model", got="a function of another program",
                              allowed="none: servos advance there")
         servos = (others.servos if others else {}) | own
-        drive = WarpDrive(mj_model, servos, data.nworld, joint_friction="keep", device=device,
+        vary = (others.vary if others else {}) | dict.fromkeys(own, self.cfg.vary or {})
+        drive = WarpDrive(mj_model, servos, data.nworld, joint_friction="keep", vary=vary, device=device,
                           seed=torch.initial_seed() % 2**32)
         drive.attach(model)
+        bridge.clear_cache()
         self._model, self._places = model, [drive.joints.index(name) for name in own]
 
     def compute(self, cmd: ActuatorCmd) -> torch.Tensor:

@@ -12,7 +12,7 @@ import numpy as np
 from servotwin.errors import InputError, MissingExtraError, UnknownNameError
 from servotwin.robots.servos.command_map import CommandMap
 from servotwin.robots.servos.mount import PASSIVE, Joint, Mount
-from servotwin.robots.trainers.joint_servos import JointServos, armature_of
+from servotwin.robots.trainers.joint_servos import JointServos, armature_of, varied
 
 try:
     import newton
@@ -33,12 +33,12 @@ _TARGETS = ("joint_target_ke", "joint_target_kd")
 class _Robot:
     """The servos of a robot, joint after joint; each is one of its own, whatever it has."""
 
-    def __init__(self, names: list[str], mounts: list[Mount], seed: int) -> None:
-        self.names, self.mounts, self.seed = names, mounts, seed
+    def __init__(self, names: list[str], mounts: list[Mount], vary: list[Any], seed: int) -> None:
+        self.names, self.mounts, self.vary, self.seed = names, mounts, vary, seed
 
 
 def add_servos(builder: Any, servos: Mapping[str, Model | Mount], *, joint_friction: str = "refuse",
-               seed: int = 0) -> None:
+               vary: Mapping[str, Any] | None = None, seed: int = 0) -> None:
     """Put servos at joints of a robot in one of Newton's builders, before it is replicated or finalized.
 
     Rotor and gear become the joints' armature, and targets of Newton's own solvers there are taken away. The model has
@@ -51,8 +51,10 @@ def add_servos(builder: Any, servos: Mapping[str, Model | Mount], *, joint_frict
         By the label of the joint, or by its last part, behind a slash.
     joint_friction : {"refuse", "clear", "keep"}
         Of the joints themselves, as of `ServoDrive`.
+    vary : mapping, optional
+        Distributions of servos' numbers that vary from world to world, as of `WarpDrive`; not the inertia of rotors.
     seed : int
-        Of all noise.
+        Of all noise, and of what varies.
 
     Raises
     ------
@@ -68,7 +70,7 @@ def add_servos(builder: Any, servos: Mapping[str, Model | Mount], *, joint_frict
                          "each other")
     mounts = [given if isinstance(given, Mount) else Mount(given) for given in servos.values()]
     places = [_place(builder, name) for name in servos]
-    robot = _Robot(list(servos), mounts, seed)
+    robot = _Robot(list(servos), mounts, varied(vary, list(servos)), seed)
     for k, (name, mount, (position, dof)) in enumerate(zip(servos, mounts, places, strict=True)):
         for field, word in _FRICTION.items():
             own = getattr(builder, field)
@@ -155,7 +157,10 @@ class DriveServo(DriveBase):
                for k, (name, mount) in enumerate(zip(robot.names, robot.mounts, strict=True))]
         maps = [CommandMap(name, -math.inf, math.inf) for name in robot.names]
         self._device, self._count = device, count
-        self._servos = JointServos(own, maps, worlds, device, robot.seed, "a robot")
+        self._servos = JointServos(own, maps, worlds, device, robot.seed, "a robot", robot.vary)
+        if np.ptp(self._servos.armature, axis=0).any():
+            raise InputError("vary of a robot's servos", got="the inertia of rotors", allowed="all else: worlds of a "
+                             "builder have one armature")
         self.torque = self._servos.torque
         with wp.ScopedDevice(device):
             self._angle, self._speed, self._goal, self._free, self._at_rest = (

@@ -14,7 +14,7 @@ from servotwin.robots.servos.command_map import CommandMap
 from servotwin.robots.servos.coupling import FORCES
 from servotwin.robots.servos.mount import PASSIVE, Mount, joints_of, treat_friction
 from servotwin.robots.servos.servo_groups import check_options, maps_of, put_into_model
-from servotwin.robots.trainers.joint_servos import JointServos, load_warp
+from servotwin.robots.trainers.joint_servos import JointServos, load_warp, varied
 
 if TYPE_CHECKING:
     from servotwin.models import Model
@@ -44,6 +44,10 @@ class WarpDrive:
         Number of worlds: `nworld` of the data.
     controls, joint_friction
         As of `ServoDrive`.
+    vary : mapping, optional
+        Distributions of servos' numbers that vary from world to world, by their dotted names and in the words of
+        `sweep`, for all servos; or a mapping of joints to such mappings. `st.distributions.stated(servo)` has those of
+        a servo file. They are drawn once.
     timestep : float, optional
         Of a step [s]; that of the model unless given.
     device : str, optional
@@ -55,8 +59,8 @@ class WarpDrive:
     ----------
     joints : tuple of str
         Names of the joints, in the order of `torque`.
-    servos : mapping of str to Model or Mount
-        As given.
+    servos, vary : mapping
+        As given, by joint.
     torque : warp.array, shape (worlds, joints)
         Of the servos in the latest step, at the joints [N m].
 
@@ -70,7 +74,8 @@ class WarpDrive:
 
     def __init__(self, model: Any, servos: Mapping[str, Model | Mount], worlds: int = 1, *,
                  controls: Mapping[str, CommandMap] | None = None, joint_friction: str = "refuse",
-                 timestep: float | None = None, device: str | None = None, seed: int = 0) -> None:
+                 vary: Mapping[str, Any] | None = None, timestep: float | None = None, device: str | None = None,
+                 seed: int = 0) -> None:
         mujoco, (self._wp, self._mjw, self._kernels) = load_mujoco(), _load_warp()
         if not isinstance(model, mujoco.MjModel):
             raise InputError("model of a WarpDrive", got=type(model).__name__, allowed="an MjModel")
@@ -88,9 +93,10 @@ class WarpDrive:
         self.joints, self.worlds = tuple(joint.name for joint in own), worlds
         self._device = self._wp.get_device(device)
         self._timestep = float(model.opt.timestep if timestep is None else timestep)
-        self._servos = JointServos(own, maps, worlds, self._device, seed, "a WarpDrive")
+        self.vary = dict(zip(self.joints, varied(vary, self.joints), strict=True))
+        self._servos = JointServos(own, maps, worlds, self._device, seed, "a WarpDrive", list(self.vary.values()))
         self.torque = self._servos.torque
-        put_into_model(mujoco, model, own, self._servos.armature)
+        put_into_model(mujoco, model, own, np.median(self._servos.armature, axis=0))
         self._changed = [joint.speed_at for joint in own], [joint.actuator for joint in own if joint.actuator >= 0]
         count, nv = len(own), int(model.nv)
         with self._wp.ScopedDevice(self._device):
@@ -115,6 +121,10 @@ class WarpDrive:
             self._carry(model, f"actuator_{field}", actuators)
         for field in _WEIGHTS:
             self._carry(model, field, slice(None))
+        if np.ptp(self._servos.armature, axis=0).any():
+            whole = np.tile(model.dof_armature.numpy()[:1], (self.worlds, 1))
+            whole[:, dofs] = self._servos.armature
+            model.dof_armature = self._wp.array(whole.astype(np.float32), dtype=float, device=self._device)
         model.callback.control = self.control
 
     def _carry(self, model: Any, field: str, places: Any) -> None:

@@ -29,42 +29,54 @@ def keep_row(solved: wp.array2d[float], speed_at: wp.array[int], k: int, found: 
     found[world, k, n] = solved[world, speed_at[n]]
 
 
+@wp.func
+def angle_of(numbers: wp.array[float], place: float):
+    """Return the angle of a servo whose joint is at a place, between its stops."""
+    return wp.clamp((place - numbers[1]) / numbers[0], numbers[2], numbers[3])
+
+
+@wp.func
+def within_commands(numbers: wp.array[float], command: float):
+    """Return the nearest command that a servo takes."""
+    return wp.clamp(command, numbers[11], numbers[12])
+
+
 @wp.kernel
 def meet(qpos: wp.array2d[float], qvel: wp.array2d[float], ctrl: wp.array2d[float], free: wp.array2d[float],
          per_torque: wp.array3d[float], torque: wp.array2d[float], which: wp.array[int], angle_at: wp.array[int],
-         speed_at: wp.array[int], command_at: wp.array[int], numbers: wp.array2d[float], count: int,
+         speed_at: wp.array[int], command_at: wp.array[int], numbers: wp.array3d[float], count: int,
          joints: int, met: wp.array2d[float], angle: wp.array[float], speed: wp.array[float],
          inertia: wp.array[float], against: wp.array[float], command: wp.array[float]):
     """Find what each servo meets at its shaft: angle, speed, inertia beyond its own, torque; and its command."""
     world, n = wp.tid()
     k = which[n]
     lane = world * count + n
-    gain = numbers[k, 0]
+    gain = numbers[world, k, 0]
     a = free[world, speed_at[k]]
     for other in range(joints):
         if other != k:
             a += per_torque[world, k, other] * torque[world, other]
     met[world, k] = a
     J = 1.0 / per_torque[world, k, k]
-    angle[lane] = wp.clamp((qpos[world, angle_at[k]] - numbers[k, 1]) / gain, numbers[k, 2], numbers[k, 3])
+    angle[lane] = angle_of(numbers[world, k], qpos[world, angle_at[k]])
     speed[lane] = qvel[world, speed_at[k]] / gain
-    inertia[lane] = wp.max(J * gain * gain - numbers[k, 4], 0.0)
+    inertia[lane] = wp.max(J * gain * gain - numbers[world, k, 4], 0.0)
     against[lane] = -J * gain * a
     if command_at[k] >= 0:
-        asked = wp.clamp(ctrl[world, command_at[k]], numbers[k, 5], numbers[k, 6])
-        place = numbers[k, 8] + numbers[k, 7] * asked
-        command[lane] = wp.clamp((place - numbers[k, 10]) / numbers[k, 9], numbers[k, 11], numbers[k, 12])
+        asked = wp.clamp(ctrl[world, command_at[k]], numbers[world, k, 5], numbers[world, k, 6])
+        place = numbers[world, k, 8] + numbers[world, k, 7] * asked
+        command[lane] = within_commands(numbers[world, k], (place - numbers[world, k, 10]) / numbers[world, k, 9])
 
 
 @wp.kernel
 def find_lack(qvel: wp.array2d[float], free: wp.array2d[float], per_torque: wp.array3d[float], met: wp.array2d[float],
-         which: wp.array[int], speed_at: wp.array[int], numbers: wp.array2d[float], count: int, timestep: float,
+         which: wp.array[int], speed_at: wp.array[int], numbers: wp.array3d[float], count: int, timestep: float,
          speed: wp.array[float], torque: wp.array2d[float], wanted: wp.array2d[float]):
     """Find the torque of each servo, and the acceleration that its joint lacks to gain the speed that it has gained."""
     world, n = wp.tid()
     k = which[n]
     dof = speed_at[k]
-    gained = (speed[world * count + n] * numbers[k, 0] - qvel[world, dof]) / timestep
+    gained = (speed[world * count + n] * numbers[world, k, 0] - qvel[world, dof]) / timestep
     torque[world, k] = (gained - met[world, k]) / per_torque[world, k, k]
     wanted[world, k] = gained - free[world, dof]
 
@@ -99,7 +111,7 @@ def push(per_torque: wp.array3d[float], speed_at: wp.array[int], count: int, wan
 
 @wp.kernel
 def place(qpos: wp.array2d[float], mask: wp.array[wp.bool], which: wp.array[int], angle_at: wp.array[int],
-          numbers: wp.array2d[float], rest: wp.array[float], count: int, angle: wp.array[float],
+          numbers: wp.array3d[float], rest: wp.array[float], count: int, angle: wp.array[float],
           command: wp.array[float], hold: wp.array[float], lanes: wp.array[wp.uint8]):
     """Find where servos of some worlds begin, with the command that lets them stay, and holds unless one was given."""
     world, n = wp.tid()
@@ -108,11 +120,11 @@ def place(qpos: wp.array2d[float], mask: wp.array[wp.bool], which: wp.array[int]
     lanes[lane] = wp.uint8(0)
     if mask[world]:
         lanes[lane] = wp.uint8(1)
-        at = wp.clamp((qpos[world, angle_at[k]] - numbers[k, 1]) / numbers[k, 0], numbers[k, 2], numbers[k, 3])
+        at = angle_of(numbers[world, k], qpos[world, angle_at[k]])
         angle[lane] = at
         hold[lane] = rest[k]
         if wp.isnan(rest[k]):
-            hold[lane] = wp.clamp(at, numbers[k, 11], numbers[k, 12])
+            hold[lane] = within_commands(numbers[world, k], at)
         if wp.isnan(command[lane]):
             command[lane] = hold[lane]
 
