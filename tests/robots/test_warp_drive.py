@@ -9,10 +9,15 @@ from robots.test_contacts import biped
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.robots import Mount, ServoDrive, WarpDrive
 from servotwin.robots.mjcf_models import JOINTS, so101
+from servotwin.robots.trainers import joint_servos
+from servotwin.simulation.compile import threads
+from servotwin.simulation.lanes import cuda, lane_threads, vector_gpu
 from servotwin.studies.plan import drawn_parameters
+from simulation.test_cuda import built, driver, needs_compilers
 
 mjw = pytest.importorskip("mujoco_warp", reason="mujoco-warp is not installed")
 wp = pytest.importorskip("warp")
+__all__ = ["built", "driver"]  # fixtures
 wp.set_device("cpu")
 pytestmark = pytest.mark.slow
 SERVO = st.PulseServo(st.load_servo("hitec-hs-755hb"))
@@ -254,6 +259,45 @@ def test_what_lanes_remembered_is_put_back_on_a_gpu_by_columns_and_by_rings():
             wp.launch(kernel, dim=now.size, inputs=[again, servos, lanes, each, wp.array(before), given])
             back = np.array([lane_of(at) >= servos for at in np.ndindex(shape)])
             assert np.array_equal(given.numpy(), np.where(back, before, now))
+
+
+@needs_compilers
+@pytest.mark.parametrize("servo", [SERVO, BUS], ids=["pulses", "bus"])
+def test_servos_on_a_gpu_are_those_of_the_processor(servo, driver, monkeypatch):
+    """The driver is the stand-in: memory of the device is that of the processor, and Warp takes it for such."""
+    class There(joint_servos._Crew):
+        def __init__(self, model, which, worlds, device, seed, vary):
+            numbers = st.VectorSimulator(model, worlds * len(which))._numbers
+            for text in lane_threads.ThreadedLanes(numbers, "float32")._texts:
+                driver.library.stand_in_library(threads.library(text)._name.encode())
+            super().__init__(model, which, worlds, "cuda", seed, vary)
+            assert isinstance(self.sims, vector_gpu.VectorSimulatorOnGpu)
+
+    def run():
+        model = arm(2e-3)
+        drive = WarpDrive(model, {"a": servo}, worlds=3)
+        own, data = mjw.put_model(model), mjw.put_data(model, mujoco.MjData(model), nworld=3)
+        drive.attach(own)
+        for k in range(120):
+            data.ctrl.assign(np.full((3, 1), 0.6, np.float32))
+            if k == 50:
+                mask = wp.array(np.array([False, True, False]))
+                mjw.reset_data(own, data, mask)
+                drive.reset(mask)
+            for _ in range(k % 2):
+                mjw.forward(own, data)
+            mjw.step(own, data)
+        return data.qpos.numpy()[:, 0]
+
+    here = run()
+    monkeypatch.setattr(cuda, "KDL_CUDA", 1)
+    for module in (lane_threads, vector_gpu):
+        monkeypatch.setattr(module, "is_guest", lambda values: isinstance(values, wp.array))
+    monkeypatch.setattr(wp.array, "__dlpack__", lambda self, stream=None: wp.to_dlpack(self))
+    monkeypatch.setattr(joint_servos, "_Crew", There)
+    found = run()
+    assert found == pytest.approx(here, abs=2e-6)
+    assert abs(here[1] - here[0]) > 1e-3
 
 
 def test_data_of_other_worlds_are_refused():

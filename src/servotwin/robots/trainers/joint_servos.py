@@ -42,8 +42,8 @@ class _Crew:
         more: Any = {} if self._here else {"dtype": "float32", "device": device}
         self.sims: Any = VectorSimulator(model, lanes, seed=seed, parameters=parameters, **more)
 
-    def advance(self, duration: float, stream: Any) -> Any:
-        """Advance by a step [s] from where the joints are; return the speeds after it."""
+    def advance(self, duration: float, stream: Any, wp: Any) -> Any:
+        """Advance by a step [s] from where the joints are; return the speeds after it, as an array of Warp."""
         angle, speed, inertia, against, command = (
             array.numpy() if self._here else array for array in self.lanes.values())
         if self._here:
@@ -51,7 +51,8 @@ class _Crew:
         more = {} if self._here else {"stream": stream}
         self.sims.set(output_angle=angle, output_speed=speed, load_inertia=inertia, **more)
         self.sims.advance(duration, external_torque=against, **{self.kind: command})
-        return self.sims["output_speed"]
+        speed = self.sims["output_speed"]
+        return wp.array(speed, dtype=float) if self._here else wp.from_dlpack(speed)
 
     def rewind(self, again: Any, wp: Any, kernels: Any) -> None:
         """Let worlds whose time has not passed since stand as before the last step."""
@@ -261,8 +262,7 @@ class JointServos:
                 self._command_at, self._numbers_of, len(crew.which), count],
                 outputs=[self._met, *crew.lanes.values()])
         for crew in self._crews:
-            reached = crew.advance(duration, self._stream)
-            after = wp.array(reached, dtype=float) if self._device.is_cpu else wp.from_dlpack(reached)
+            after = crew.advance(duration, self._stream, wp)
             wp.launch(kernels.find_lack, dim=(self.worlds, len(crew.which)), inputs=[
                 speed, free, per_torque, self._met, crew.places, self.speed_at, self._numbers_of, len(crew.which),
                 duration, after], outputs=[self.torque, self._wanted])
