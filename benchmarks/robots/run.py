@@ -1,6 +1,6 @@
 """Servos inside MuJoCo: how exact they are, what contacts cost, and what a joint costs beside `mj_step`.
 
-`run.py` does all parts; `run.py accuracy`, `run.py contact`, `run.py speed` or `run.py walker` one of them.
+`run.py` does all parts; `run.py accuracy`, `contact`, `speed`, `walker` or `gap` one of them.
 """
 
 import sys
@@ -18,12 +18,13 @@ def main() -> None:
         return
     import accuracy
     import contact
+    import gap
     import speed
     import walker
 
     print(f"MuJoCo {mujoco.__version__}")
     parts = {"accuracy": (accuracy.hinge, accuracy.arm, accuracy.held), "contact": (contact.table,),
-             "speed": (speed.table,), "walker": (walker.table,)}
+             "speed": (speed.table,), "walker": (walker.table,), "gap": (gap.table,)}
     for part in sys.argv[1:] or parts:
         if part not in parts:
             sys.exit(f"run.py: {part!r} is not one of {', '.join(parts)}")
