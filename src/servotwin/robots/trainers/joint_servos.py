@@ -125,10 +125,6 @@ class JointServos:
     armature : ndarray, shape (worlds, joints)
         Inertia of rotor and gear at each joint [kg m²].
 
-    Raises
-    ------
-    InputError
-        If a gear has play or a spring.
     """
 
     def __init__(self, own: Sequence[Joint], maps: Sequence[CommandMap], worlds: int, device: Any, seed: int,
@@ -147,19 +143,11 @@ class JointServos:
         self.armature = self._table[:, :, 4] / self._table[:, :, 0] ** 2
         self._lay_out(own)
 
-    def _check_gears(self, joint: str, numbers: Any) -> None:
-        for kind, part, word in ((Play, "half", "play"), (Elastic, "k", "an elastic gear")):
-            if (getattr(numbers.now(kind), part) > 0.0).any():
-                raise InputError(f"servo of joint {joint} of {self._name}", got=word,
-                                 allowed="a rigid gear (gear.backlash = 0): contacts of teeth and of the robot, each "
-                                         "a step late, would not come to rest; ServoDrive has them")
-
     def _numbers(self, own: Sequence[Joint], maps: Sequence[CommandMap]) -> NDArray[np.float64]:
         """Return of each joint in each world: gain, zero, stops, own inertia, control and its map, command and ends."""
         found = np.zeros((self.worlds, len(own), 13))
         for crew in self._crews:
             numbers = crew.sims._numbers
-            self._check_gears(own[crew.which[0]].name, numbers)
             crew.kind = told(own[crew.which[0]].mount).kind
             crew.ends = np.array([*numbers.travel(), *numbers.command_ends(crew.kind)])
             lower, upper, low, high, inertia = (
@@ -170,6 +158,15 @@ class JointServos:
                     mount.gain, mount.zero, lower[n], upper[n], inertia[n], one.low, one.high, one.scale, one.offset,
                     how.gain, how.zero, low[n], high[n]), axis=1)
         return found
+
+    def check_rigid(self) -> None:
+        """Raise InputError where a gear has play or a spring, for accelerations that are a step old."""
+        for crew in self._crews:
+            for kind, part, word in ((Play, "half", "play"), (Elastic, "k", "an elastic gear")):
+                if (getattr(crew.sims._numbers.now(kind), part) > 0.0).any():
+                    raise InputError(f"servo of joint {self.names[crew.which[0]]} of {self._name}", got=word,
+                                     allowed="a rigid gear (gear.backlash = 0): with accelerations of the last step "
+                                             "its teeth do not come to rest; WarpDrive and ServoDrive have them")
 
     def _lay_out(self, own: Sequence[Joint]) -> None:
         wp, count, worlds = self._wp, len(own), self.worlds

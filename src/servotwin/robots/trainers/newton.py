@@ -158,6 +158,7 @@ class DriveServo(DriveBase):
         maps = [CommandMap(name, -math.inf, math.inf) for name in robot.names]
         self._device, self._count = device, count
         self._servos = JointServos(own, maps, worlds, device, robot.seed, "a robot", robot.vary)
+        self._servos.check_rigid()
         if np.ptp(self._servos.armature, axis=0).any():
             raise InputError("vary of a robot's servos", got="the inertia of rotors", allowed="all else: worlds of a "
                              "builder have one armature")

@@ -13,6 +13,7 @@ from servotwin.robots.places import load_mujoco
 from servotwin.robots.servos.command_map import CommandMap
 from servotwin.robots.servos.coupling import FORCES
 from servotwin.robots.servos.mount import PASSIVE, Mount, joints_of, treat_friction
+from servotwin.robots.servos.record import LEAST, set_iterations
 from servotwin.robots.servos.servo_groups import check_options, maps_of, put_into_model
 from servotwin.robots.trainers.joint_servos import JointServos, load_warp, varied
 
@@ -32,7 +33,8 @@ class WarpDrive:
     without it, by contacts and other servos as they were a step before; the torques that let the joints gain the
     speeds that the servos gain are in `qfrc_applied` for the step, where nobody else may put any for these joints. That
     is of first order in the step. Where `forward` is called too, servos advance once in a step all the same: a world
-    whose time has not passed begins the step anew. A servo whose gear has play or a spring is refused.
+    whose time has not passed begins the step anew. Where a gear has play or a spring the joint has the inertia of its
+    output wheel alone, and the solver's iterations are raised to 10 and 20 as by `ServoDrive`.
 
     Parameters
     ----------
@@ -96,6 +98,7 @@ class WarpDrive:
         self.vary = dict(zip(self.joints, varied(vary, self.joints), strict=True))
         self._servos = JointServos(own, maps, worlds, self._device, seed, "a WarpDrive", list(self.vary.values()))
         self.torque = self._servos.torque
+        set_iterations(model, own, "raised")
         put_into_model(mujoco, model, own, np.median(self._servos.armature, axis=0))
         self._changed = [joint.speed_at for joint in own], [joint.actuator for joint in own if joint.actuator >= 0]
         count, nv = len(own), int(model.nv)
@@ -121,6 +124,8 @@ class WarpDrive:
             self._carry(model, f"actuator_{field}", actuators)
         for field in _WEIGHTS:
             self._carry(model, field, slice(None))
+        for name in LEAST:
+            setattr(model.opt, name, max(getattr(model.opt, name), getattr(self._model.opt, name)))
         if np.ptp(self._servos.armature, axis=0).any():
             whole = np.tile(model.dof_armature.numpy()[:1], (self.worlds, 1))
             whole[:, dofs] = self._servos.armature
