@@ -11,12 +11,13 @@ from servotwin.robots import Mount, ServoDrive
 newton = pytest.importorskip("newton", reason="newton is not installed: it needs an environment of its own")
 import warp as wp  # noqa: E402
 
-from servotwin.robots.trainers.newton import DriveServo, add_servos  # noqa: E402
+from servotwin.robots.trainers.newton import DriveServo, add_servos, servos_in  # noqa: E402
 
 wp.set_device("cpu")
 pytestmark = pytest.mark.slow
 SERVO = st.PulseServo(st.load_servo("hitec-hs-755hb"))
 BUS = st.DigitalServo(st.load_servo("feetech-sts3215-12v").replace({"gear.backlash": 0.0}))
+PLAY = st.DigitalServo(st.load_servo("feetech-sts3215-12v"))
 TURNED = Mount(SERVO, zero=0.3, direction=-1, ratio=1.5)
 ARM = """<mujoco><compiler angle="radian"/><option timestep="{step}"/><worldbody>{floor}<body name="base">
 <body name="upper" pos="0 0 .1"><joint name="shoulder" axis="0 -1 0"{own}/>
@@ -113,6 +114,34 @@ def test_an_arm_that_presses_on_the_floor_rests_where_servo_drive_has_it():
     assert np.abs(run.actuator.drive.torque.numpy()).min() > 1.0  # N m
 
 
+@pytest.mark.parametrize("servo", [BUS, PLAY], ids=["rigid", "play"])
+def test_servos_within_the_solver_have_contacts_and_play(servo):
+    def run(step, duration, goals, floor=""):
+        robot, scene = newton.ModelBuilder(), newton.ModelBuilder()
+        for builder in (robot, scene):
+            newton.solvers.SolverMuJoCo.register_custom_attributes(builder)
+        robot.add_mjcf(arm(floor=floor))
+        scene.replicate(robot, 2)
+        model = scene.finalize(device="cpu")
+        solver = newton.solvers.SolverMuJoCo(model)
+        drive = servos_in(solver, {"shoulder": servo, "elbow": servo}, timestep=step)
+        state, after, control, angles = model.state(), model.state(), model.control(), []
+        for k in range(round(duration / step)):
+            places = zip(drive.joints, goals(k * step), strict=True)
+            drive.command({name: wp.array(np.full(2, goal, np.float32)) for name, goal in places})
+            solver.step(state, after, control, None, step)
+            state, after = after, state
+            angles.append(state.joint_q.numpy()[-2:].copy())
+        return np.array(angles)
+
+    servos = {"shoulder": servo, "elbow": servo}
+    true = by_servo_drive(servos, 2.5e-4, 0.8)
+    assert off(run(2e-3, 0.8, goals), true, 8) <= 2e-3
+    if servo is BUS:
+        pressed = by_servo_drive(servos, 2e-3, 1.0, lambda time: [-0.9, 0.0], FLOOR)
+        assert np.abs(run(2e-3, 1.0, lambda time: [-0.9, 0.0], FLOOR) - pressed).max() <= 8e-3
+
+
 def test_worlds_begin_anew_by_a_mask_and_do_not_touch_each_other():
     run, draw = Run({"shoulder": SERVO, "elbow": SERVO}, worlds=3), np.random.default_rng(0)
     latest = 0  # step at which the second world began
@@ -163,6 +192,8 @@ def test_mistakes_are_said_in_a_line(own, servos, options, error, words):
 
 
 def test_what_is_missing_is_said_in_a_line():
+    with pytest.raises(InputError, match=r"^solver of servos: got 'int'"):
+        servos_in(3, {"shoulder": SERVO}, timestep=2e-3)
     builder = newton.ModelBuilder()
     with pytest.raises(InputError, match=r"^DriveServo: got 'add_actuator\(DriveServo\)'"):
         builder.add_actuator(DriveServo, 0)

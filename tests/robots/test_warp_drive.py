@@ -209,10 +209,16 @@ def test_joints_without_an_actuator_are_told_by_name():
             drive.command({"a": wrong})
     with pytest.raises(InputError, match=r"^worlds of a WarpDrive: got 'an array of shape \(3,\)', allowed: a"):
         drive.reset(np.ones(3, bool))
+    with pytest.raises(InputError, match=r"^command of joint a: got 'an array of float64, shape \(2,\)'"):
+        drive.command({"a": wp.zeros(2, dtype=wp.float64)})
     drive.command({"a": [0.3, 0.7]})
     for _ in range(300):
         mjw.step(own, data)
     assert data.qpos.numpy()[:, 0] == pytest.approx([0.3, 0.7], abs=0.03)
+    drive.command({"a": wp.array(np.float32([0.7, 9.0]))})
+    for _ in range(300):
+        mjw.step(own, data)
+    assert data.qpos.numpy()[:, 0] == pytest.approx([0.7, SERVO.value("stops.upper_angle")], abs=0.05)
 
 
 def test_a_model_that_was_there_before_gets_rotors_and_no_other_force():

@@ -266,7 +266,7 @@ class JointServos:
         wp.launch(kernels.push, dim=self.worlds, inputs=[per_torque, self.speed_at, count, self._wanted, into])
 
     def command(self, places: Mapping[str, Any]) -> None:
-        """Tell joints without an actuator where to go [rad, m], a number or an array (worlds,) each.
+        """Tell joints without an actuator where to go [rad, m]: a number each, or an array (worlds,), of Warp in place.
 
         Raises
         ------
@@ -278,6 +278,13 @@ class JointServos:
             if k < 0 or self._has_actuator[k]:
                 raise InputError(f"command of joint {name}", allowed="joints with a servo and without an actuator")
             crew = next(crew for crew in self._crews if k in crew.which)
+            if isinstance(values, self._wp.array):
+                if values.shape != (self.worlds,) or values.dtype is not self._wp.float32:
+                    raise InputError(f"command of joint {name}", got=f"an array of {values.dtype.__name__}, shape "
+                                     f"{values.shape}", allowed=f"one of float32, shape ({self.worlds},)")
+                self._wp.launch(self._kernels.command, dim=self.worlds, device=self._device, inputs=[
+                    values, k, crew.which.index(k), len(crew.which), self._numbers_of, crew.lanes["command"]])
+                continue
             gain, zero, low, high = self._table[:, k, [9, 10, 11, 12]].T
             place = numbers_of(f"command of joint {name}", values, np.arange(self.worlds))
             column = np.clip((place - zero) / gain, low, high)

@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from servotwin.errors import InputError, MissingExtraError, UnknownNameError
+from servotwin.robots.places import load_mujoco
 from servotwin.robots.servos.command_map import CommandMap
 from servotwin.robots.servos.mount import PASSIVE, Joint, Mount
 from servotwin.robots.trainers.joint_servos import JointServos, armature_of, varied
+from servotwin.robots.trainers.warp_drive import WarpDrive
 
 try:
     import newton
@@ -85,19 +87,61 @@ def add_servos(builder: Any, servos: Mapping[str, Model | Mount], *, joint_frict
         builder.add_actuator(DriveServo, dof, pos_index=position, place=float(k), robot=robot)
 
 
-def _place(builder: Any, name: str) -> tuple[int, int]:
-    """Return the places of a joint among positions and among velocities."""
-    labels = list(builder.joint_label)
-    found = [k for k, label in enumerate(labels) if label == name] or [
-        k for k, label in enumerate(labels) if label.rsplit("/", 1)[-1] == name]
+def servos_in(solver: Any, servos: Mapping[str, Model | Mount], *, timestep: float, joint_friction: str = "refuse",
+              vary: Mapping[str, Any] | None = None, seed: int = 0) -> WarpDrive:
+    """Return servos at joints within a `SolverMuJoCo`, instead of drives of Newton's: gears may have play there.
+
+    `WarpDrive.command` tells them where to go, by the names that its attribute `joints` has. No other actuator and no
+    target may be at these joints.
+
+    Parameters
+    ----------
+    solver : newton.solvers.SolverMuJoCo
+        On MuJoCo Warp.
+    servos : mapping of str to Model or Mount
+        By the label of the joint in the first world, or by its last part, behind a slash.
+    timestep : float
+        Of each `solver.step` [s].
+    joint_friction, vary, seed
+        As of `WarpDrive`.
+
+    Raises
+    ------
+    InputError
+        On bad input: there is no such joint, or the solver runs on MuJoCo's own processor code.
+    """
+    if getattr(solver, "mjw_data", None) is None:
+        raise InputError("solver of servos", got=type(solver).__name__, allowed="SolverMuJoCo on MuJoCo Warp")
+    mujoco = load_mujoco()
+    labels = {solver.model.joint_label[own]: mujoco.mj_id2name(solver.mj_model, mujoco.mjtObj.mjOBJ_JOINT, k)
+              for k, own in enumerate(solver.mjc_jnt_to_newton_jnt.numpy()[0].tolist()) if own >= 0}
+    found = {labels[_label(list(labels), name)]: servo for name, servo in servos.items()}
+    drive = WarpDrive(solver.mj_model, found, solver.mjw_data.nworld, joint_friction=joint_friction, vary=vary,
+                      timestep=timestep, device=str(solver.model.device), seed=seed)
+    drive.attach(solver.mjw_model)
+    return drive
+
+
+def _label(labels: list[str], name: str) -> str:
+    """Return the label that a name means: a whole one, or its last part."""
+    found = [label for label in labels if label == name] or [
+        label for label in labels if label.rsplit("/", 1)[-1] == name]
     if not found:
         raise UnknownNameError("joint", name, labels)
     if len(found) > 1:
-        raise InputError(f"joint {name}", got=", ".join(labels[k] for k in found), allowed="the whole label of one")
-    if builder.joint_type[found[0]] not in (newton.JointType.REVOLUTE, newton.JointType.PRISMATIC):
-        raise InputError(f"joint {name}", got=newton.JointType(builder.joint_type[found[0]]).name.lower(),
+        raise InputError(f"joint {name}", got=", ".join(found), allowed="the whole label of one")
+    return found[0]
+
+
+def _place(builder: Any, name: str) -> tuple[int, int]:
+    """Return the places of a joint among positions and among velocities."""
+    labels = list(builder.joint_label)
+    k = labels.index(_label(labels, name))
+    kind = newton.JointType(builder.joint_type[k])
+    if kind not in (newton.JointType.REVOLUTE, newton.JointType.PRISMATIC):
+        raise InputError(f"joint {name}", got=kind.name.lower(),
                          allowed="revolute or prismatic: one servo moves one degree of freedom")
-    return int(builder.joint_q_start[found[0]]), int(builder.joint_qd_start[found[0]])
+    return int(builder.joint_q_start[k]), int(builder.joint_qd_start[k])
 
 
 class DriveServo(DriveBase):

@@ -181,7 +181,7 @@ class WarpDrive:
         self._servos.reset(worlds)
 
     def command(self, places: Mapping[str, Any]) -> None:
-        """Tell joints without an actuator where to go [rad, m], a number or an array (worlds,) each.
+        """Tell joints without an actuator where to go [rad, m]: a number each, or an array (worlds,), of Warp in place.
 
         Raises
         ------
