@@ -123,8 +123,7 @@ class JointServos:
     torque : warp.array, shape (worlds, joints)
         Of the servos in the latest step, at the joints [N m].
     armature : ndarray, shape (worlds, joints)
-        Inertia of rotor and gear at each joint [kg m²].
-
+        Inertia of rotor and gear at each joint [kg m²]; of the output wheel alone where the gear has play or a spring.
     """
 
     def __init__(self, own: Sequence[Joint], maps: Sequence[CommandMap], worlds: int, device: Any, seed: int,

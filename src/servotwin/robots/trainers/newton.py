@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -73,17 +74,15 @@ def add_servos(builder: Any, servos: Mapping[str, Model | Mount], *, joint_frict
     mounts = [given if isinstance(given, Mount) else Mount(given) for given in servos.values()]
     places = [_place(builder, name) for name in servos]
     robot = _Robot(list(servos), mounts, varied(vary, list(servos)), seed)
-    for k, (name, mount, (position, dof)) in enumerate(zip(servos, mounts, places, strict=True)):
-        for field, word in _FRICTION.items():
-            own = getattr(builder, field)
-            if joint_friction == "clear":
-                own[dof] = 0.0
-            elif joint_friction == "refuse" and own[dof] != 0.0:
-                raise InputError(f"{word} of joint {name}", got=own[dof], allowed="0, for friction is the servo's: "
-                                 "joint_friction='clear' sets it so, 'keep' leaves it as the bearing's")
-        for field in _TARGETS:
+    armature = [armature_of(mount) for mount in mounts]
+    for (field, word), (name, (_, dof)) in product(_FRICTION.items(), zip(servos, places, strict=True)):
+        if joint_friction == "refuse" and getattr(builder, field)[dof] != 0.0:
+            raise InputError(f"{word} of joint {name}", got=getattr(builder, field)[dof], allowed="0, for friction is "
+                             "the servo's: joint_friction='clear' sets it so, 'keep' leaves it as the bearing's")
+    for k, (position, dof) in enumerate(places):
+        for field in (*_TARGETS, *(_FRICTION if joint_friction == "clear" else ())):
             getattr(builder, field)[dof] = 0.0
-        builder.joint_armature[dof] = armature_of(mount)
+        builder.joint_armature[dof] = armature[k]
         builder.add_actuator(DriveServo, dof, pos_index=position, place=float(k), robot=robot)
 
 
