@@ -14,6 +14,12 @@ import torch
 import warp as wp
 from mjlab.actuator import BuiltinPositionActuatorCfg
 from mjlab.entity import EntityArticulationInfoCfg, EntityCfg
+from mjlab.envs import ManagerBasedRlEnv, ManagerBasedRlEnvCfg
+from mjlab.envs.mdp import joint_pos_rel, time_out
+from mjlab.envs.mdp.actions import JointPositionActionCfg
+from mjlab.managers.observation_manager import ObservationGroupCfg, ObservationTermCfg
+from mjlab.managers.scene_entity_config import SceneEntityCfg
+from mjlab.managers.termination_manager import TerminationTermCfg
 from mjlab.scene import Scene, SceneCfg
 from mjlab.sim import MujocoCfg, Simulation, SimulationCfg
 
@@ -111,6 +117,37 @@ def test_servos_vary_from_world_to_world_by_the_seed_of_pytorch():
     assert np.ptp(found[:, 0]) > 1e-3
     assert np.array_equal(ends(1, vary=vary), found)
     assert not np.array_equal(ends(2, vary=vary), found)
+
+
+def test_an_environment_decimates_resets_and_looks_as_it_does():
+    arm = EntityCfg(spec_fn=lambda: mujoco.MjSpec.from_string(ARM), articulation=EntityArticulationInfoCfg(
+        actuators=(ServoActuatorCfg(target_names_expr=(".*",), servo=BUS),)))
+    cfg = ManagerBasedRlEnvCfg(
+        decimation=10, scene=SceneCfg(num_envs=3, entities={"arm": arm}), seed=1, episode_length_s=0.4,
+        sim=SimulationCfg(mujoco=MujocoCfg(timestep=2e-3)),
+        observations={"actor": ObservationGroupCfg(terms={"joints": ObservationTermCfg(
+            func=joint_pos_rel, params={"asset_cfg": SceneEntityCfg("arm")})})},
+        actions={"joints": JointPositionActionCfg(entity_name="arm", actuator_names=(".*",), use_default_offset=False)},
+        terminations={"time_out": TerminationTermCfg(func=time_out, time_out=True)})
+    env = ManagerBasedRlEnv(cfg, device="cpu")
+    env.reset()
+    found, ended = [], 0
+    for k in range(45):  # episodes of 20 steps
+        _, _, _, timed_out, _ = env.step(torch.tensor([goals(10 * (k % 20))] * 3, dtype=torch.float32))
+        ended += int(timed_out.sum())
+        found.append(env.scene["arm"].data.joint_pos.numpy().copy())
+    model = mujoco.MjModel.from_xml_string(CONTROLLED)
+    drive = WarpDrive(model, {"shoulder": BUS, "elbow": BUS})
+    own, data = mjw.put_model(model), mjw.put_data(model, mujoco.MjData(model), nworld=1)
+    drive.attach(own)
+    for k in range(19):
+        data.ctrl.assign(np.float32([goals(10 * k)]))
+        for _ in range(10):
+            mjw.step(own, data)
+        for at in (k, 20 + k):
+            if at < 45:
+                assert found[at] == pytest.approx(np.tile(data.qpos.numpy(), (3, 1)), abs=1e-3)
+    assert ended == 6
 
 
 def test_a_delay_of_mjlab_delays_the_command():
