@@ -350,12 +350,12 @@ def test_a_servo_that_falls_silent_ends_the_run_and_the_others_go_limp(kind):
 @DIALECTS
 def test_an_answer_that_comes_late_is_none_to_the_next_question(kind):
     def late(frame):
-        time.sleep(0.03)
+        time.sleep(0.06)
         return frame
 
     with peers.Bus(kind, [1], peers.Fixed(STILL)) as peer:
         peer.harm = late
-        rig = rig_on(peer, patience=0.02)
+        rig = rig_on(peer, patience=0.04)
         peer.harm = lambda frame: frame
         memory = bytes(peer.servos[1].memory)
         rig.close()
