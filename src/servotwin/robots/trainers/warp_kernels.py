@@ -131,7 +131,7 @@ def place(qpos: wp.array2d[float], mask: wp.array[wp.bool], which: wp.array[int]
 
 @wp.kernel
 def command(places: wp.array[float], k: int, n: int, count: int, numbers: wp.array3d[float], command: wp.array[float]):
-    """Take the places that a joint of all worlds is told to go to."""
+    """Take the places that a joint of all worlds is commanded to go to."""
     world = wp.tid()
     own = numbers[world, k]
     command[world * count + n] = within_commands(own, (places[world] - own[10]) / own[9])
