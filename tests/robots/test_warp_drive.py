@@ -262,10 +262,10 @@ def test_what_lanes_remembered_is_put_back_on_a_gpu_by_columns_and_by_rings():
 
     again, servos, lanes = wp.array(np.array([False, True]), dtype=wp.bool), 3, 6
     for shape, each, lane_of in (((4, lanes), 0, lambda at: at[1]), ((lanes, 2, 5), 10, lambda at: at[0])):
-        for kernel, dtype in ((kernels.take_reals_back, np.float32), (kernels.take_wholes_back, np.int32)):
+        for dtype in (np.float32, np.int32):
             before, now = (np.arange(np.prod(shape)).astype(dtype) + shift for shift in (0, 1000))
             given = wp.array(now)
-            wp.launch(kernel, dim=now.size, inputs=[again, servos, lanes, each, wp.array(before), given])
+            wp.launch(kernels.take_back, dim=now.size, inputs=[again, servos, lanes, each, wp.array(before), given])
             back = np.array([lane_of(at) >= servos for at in np.ndindex(shape)])
             assert np.array_equal(given.numpy(), np.where(back, before, now))
 
@@ -323,6 +323,8 @@ def test_data_of_other_worlds_are_refused():
     (lambda model: WarpDrive(model, {}), InputError, "^servos of a WarpDrive"),
     (lambda model: WarpDrive(model, {"z": SERVO}), (InputError, UnknownNameError), "z"),
     (lambda model: WarpDrive(model, {"a": SERVO}, worlds=0), InputError, "^worlds: got 0"),
+    (lambda model: WarpDrive(model, {"a": SERVO}, timestep=0.0), InputError, "^timestep: got 0.0"),
+    (lambda model: WarpDrive(model, {"a": SERVO}, timestep=np.nan), InputError, "^timestep: got nan"),
     (lambda model: WarpDrive(model, {"a": SERVO}, vary=3), InputError, "^vary: got 'int'"),
     (lambda model: WarpDrive(model, {"a": SERVO}, vary={"z": {}}), UnknownNameError, "^unknown joint with a servo"),
     (lambda model: WarpDrive(model, {"a": SERVO}).command({"a": 0.3}), InputError, "^command of joint a")])

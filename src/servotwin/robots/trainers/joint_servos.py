@@ -63,8 +63,8 @@ class _Crew:
             return
         for name, column, before in self._columns(wp):
             each = column.size // self.mask.size if name == "rings" else 0
-            back = kernels.take_reals_back if column.dtype is wp.float32 else kernels.take_wholes_back
-            wp.launch(back, dim=column.size, inputs=[again, len(self.which), self.mask.size, each, before, column])
+            wp.launch(kernels.take_back, dim=column.size, inputs=[
+                again, len(self.which), self.mask.size, each, before, column])
 
     def keep(self, wp: Any) -> None:
         """Keep how lanes stand before a step."""

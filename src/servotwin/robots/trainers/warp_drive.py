@@ -16,6 +16,7 @@ from servotwin.robots.servos.mount import PASSIVE, Mount, joints_of, treat_frict
 from servotwin.robots.servos.record import LEAST, set_iterations
 from servotwin.robots.servos.servo_groups import check_options, maps_of, put_into_model
 from servotwin.robots.trainers.joint_servos import JointServos, load_warp, varied
+from servotwin.units import is_finite
 
 if TYPE_CHECKING:
     from servotwin.models import Model
@@ -55,7 +56,7 @@ class WarpDrive:
     device : str, optional
         "cpu" or "cuda:0", ...; that on which Warp is unless given.
     seed : int
-        Of all noise.
+        Of all noise, and of what varies.
 
     Attributes
     ----------
@@ -85,6 +86,8 @@ class WarpDrive:
             raise InputError("servos of a WarpDrive", got=servos, allowed="a mapping of joints to models")
         if isinstance(worlds, bool) or not isinstance(worlds, int) or worlds < 1:
             raise InputError("worlds", got=worlds, allowed="a whole number, at least 1")
+        if timestep is not None and not (is_finite(timestep) and timestep > 0.0):
+            raise InputError("timestep", got=timestep, allowed="a positive number of seconds")
         if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
             raise InputError("integrator of the model", got="RK4", allowed="Euler, implicit or implicitfast")
         own = joints_of(model, servos)
@@ -127,7 +130,7 @@ class WarpDrive:
         for name in LEAST:
             setattr(model.opt, name, max(getattr(model.opt, name), getattr(self._model.opt, name)))
         if np.ptp(self._servos.armature, axis=0).any():
-            whole = np.tile(model.dof_armature.numpy()[:1], (self.worlds, 1))
+            whole = np.broadcast_to(model.dof_armature.numpy(), (self.worlds, model.nv)).copy()
             whole[:, dofs] = self._servos.armature
             model.dof_armature = self._wp.array(whole.astype(np.float32), dtype=float, device=self._device)
         model.callback.control = self.control

@@ -3,6 +3,8 @@
 Warp reads types from annotations, so that these stay as they are.
 """
 
+from typing import Any
+
 import warp as wp
 
 
@@ -166,18 +168,8 @@ def world_of(k: int, count: int, lanes: int, each: int):
 
 
 @wp.kernel
-def take_reals_back(again: wp.array[wp.bool], count: int, lanes: int, each: int, before: wp.array[float],
-                    now: wp.array[float]):
+def take_back(again: wp.array[wp.bool], count: int, lanes: int, each: int, before: wp.array[Any], now: wp.array[Any]):
     """Let numbers of some worlds be what they were before."""
-    k = wp.tid()
-    if again[world_of(k, count, lanes, each)]:
-        now[k] = before[k]
-
-
-@wp.kernel
-def take_wholes_back(again: wp.array[wp.bool], count: int, lanes: int, each: int, before: wp.array[int],
-                     now: wp.array[int]):
-    """Let whole numbers of some worlds be what they were before."""
     k = wp.tid()
     if again[world_of(k, count, lanes, each)]:
         now[k] = before[k]
