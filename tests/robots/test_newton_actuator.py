@@ -100,6 +100,13 @@ def test_joints_are_those_of_servo_drive_by_steps_of_first_order(servos, solver)
     assert at_four >= 1.4 * at_two
 
 
+@pytest.mark.parametrize("servo", [SERVO, BUS], ids=["pulses", "bus"])
+def test_accelerations_of_the_last_step_less_the_servos_are_those_of_inverse_dynamics(servo):
+    found, other = (Run({"shoulder": servo, "elbow": servo}, solver=solver).run(2e-3, 0.5)
+                    for solver in ("SolverMuJoCo", "SolverFeatherstone"))
+    assert np.abs(found - other).max() <= 3e-4
+
+
 def test_an_arm_that_presses_on_the_floor_rests_where_servo_drive_has_it():
     def into_the_floor(time):
         return [-0.9, 0.0]
