@@ -583,3 +583,42 @@ def test_goals_after_a_silence_are_those_of_a_stepped_goal(latency, tick):
         assert many["output_angle"] == pytest.approx(angle, abs=1e-12)
         assert threaded.column("stand.y.q") == pytest.approx(angle, abs=1e-9)
     assert 0.1 < limp / count < 0.7
+
+
+def test_each_reset_gives_a_lane_another_servo(servo):
+    """By its seed and the number of its resets: whatever the number of lanes, and what others do."""
+    variants = {"motor.torque_constant": np.linspace(2e-3, 5e-3, 50), "load.inertia": np.linspace(1e-4, 2e-3, 50)}
+    model, lanes = st.PulseServo(servo), 40
+    sims = st.VectorSimulator(model, lanes, seed=4, variants=variants)
+    few = st.VectorSimulator(model, 5, seed=4, variants=variants)
+    first, resets = sims.variant, np.zeros(lanes, int)
+    for k in range(3):
+        for each in (sims, few):
+            some = np.arange(k, len(each), 2)
+            each.reset(command_angle=0.5, lanes=some)
+            each.advance(0.05, command_angle=0.8, external_torque=0.02)
+        resets[k::2] += 1
+    assert np.array_equal(few["output_angle"], sims["output_angle"][:5])
+    assert np.array_equal(few.variant, sims.variant[:5])
+    assert (sims.variant == first).sum() < lanes // 4
+    own = st.VectorSimulator(model, lanes, seed=4, parameters={
+        name: values[sims.variant] for name, values in variants.items()})
+    for k in range(3):
+        own.reset(command_angle=0.5, lanes=np.arange(k, lanes, 2))
+        own.advance(0.05, command_angle=0.8, external_torque=0.02)
+    last = np.arange(0, lanes, 2)  # since their last reset they are what they are now
+    assert sims["output_angle"][last] == pytest.approx(own["output_angle"][last], abs=1e-12)
+
+
+@pytest.mark.parametrize(("variants", "more", "words"), [
+    ({}, {}, "^variants: got {}"), ([1.0], {}, "^variants: got"),
+    ({"motor.torque_constant": 3e-3}, {}, r"^variants: motor.torque_constant: got 'an array of shape \(\)'"),
+    ({"motor.torque_constant": [3e-3], "load.inertia": [1e-3, 2e-3]}, {}, "^variants: motor.torque_constant: got"),
+    ({"motor.torque_constant": []}, {}, "^variants: motor.torque_constant: got"),
+    ({"load.inertia": [1e-3]}, {"parameters": {"load.inertia": 1e-3}}, "^variants: load.inertia: got 'a parameter of"),
+    ({"motor.color": [1.0]}, {}, "motor.color")])
+def test_variants_that_are_none(servo, variants, more, words):
+    with pytest.raises(ServotwinError, match=words):
+        st.VectorSimulator(st.PulseServo(servo), 3, variants=variants, **more)
+    with pytest.raises(InputError, match="^variant: got 'a simulator without'"):
+        _ = st.VectorSimulator(st.PulseServo(servo), 3).variant

@@ -149,3 +149,41 @@ def test_simulators_that_no_gpu_has(driver):
         st.VectorSimulator(model, 2, device="tpu")
     with pytest.raises(InputError, match=r"^lanes one a thread: got 'a pendulum'"):
         st.VectorSimulator(model, 2, load=st.loads.Pendulum(mass=0.1, length=0.1), device="cuda")
+
+
+VARIANTS = st.distributions.drawn_parameters(
+    {"motor.torque_constant": "normal:5%", "friction.coulomb_torque_forward": "uniform:50%",
+     "load.inertia": "uniform:5..40kg cm2", "load.torque": "uniform:-0.02..0.02Nm"},
+    st.PulseServo(st.load_servo(PLAIN)), 300, 1)
+
+
+@pytest.mark.parametrize("model", [None, pytest.param(st.DigitalServo(st.load_servo(GOALS)), marks=pytest.mark.slow)])
+def test_a_reset_gives_a_lane_the_same_servo_there_and_here(shared, model):
+    """Inertias that were imposed stay, and what was saved there continues here."""
+    variants = {name: values for name, values in VARIANTS.items() if model is None or name.startswith("load.")}
+    here, there = both(shared, model, variants=variants, load=None)
+    rng, within, every = np.random.default_rng(2), 1e-11 if model is None else 1e-9, np.arange(LANES)
+    seen = []
+    for k in range(8):
+        angles, some = rng.uniform(0.4, 1.1, LANES), rng.random(LANES) < 0.4
+        here.advance(0.0137, command_angle=angles, external_torque=0.01)
+        there.advance(0.0137, command_angle=angles if k % 2 else Guest(angles), external_torque=0.01)
+        if k in (2, 4):
+            here.reset(command_angle=angles[some], lanes=some)
+            there.reset(command_angle=Guest(angles), lanes=Guest(some))
+        if k == 3:
+            here.set(load_inertia=2e-3, lanes=every[::2])
+            there.set(load_inertia=2e-3, lanes=every[::2])
+        if k == 5:
+            here.reset(output_angle=0.5)
+            there.reset(output_angle=0.5)
+        assert there.variant.read().tolist() == here.variant.tolist()
+        seen.append(here.variant)
+        same(here, there, within=within)
+    assert len(np.unique(seen)) > LANES
+    memory = there.save()
+    assert np.array_equal(memory.numbers["motor"]["K"], here.save().numbers["motor"]["K"])
+    here.restore(memory)
+    for each in (here, there):
+        each.advance(0.05)
+    same(here, there, within=within)

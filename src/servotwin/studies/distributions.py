@@ -13,6 +13,7 @@ from servotwin.studies.kinds import (
     Truncated,
     Uniform,
 )
+from servotwin.studies.plan import drawn_parameters
 
 __all__ = ["Affine", "Choice", "Distribution", "LogNormal", "Normal", "Offset", "Relative", "Triangular", "Truncated",
-           "Uniform", "stated"]
+           "Uniform", "drawn_parameters", "stated"]

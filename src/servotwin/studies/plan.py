@@ -198,7 +198,21 @@ def drawn(distributions: Mapping[str, Distribution], lanes: int, seed: int, samp
 
 
 def drawn_parameters(vary: Mapping[str, Distribution | str], model: Model, lanes: int, seed: int) -> dict[str, Column]:
-    """Return the parameters of lanes, as `simulate_many` takes them, that follow from what is drawn, within ranges.
+    """Return servos that are drawn, within ranges, as `parameters` of `simulate_many`, or `variants`, take them.
+
+    Parameters
+    ----------
+    vary : mapping of str to Distribution or str
+        By dotted name, as of `sweep`; what follows from a number that is drawn is drawn with it.
+    model : Model
+    lanes : int
+        How many servos.
+    seed : int
+
+    Returns
+    -------
+    dict of str to ndarray, shape (lanes,)
+        Values (SI) by dotted name.
 
     Raises
     ------

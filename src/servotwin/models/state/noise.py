@@ -61,6 +61,18 @@ def uniform(seed: int, number: int) -> float:
     return (scrambled(a ^ 0x2545F491) + 0.5) * _UNIT
 
 
+def chosen(seed: int, number: int, count: int) -> int:
+    """Return which of so many is drawn by its number, 0 the first, independent of `gaussian` and `uniform`.
+
+    Examples
+    --------
+    >>> [chosen(7, number, 100) for number in range(4)]
+    [22, 1, 98, 98]
+    """
+    a = scrambled(number + scrambled(seed + scrambled(seed >> 32)))
+    return scrambled(a ^ 0x27D4EB2F) % count
+
+
 def drawn(seed: int, number: int, low: float, high: float) -> float:
     """Return a draw from low to high, both positive, evenly over their logarithm.
 

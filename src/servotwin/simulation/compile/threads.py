@@ -82,14 +82,15 @@ def _leaves(path: str, kind: Any) -> Iterator[tuple[str, Any]]:
 
 
 _ADDRESSES = ("numbers", "arcs", "chips", "programs", "wirings", "curve", "seeds", "bare", "command", "torque",
-              "followed", "total", "angle", "speed", "inertia", "mask", "reals", "wholes", "rings", "status", "seen",
-              "left", "count")
+              "followed", "total", "angle", "speed", "inertia", "mask", "hung", "draws", "variant", "reals", "wholes",
+              "rings", "status", "seen", "left", "count")
 
 
 @cache
 def table_type(floats: bool) -> type[Any]:
     """Return the struct that a text is called with: addresses, on the device where it runs there."""
-    order = ("lanes", *_ADDRESSES[:4], "program_step", "wirings", "curve", "curve_rows", *_ADDRESSES[6:], "kind")
+    order = ("lanes", "places", "variants", *_ADDRESSES[:4], "program_step", "wirings", "curve", "curve_rows",
+             *_ADDRESSES[6:], "kind")
     fields = [(name, ctypes.c_void_p if name in _ADDRESSES else ctypes.c_int64) for name in order]
     return type("Table", (ctypes.Structure,), {"_fields_": [*fields, ("duration", ctypes.c_float if floats
                                                                      else ctypes.c_double)]})
@@ -102,18 +103,20 @@ _EXPORTED = '''#if defined(_WIN32)
 #endif'''
 _TABLE = '''
 typedef struct {
-    int64_t lanes;
+    int64_t lanes, places, variants; /* places of numbers: those of lanes, then of variants, which are the last */
     const void *numbers, *arcs, *chips, *programs; /* tiles, and records of programs */
     int64_t program_step;                          /* from the program of a lane to the next one's: 0 where it is one */
     const void *wirings;                           /* tiles: how commands are taken */
     const real *curve;                             /* of the potentiometers */
     int64_t curve_rows;
     const int64_t *seeds;
-    const real *bare;             /* a column each: torque of the load, inertias without it, reduction, period */
+    real *bare;                   /* a column each: torque of the load, inertias without it, reduction, period */
     const real *command, *torque; /* that are told: of a kind; beside the load [N m]; none of it: as before */
     real *followed, *total;       /* what that comes to: as the servo follows it; with the load's [N m] */
     const real *angle, *speed, *inertia; /* that are imposed, or where lanes begin; nan, or none of it: not */
     const uint8_t *mask;                 /* lanes of which that is said; none of it: all */
+    real *hung;                          /* inertias that were imposed; nan: none */
+    int32_t *draws, *variant;            /* how many variants a lane has had before, and which one it is */
     real *reals;                         /* a column each: what a lane remembers */
     int32_t *wholes;
     real *rings;     /* of programs, a lane after the other */
@@ -260,17 +263,41 @@ INLINED void impose(const lane_table *of, int32_t lane) {
             lose(of, lane);
             return;
         }
-        $hang(numbers, j, $output_inertia, $motor_inertia, of->inertia[lane]);
+        of->hung[lane] = of->inertia[lane];
+        $hang(numbers, j, $output_inertia, $motor_inertia, of->hung[lane]);
 $prepared    }
     $stand stand = {0};
 $stand_loads
     stand = $impose(numbers, j, &stand, of->angle ? of->angle[lane] : NAN, of->speed ? of->speed[lane] : NAN);
 $stand_stores
 }
+INLINED void copy(real *tiles, int64_t size, int64_t from, int32_t lane) {
+    real *to = tiles + lane / $tile * size + lane % $tile;
+    tiles += from / $tile * size + from % $tile;
+    for (; size > 0; size -= $tile, to += $tile, tiles += $tile)
+        *to = *tiles;
+}
+INLINED void change(const lane_table *of, int32_t lane) {
+    const int64_t n = of->lanes, tile = lane / $tile;
+    const int32_t j = lane % $tile;
+    if (of->mask && !of->mask[lane])
+        return;
+    const int64_t variant = $chosen(of->seeds[lane], ++of->draws[lane], of->variants);
+    const int64_t from = of->places - of->variants + variant;
+    of->variant[lane] = (int32_t)variant;
+    const real load_torque = $load_torque;
+    $numbers *numbers = ($numbers *)(uintptr_t)of->numbers + tile;
+$copies
+    for (int k = 0; k < $columns; k++)
+        of->bare[k * of->places + lane] = of->bare[k * of->places + from];
+    of->total[lane] += $load_torque - load_torque;
+    if (of->hung[lane] == of->hung[lane])
+        $hang(numbers, j, $output_inertia, $motor_inertia, of->hung[lane]);
+$prepared}
 ''')
 BARE = ("load_torque", "output_inertia", "motor_inertia", "reduction", "period")
 """Columns of what lanes are beside their tiles: of the load, of the shaft without it, and of frames or ticks."""
-_ENTRIES_BESIDE = ("tell", "begin", "impose", "look")
+_ENTRIES_BESIDE = ("tell", "begin", "impose", "change", "look")
 SEEN = (*Observed._fields, "time")
 """Columns of what shows of lanes."""
 _THREAD = '''
@@ -332,7 +359,8 @@ class LaneText:
     def recipe(self) -> Recipe:
         """The kernels within it."""
         never = "BY_LEGS" if self.way == PULSES_BY_ARCS else "BY_ARCS"
-        entries = tuple(f"servotwin.models.engine.one_lane:{entry}" for entry in _signatures(self))
+        entries = tuple(f"servotwin.models.{'state.noise' if entry == 'chosen' else 'engine.one_lane'}:{entry}"
+                        for entry in _signatures(self))
         return Recipe(f"lane_{self.way}{'_beside' if self.beside else ''}", entries, knows=self.flags,
                       always=PROGRAM | PWM if self.way == TICKS else 0, never=(never,), in_floats=self.floats)
 
@@ -365,6 +393,7 @@ def _signatures(own: LaneText) -> dict[str, tuple[Kind, ...]]:
         always |= {"begin": (numbers, wirings, INT64, _TABLE_OF, FLOAT64, FLOAT64)}
         always |= {"impose": (numbers, INT64, stand, FLOAT64, FLOAT64), "hang": (numbers, INT64, *[FLOAT64] * 3)}
         always |= {"prepare": (numbers, arcs, INT64)} if own.way == PULSES_BY_ARCS else {}
+        always |= {"chosen": (INT64, INT64, INT64)}
         looks = ("look_at_ticks", firm) if own.way == TICKS else ("look_at_pulses", chip)
         return {looks[0]: (numbers, INT64, _TABLE_OF, FLOAT64, FLOAT64, stand, looks[1])} | always
     if own.way == TICKS:
@@ -424,7 +453,9 @@ def _printed(own: LaneText) -> str:
         "stores": _lines(f"{place} = {path};" for path, place in places),
         "lose": _lines(f"    {place} = NAN;" for path, place in places if _MOVES.match(path))}
     if own.beside:
-        words |= {"arcs": types.record(_tile(ArcNumbers)), "wirings": types.record(_tile(Wiring))}
+        words |= {"arcs": types.record(_tile(ArcNumbers)), "wirings": types.record(_tile(Wiring)), **(
+            {"program": types.record(Record(record_of(Firmware)))} if by_ticks else
+            {"chips": types.record(_tile(Chip))})}
         around = _beside(words, names, places, by_ticks)
     else:
         around = _advancing(own, words, names, text, kinds)
@@ -452,13 +483,20 @@ def _beside(words: dict[str, Any], names: Mapping[str, str], places: Sequence[tu
     """Return the functions that let lanes begin, and look at them; noise continues where it was."""
     begun = dict(_numbers_in("firm", control.AT_START)) if by_ticks else dict(_numbers_in("now", frame.AT_START))
     kept = ("firm.draws", "now.draws")
-    bare = {name: f"of->bare[{k} * n + lane]" for k, name in enumerate(BARE)}
+    bare = {name: f"of->bare[{k} * of->places + lane]" for k, name in enumerate(BARE)}
     time = f"stand.frames * {bare['period']} + stand.time"
     shown = [f"shown.{identifier(name)}" for name in Observed._fields]
     prepared = "" if "prepare" not in names else (
         f"        {names['prepare']}(numbers, ({words['arcs']} *)(uintptr_t)of->arcs + tile, j);\n")
+    tiles = {"numbers": words["numbers"], "wirings": words["wirings"]} | ({} if by_ticks else {"chips": words["chips"]})
+    copies = [f"copy((real *)(uintptr_t)of->{name}, sizeof({kind}) / sizeof(real), from, lane);"
+              for name, kind in tiles.items()]
+    if by_ticks:
+        program = f"({words['program']} *)(uintptr_t)of->programs"
+        copies.append(f"({program})[lane] = ({program})[from];")
     return _BESIDE.substitute(
-        words, **bare, **{entry: names[entry] for entry in ("follow", "begin", "impose", "hang")}, prepared=prepared,
+        words, **bare, **{entry: names[entry] for entry in ("follow", "begin", "impose", "hang",
+        "chosen")}, prepared=prepared, copies=_lines(copies), columns=len(BARE),
         look=words["entry"], observed=words["gone"],
         memory="&stand, &firm" if by_ticks else "&stand, &now",
         rings=f"    firm.duties = of->rings + {2 * WAITING}LL * lane, firm.coming = firm.duties + {WAITING};\n"

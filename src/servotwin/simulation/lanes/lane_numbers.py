@@ -21,6 +21,7 @@ from servotwin.models.engine.cosim import INERTIA, SLACK, VOLTAGE
 from servotwin.models.engine.lanes import Lanes
 from servotwin.models.engine.memory import Memories, put_started
 from servotwin.models.state.modes import INSIDE, NOWHERE, RIGID, Vector
+from servotwin.models.state.noise import chosen
 from servotwin.models.state.records import TILE, columns_of, fields_of
 from servotwin.models.terms.elastic import Elastic
 from servotwin.models.terms.firmware import Firmware
@@ -207,6 +208,46 @@ def _in_rows(tiles: Any) -> Array:
     """Return tiles as numbers, shape (tiles, numbers of a lane, TILE)."""
     found: Array = tiles.view(np.float64).reshape(len(tiles), -1, TILE)
     return found
+
+
+class Variants:
+    """Servos of which a lane is one from reset to reset; which, follows from its seed and how many it has had before.
+
+    Attributes
+    ----------
+    columns : dict of str to ndarray, shape (n,)
+        Their parameters by dotted name.
+    draws : ndarray of int, shape (lanes,)
+        How many each lane has had before the present one.
+    """
+
+    def __init__(self, columns: Any, parameters: Mapping[str, Any], seeds: NDArray[np.int64]) -> None:
+        if not isinstance(columns, Mapping) or not columns:
+            raise InputError("variants", got=columns, allowed="a mapping of names to arrays (SI)")
+        twice = next((name for name in columns if name in parameters), None)
+        if twice is not None:
+            raise InputError(f"variants: {twice}", got="a parameter of all lanes too", allowed="one of both")
+        self.columns = {name: np.asarray(values) for name, values in columns.items()}
+        self.count = max((values.size for values in self.columns.values()), default=0)
+        for name, values in self.columns.items():
+            if values.ndim != 1 or len(values) != self.count or self.count == 0:
+                raise InputError(f"variants: {name}", got=f"an array of shape {values.shape}",
+                                 allowed="an array (n,) with a value of each servo, of one length n for all names")
+        self._seeds, self.draws = seeds, np.zeros(len(seeds), np.int64)
+
+    def of(self, which: Any) -> Indices:
+        """Return which of them lanes are now."""
+        found: Indices = np.asarray(chosen(cast("Any", self._seeds[which]), cast("Any", self.draws[which]), self.count))
+        return found
+
+    def now(self, which: Any = slice(None)) -> dict[str, NDArray[Any]]:
+        """Return the parameters of lanes as they are now."""
+        return {name: values[self.of(which)] for name, values in self.columns.items()}
+
+    def drawn(self, which: Indices) -> dict[str, NDArray[Any]]:
+        """Return those of lanes that are the next ones from now on."""
+        self.draws[which] += 1
+        return self.now(which)
 
 
 class Imposed(NamedTuple):
@@ -406,26 +447,26 @@ class LaneNumbers:
                 and np.array_equal(part.frame_period, self.frame_period[which]))
         return part if fits else None
 
-    def take(self, which: Indices, part: LaneNumbers, names: Iterable[str]) -> None:
-        """Put lanes into their places that were packed by themselves with other numbers of these names."""
+    def take(self, which: Indices, part: LaneNumbers, names: Iterable[str], of: Any = slice(None)) -> None:
+        """Put lanes of a part, or some of those, into their places; of these names they have other numbers."""
         numbers = dict(self.inputs.numbers)
         for name in names:
             column = numbers[name].copy() if name in numbers else np.full(self.count, self._now(name))
-            column[which] = part.inputs.numbers[name] if name in part.inputs.numbers else part._now(name)
+            column[which] = part.inputs.numbers[name][of] if name in part.inputs.numbers else part._now(name)
             numbers[name] = column
         self.inputs = replace(self.inputs, numbers=numbers)
         if 0 in which:
             self.inputs = replace(self.inputs, model=self.inputs.lane_model(0))
         for kept in ("chunks", "translate"):
             self.__dict__.pop(kept, None)
-        own, theirs, every = self.columns, part.columns, np.arange(part.count)
+        own, theirs, every = self.columns, part.columns, np.arange(part.count)[of]
         for there, here in ((theirs.numbers, own.numbers), (theirs.numbers, self.given), (theirs.chips, own.chips)):
             _in_rows(here)[which // TILE, :, which % TILE] = _in_rows(there)[every // TILE, :, every % TILE]
         if self.digital:
-            own.firmware[which] = theirs.firmware
-        own.torque[which] = theirs.torque
+            own.firmware[which] = theirs.firmware[of]
+        own.torque[which] = theirs.torque[of]
         for name in ("load_total", "reduction", "V_oc", "neutral"):
-            getattr(self, name)[which] = getattr(part, name)
+            getattr(self, name)[which] = getattr(part, name)[of]
         for k, values in enumerate(self.imposed):
             again = which[~np.isnan(values[which])]
             if len(again):

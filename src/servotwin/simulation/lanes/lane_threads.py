@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,8 @@ from servotwin.models.engine.batch.segments.linear_segments import ArcNumbers
 from servotwin.models.engine.memory import SAME, Memories, put_started
 from servotwin.models.engine.one_lane import FOLLOWED
 from servotwin.models.state.modes import NOWHERE, RIGID
-from servotwin.models.state.records import columns_of, mapped, rows_of, tiles_with
+from servotwin.models.state.noise import chosen
+from servotwin.models.state.records import TILE, columns_of, mapped, rows_of, tiles_with
 from servotwin.models.terms import wiring
 from servotwin.models.terms.control import WAITING
 from servotwin.models.terms.dependence import (
@@ -50,7 +51,7 @@ from servotwin.models.terms.shaft import Shaft
 from servotwin.models.terms.wiring import Wiring
 from servotwin.simulation.compile import threads
 from servotwin.simulation.compile.c_types import identifier
-from servotwin.simulation.compile.threads import PULSES_BY_ARCS, PULSES_BY_LEGS, RINGS, SEEN, TICKS, LaneText
+from servotwin.simulation.compile.threads import BARE, PULSES_BY_ARCS, PULSES_BY_LEGS, RINGS, SEEN, TICKS, LaneText
 from servotwin.simulation.lanes.cuda import Gpu, GpuArray, guest, is_guest, stream_of
 from servotwin.simulation.lanes.forms import WORDS, Terms
 from servotwin.simulation.lanes.whole_runs import nothing_yet, taken
@@ -107,6 +108,19 @@ def _wirings_of(numbers: LaneNumbers) -> NDArray[Any]:
         for column, values in zip(columns, mapped(np.ravel, chunk.model.made_of(law, math.nan)), strict=True):
             column[chunk.which] = values
     return tiles_with(Wiring, Wiring(*columns), numbers.count)
+
+
+def _bare(numbers: LaneNumbers) -> NDArray[np.float64]:
+    """Return what lanes are beside their tiles, a row for each of `threads.BARE`."""
+    shaft = columns_of(Shaft, numbers.given["shaft"], slice(numbers.count))
+    return np.array([numbers.columns.torque, shaft.J_out - numbers.load_total, shaft.J - shaft.J_out,
+                     numbers.reduction, period_of(numbers)])
+
+
+def period_of(numbers: LaneNumbers) -> NDArray[np.float64]:
+    """Return how long frames of pulses last, or ticks [s]."""
+    found: NDArray[np.float64] = numbers.columns.firmware["T_c"] if numbers.digital else numbers.frame_period
+    return found
 
 
 class OnProcessor:
@@ -215,6 +229,8 @@ class ThreadedLanes:
         "float64" or "float32": of all numbers, throughout.
     device : str
         "cpu", or "cuda" with or without ":" and the number of a GPU, where all of it stands and runs.
+    variants : LaneNumbers, optional
+        Servos of which `change` gives a lane another one.
 
     Attributes
     ----------
@@ -226,50 +242,57 @@ class ThreadedLanes:
         If lanes have what no text follows, there is no such device, or no compiler for it.
     """
 
-    def __init__(self, numbers: LaneNumbers, dtype: str = "float64", device: str = "cpu") -> None:
-        self._numbers, self.text = numbers, text_of(numbers, dtype)
+    def __init__(self, numbers: LaneNumbers, dtype: str = "float64", device: str = "cpu",
+                 variants: LaneNumbers | None = None) -> None:
+        self._numbers, self.text = numbers, text_of(variants or numbers, dtype)
         real, count = self.text.real, numbers.count
+        of = [numbers] if variants is None else [numbers, variants]
+        places = count if variants is None else -(-count // TILE) * TILE + variants.count
         names = threads.columns(self.text.way)
         self._place = {path: (kind, k) for kind, paths in zip(("reals", "wholes"), names, strict=True)
                        for k, path in enumerate(paths)}
         by_ticks = self.text.way == TICKS
         arrays = {
-            "numbers": self._typed(Numbers, numbers.columns.numbers), "seeds": numbers.columns.seeds,
+            "numbers": self._typed(Numbers, [own.columns.numbers for own in of]), "seeds": numbers.columns.seeds,
             "curve": np.ascontiguousarray(numbers.curve, real), "command": np.zeros(count, real),
             "torque": np.zeros(count, real), "reals": np.zeros((len(names[0]), count), real),
             "wholes": np.zeros((len(names[1]), count), np.int32), "status": np.zeros(count, np.int32),
             "rings": np.zeros((count if by_ticks else 0, len(RINGS), WAITING), real),
-            "wirings": self._typed(Wiring, _wirings_of(numbers)), "bare": self._bare().astype(real),
+            "wirings": self._typed(Wiring, [_wirings_of(own) for own in of]),
+            "bare": np.zeros((len(BARE), places), real),
             **{name: np.zeros(count, real) for name in ("angle", "speed", "inertia", "followed", "total")},
-            "mask": np.zeros(count, np.uint8), "seen": np.zeros((len(SEEN), count), real),
+            "mask": np.zeros(count, np.uint8), "hung": np.full(count, math.nan, real),
+            "draws": np.zeros(count, np.int32), "variant": np.zeros(count, np.int32),
+            "seen": np.zeros((len(SEEN), count), real),
             "left": np.zeros(count, np.int32), "count": np.zeros(1, np.int32)}
+        for own, first in zip(of, (0, places - of[-1].count), strict=False):
+            arrays["bare"][:, first:first + own.count] = _bare(own)
         if by_ticks:
-            programs = numbers.columns.firmware
-            arrays["programs"] = programs.astype([(name, real) for name in Firmware._fields])
+            arrays["programs"] = np.zeros(places, [(name, real) for name in Firmware._fields])
+            for own, first in zip(of, (0, places - of[-1].count), strict=False):
+                arrays["programs"][first:first + own.count] = own.columns.firmware
         else:
-            arrays["chips"] = self._typed(Chip, numbers.columns.chips)
-            arrays["arcs"] = np.zeros(len(arrays["numbers"]), rows_of(ArcNumbers, real))
+            arrays["chips"] = self._typed(Chip, [own.columns.chips for own in of])
+            arrays["arcs"] = np.zeros(-(-count // TILE), rows_of(ArcNumbers, real))
+        if variants is not None:
+            arrays["variant"][:] = chosen(cast("Any", numbers.columns.seeds), 0, variants.count)
         self._arrays, self._texts = arrays, [self.text]
         if self.text.way == PULSES_BY_ARCS:
             self._texts.append(LaneText(PULSES_BY_LEGS, self.text.flags, self.text.floats))
         self._texts.append(LaneText(self.text.way, self.text.flags, self.text.floats, beside=True))
         self._at = OnProcessor(self._texts, arrays) if device == "cpu" else OnGpu(self._texts, arrays, device)
         self._of = threads.table_type(self.text.floats)(
-            lanes=count, program_step=1, curve_rows=len(numbers.curve), **self._at.addresses)
+            lanes=count, places=places, variants=0 if variants is None else variants.count, program_step=1,
+            curve_rows=len(numbers.curve), **self._at.addresses)
         self.tell(torque=0.0)
         if self.text.way == PULSES_BY_ARCS:
             self._at.call(0, "servotwin_prepare", self._of, count)
         elif self.text.way == PULSES_BY_LEGS:
             self._of.left = None  # all lanes, not those of a list
 
-    def _bare(self) -> NDArray[np.float64]:
-        """Return what lanes are beside their tiles, a row for each of `threads.BARE`."""
-        numbers, shaft = self._numbers, columns_of(Shaft, self._numbers.given["shaft"], slice(self._numbers.count))
-        return np.array([numbers.columns.torque, shaft.J_out - numbers.load_total, shaft.J - shaft.J_out,
-                         numbers.reduction, self._period])
-
-    def _typed(self, kind: Any, tiles: NDArray[Any]) -> NDArray[Any]:
-        """Return tiles with numbers of this text's type."""
+    def _typed(self, kind: Any, parts: list[NDArray[Any]]) -> NDArray[Any]:
+        """Return tiles, one after the other, with numbers of this text's type."""
+        tiles = np.concatenate(parts)
         found = np.empty(len(tiles), rows_of(kind, self.text.real))
         found.view(self.text.real)[:] = tiles.view(np.float64)
         return found
@@ -307,6 +330,13 @@ class ThreadedLanes:
     def impose(self, *, angle: Any = None, speed: Any = None, inertia: Any = None, mask: Any = None) -> None:
         """Impose angles [rad], speeds [rad/s] and inertias of loads [kg m²] as `VectorSimulator.set` does; nan: not."""
         self._do("impose", angle=angle, speed=speed, inertia=inertia, mask=mask)
+
+    def change(self, *, mask: Any = None) -> None:
+        """Let lanes be other servos, each the next that is drawn for it; memories and inertias that were imposed stay.
+
+        Noise continues where it was.
+        """
+        self._do("change", mask=mask)
 
     def look(self) -> Any:
         """Return what shows, shape (`threads.SEEN`, lanes), in place."""
@@ -357,9 +387,7 @@ class ThreadedLanes:
 
     @property
     def _period(self) -> NDArray[np.float64]:
-        digital, columns = self.text.way == TICKS, self._numbers.columns
-        found: NDArray[np.float64] = columns.firmware["T_c"] if digital else self._numbers.frame_period
-        return found
+        return period_of(self._numbers)
 
     def put(self, which: NDArray[np.int64], memories: Memories) -> None:
         """Let some lanes remember what records say."""

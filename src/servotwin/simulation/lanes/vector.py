@@ -22,7 +22,7 @@ from servotwin.signals import Signal, constant
 from servotwin.simulation.bus import supplies_of
 from servotwin.simulation.lanes.batch import Failure
 from servotwin.simulation.lanes.inputs import LAWS, lanes_of, pick
-from servotwin.simulation.lanes.lane_numbers import LaneNumbers
+from servotwin.simulation.lanes.lane_numbers import LaneNumbers, Variants
 from servotwin.simulation.lanes.many import real_type
 from servotwin.simulation.lanes.store import SHAFT, Store
 from servotwin.simulation.lanes.whole_runs import VectorMemory, known_lowest
@@ -75,6 +75,10 @@ class VectorSimulator:
         Of what is integrated, as in `Simulator` [rad].
     watch_supply : bool
         Whether `lowest_voltage` is kept, for which lanes go from event to event: it takes six times as long.
+    variants : mapping, optional
+        Servos of which each reset gives a lane another one: arrays (n,) (SI) by dotted name, as
+        `st.distributions.drawn_parameters` and `draw` of a fit return them. `variant` is which of the n a lane is now;
+        it follows from its seed and the number of its resets.
     device : str
         "cpu", or "cuda" with or without ":" and the number of a GPU, where `VectorSimulatorOnGpu` has the lanes.
 
@@ -106,29 +110,27 @@ class VectorSimulator:
         self, model: Model, lanes: int, *, load: loads.Load | loads.Part | list[Any] | None = None,
         parameters: Mapping[str, Any] | None = None, bus: Any = None, dtype: DTypeLike = "float64",
         threads: int | None = None, seed: int = 0, accuracy: float = ACCURACY, watch_supply: bool = False,
-        device: str = "cpu",
+        variants: Mapping[str, ArrayLike] | None = None, device: str = "cpu",
     ) -> None:
-        numbers = self._laid_out(model, lanes, load, parameters, bus, seed, accuracy)
+        numbers = self._laid_out(model, seeds_of(lanes, seed), load, parameters, bus, accuracy, variants)
         self._store = Store(numbers, real_type(dtype),
                             _whole("threads", threads, 1) if threads is not None else workers_of(None),
                             own_threads(os.getpid()), bool(watch_supply))
         self._entry: CEntry | None = None
 
-    def _laid_out(self, model: Model, lanes: int, load: Any, parameters: Mapping[str, Any] | None, bus: Any, seed: int,
-                  accuracy: float) -> LaneNumbers:
+    def _laid_out(self, model: Model, seeds: NDArray[np.int64], load: Any, parameters: Mapping[str, Any] | None,
+                  bus: Any, accuracy: float, variants: Any) -> LaneNumbers:
         """Return the numbers of the lanes, or raise InputError."""
         if LAWS.get(type(model), "voltage") == "voltage":
             raise InputError("model of a VectorSimulator", got=model,
                              allowed=" or ".join(kind.__name__ for kind, law in LAWS.items() if law != "voltage"))
-        count = _whole("lanes", lanes, 1)
-        if count * _BYTES > 0.8 * memory_limit():
-            raise InputError("lanes", got=count, allowed="what fits into memory: take fewer")
-        supplies = supplies_of(bus, model, count)
-        base = _whole("seed", seed, None)
-        start = _first_command(model)
-        inputs = lanes_of(model, start, load, parameters, None, base + np.arange(count))
-        if inputs.count != count:
-            raise InputError("numbers of lanes", got=f"lanes: {count}, parameters or loads: {inputs.count}",
+        supplies = supplies_of(bus, model, len(seeds))
+        self._variants = None if variants is None else Variants(variants, parameters or {}, seeds)
+        if self._variants is not None:
+            parameters = {**(parameters or {}), **self._variants.now()}
+        inputs = lanes_of(model, _first_command(model), load, parameters, None, seeds)
+        if inputs.count != len(seeds):
+            raise InputError("numbers of lanes", got=f"lanes: {len(seeds)}, parameters or loads: {inputs.count}",
                              allowed="arrays of one number for each lane")
         return LaneNumbers(inputs, accuracy_of(accuracy), supplies)
 
@@ -162,6 +164,22 @@ class VectorSimulator:
         for some in self._store.sets:
             found[some.which] = some.kernel
         return found
+
+    @property
+    def variant(self) -> Any:
+        """Which of its `variants` each lane is, shape (lanes,).
+
+        Raises
+        ------
+        InputError
+            If it has none.
+        """
+        if self._variants is None:
+            raise self._no_variants()
+        return self._variants.of(slice(None))
+
+    def _no_variants(self) -> InputError:
+        return InputError("variant", got="a simulator without", allowed="VectorSimulator(..., variants={...})")
 
     @property
     def lowest_voltage(self) -> Array:
@@ -229,6 +247,8 @@ class VectorSimulator:
               lanes: ArrayLike | None = None) -> None:
         """Put lanes at rest and their clocks to 0, their torque on; noise continues where it was.
 
+        With `variants` each is another servo from then on.
+
         Parameters
         ----------
         pulse_width, command_angle, command_voltage : float or array, optional
@@ -239,8 +259,10 @@ class VectorSimulator:
             Which; all unless given.
         """
         which = pick(lanes, len(self))
-        self._store.fresh[0] = 0
         angle = None if output_angle is None else numbers_of("output_angle", output_angle, which)
+        if self._variants is not None and len(which):
+            self.set(parameters=self._variants.drawn(which), lanes=which)
+        self._store.fresh[0] = 0
         command = self._store.command.copy()
         found = self._numbers.translate.command(pulse_width, command_angle, command_voltage, which)
         if found is not None:
@@ -422,6 +444,14 @@ class VectorSimulator:
         if type(torque) is float and math.isfinite(torque):
             return torque
         return numbers_of("external_torque", torque, np.arange(len(self)))
+
+
+def seeds_of(lanes: int, seed: int) -> NDArray[np.int64]:
+    """Return the seed of each lane, or raise InputError."""
+    count = _whole("lanes", lanes, 1)
+    if count * _BYTES > 0.8 * memory_limit():
+        raise InputError("lanes", got=count, allowed="what fits into memory: take fewer")
+    return _whole("seed", seed, None) + np.arange(count)
 
 
 def check_duration(duration: float) -> None:

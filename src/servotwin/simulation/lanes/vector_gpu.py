@@ -11,22 +11,24 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models.engine.memory import ACCURACY, Memories
 from servotwin.models.engine.one_lane import COMMAND_ANGLE, FOLLOWED, PULSE_WIDTH
+from servotwin.simulation.bus import Supplies
 from servotwin.simulation.compile.threads import SEEN
 from servotwin.simulation.lanes.batch import Failure
 from servotwin.simulation.lanes.cuda import GpuArray, is_guest
-from servotwin.simulation.lanes.inputs import pick
-from servotwin.simulation.lanes.lane_threads import REMEMBERED, ThreadedLanes
+from servotwin.simulation.lanes.inputs import lanes_of, pick
+from servotwin.simulation.lanes.lane_numbers import LaneNumbers
+from servotwin.simulation.lanes.lane_threads import REMEMBERED, ThreadedLanes, period_of
 from servotwin.simulation.lanes.many import real_type
-from servotwin.simulation.lanes.vector import VectorSimulator, check_duration, numbers_of
+from servotwin.simulation.lanes.vector import VectorSimulator, check_duration, numbers_of, seeds_of
 from servotwin.simulation.lanes.whole_runs import VectorMemory
 from servotwin.simulation.start import Status
 
 if TYPE_CHECKING:
-    from numpy.typing import DTypeLike
+    from numpy.typing import ArrayLike, DTypeLike
 
     from servotwin import loads
     from servotwin.models.base import Model
-    from servotwin.simulation.lanes.lane_numbers import LaneNumbers
+    from servotwin.simulation.lanes.lane_numbers import Variants
 
 _KINDS = {"pulse_width": PULSE_WIDTH, "command_angle": COMMAND_ANGLE}
 _SHAFT = {"output_angle": "stand.y.q", "output_speed": "stand.y.w"}
@@ -56,18 +58,37 @@ class VectorSimulatorOnGpu(VectorSimulator):
         self, model: Model, lanes: int, *, load: loads.Load | loads.Part | list[Any] | None = None,
         parameters: Mapping[str, Any] | None = None, bus: Any = None, dtype: DTypeLike = "float64",
         threads: int | None = None, seed: int = 0, accuracy: float = ACCURACY, watch_supply: bool = False,
-        device: str = "cuda",
+        variants: Mapping[str, ArrayLike] | None = None, device: str = "cuda",
     ) -> None:
         if watch_supply:
             raise _refused("watch_supply")
-        numbers = self._laid_out(model, lanes, load, parameters, bus, seed, accuracy)
-        self._lanes, self._device = ThreadedLanes(numbers, real_type(dtype), device), device
+        numbers = self._laid_out(model, seeds_of(lanes, seed), load, parameters, bus, accuracy, variants)
+        self._pool = None if self._variants is None else _pool_of(numbers, self._variants, load, parameters or {})
+        self._lanes, self._device = ThreadedLanes(numbers, real_type(dtype), device, self._pool), device
         self._given, self._fresh = numbers, False
         self._lanes.tell(numbers.neutral)
         self._lanes.begin()
 
     @property
     def _numbers(self) -> LaneNumbers:
+        return self._given
+
+    @property
+    def variant(self) -> GpuArray:
+        """Which of its `variants` each lane is, on the GPU, in place."""
+        if self._variants is None:
+            raise self._no_variants()
+        found: GpuArray = self._lanes.array("variant")
+        return found
+
+    def _as_now(self) -> LaneNumbers:
+        """Return the numbers of the lanes as they are now; with variants this asks the GPU."""
+        if self._variants is not None and self._pool is not None:
+            draws = self._lanes.array("draws").read().astype(np.int64)
+            others = np.flatnonzero(draws != self._variants.draws)
+            self._variants.draws[:] = draws
+            if others.size:
+                self._given.take(others, self._pool, (), self._variants.of(others))
         return self._given
 
     def __repr__(self) -> str:
@@ -123,6 +144,8 @@ class VectorSimulatorOnGpu(VectorSimulator):
         self._check_given(angle, None, which)
         mask = self._mask(lanes, which)
         self._on(stream)
+        if self._variants is not None:
+            self._lanes.change(mask=mask)
         if command is not None:
             self._lanes.tell(command, kind=kind, mask=mask)
         self._lanes.begin(angle, mask=mask)
@@ -191,11 +214,12 @@ class VectorSimulatorOnGpu(VectorSimulator):
     def save(self) -> VectorMemory:
         """Return all that the lanes remember, as it is now, on the processor; picklable, and for `device="cpu"` too."""
         count, followed = len(self), self._lanes.array("followed").read().astype(np.float64)
-        torque = self._lanes.array("total").read().astype(np.float64) - self._numbers.columns.torque
+        columns = self._as_now().columns
+        torque = self._lanes.array("total").read().astype(np.float64) - columns.torque
         status, time = self.status.read().astype(np.int8), self._lanes.time
         return VectorMemory(type(self._numbers.model).__name__, *self._lanes.memories(np.arange(count)), followed,
                             torque, status, np.where(status != 0, time, 0.0), np.zeros(count),
-                            self._numbers.columns.numbers.copy(), None)
+                            columns.numbers.copy(), None)
 
     def restore(self, memory: VectorMemory, *, lanes: Any = None) -> None:
         """Go back to what was saved; as `VectorSimulator.restore`."""
@@ -228,6 +252,12 @@ class VectorSimulatorOnGpu(VectorSimulator):
             if there[0] not in _KINDS:
                 raise InputError(there[0], got="an array on a GPU", allowed=" or ".join(_KINDS))
             return given[there[0]], _KINDS[there[0]]
+        names = [name for name, value in given.items() if value is not None]
+        if self._variants is not None and names:  # the GPU knows which servo each lane is
+            if len(names) > 1 or names[0] not in _KINDS:
+                raise InputError("command of lanes with variants on a GPU", got=" and ".join(names),
+                                 allowed=" or ".join(_KINDS))
+            return self._spread(names[0], given[names[0]], which), _KINDS[names[0]]
         found = self._numbers.translate.command(pulse_width, command_angle, command_voltage, which)
         return self._spread("command", found, which), FOLLOWED
 
@@ -244,7 +274,7 @@ class VectorSimulatorOnGpu(VectorSimulator):
         """Check numbers that are not on the GPU: of some lanes, or of all where a mask there says of which."""
         places = np.arange(len(self)) if which is None else which
         angle, inertia = (x[places] if isinstance(x, np.ndarray) else None for x in (angle, inertia))
-        self._check_imposed(angle, inertia, places)
+        self._check_imposed(None if self._variants is not None else angle, inertia, places)
 
     def _mask(self, lanes: Any, which: NDArray[np.int64] | None) -> Any:
         if lanes is None or which is None:
@@ -252,6 +282,27 @@ class VectorSimulatorOnGpu(VectorSimulator):
         mask = np.zeros(len(self), np.uint8)
         mask[which] = 1
         return mask
+
+
+def _pool_of(numbers: LaneNumbers, variants: Variants, load: Any, parameters: Mapping[str, Any]) -> LaneNumbers:
+    """Return the numbers of all variants, a lane of each.
+
+    Raises
+    ------
+    InputError
+        If lanes differ otherwise too, or variants in how long their frames last, or their ticks.
+    """
+    several = [name for name, value in parameters.items() if np.ndim(value)]
+    if several or isinstance(load, list | tuple):
+        raise InputError(f"{several[0] if several else 'load'} beside variants on a GPU", got="one for each lane",
+                         allowed="one for all lanes")
+    inputs = lanes_of(numbers.model, numbers.inputs.commands[0], load, {**parameters, **variants.columns}, None,
+                      np.arange(variants.count))
+    found = LaneNumbers(inputs, numbers.accuracy, Supplies((), (), variants.count))
+    if np.ptp(period_of(found)) > 0.0:
+        raise InputError("variants on a GPU", got="frames, or ticks, that last longer in some",
+                         allowed="servos that have them in common")
+    return found
 
 
 def _refused(name: str) -> InputError:
