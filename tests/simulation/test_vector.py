@@ -613,10 +613,10 @@ def test_each_reset_gives_a_lane_another_servo(servo):
 @pytest.mark.parametrize(("variants", "more", "words"), [
     ({}, {}, "^variants: got {}"), ([1.0], {}, "^variants: got"),
     ({"motor.torque_constant": 3e-3}, {}, r"^variants: motor.torque_constant: got 'an array of shape \(\)'"),
-    ({"motor.torque_constant": [3e-3], "load.inertia": [1e-3, 2e-3]}, {}, "^variants: motor.torque_constant: got"),
-    ({"motor.torque_constant": []}, {}, "^variants: motor.torque_constant: got"),
-    ({"load.inertia": [1e-3]}, {"parameters": {"load.inertia": 1e-3}}, "^variants: load.inertia: got 'a parameter of"),
-    ({"motor.color": [1.0]}, {}, "motor.color")])
+    ({"motor.torque_constant": [3e-3], "load.inertia": [1e-3, 2e-3]}, {}, r"^variants: motor\.torque_constant: got"),
+    ({"motor.torque_constant": []}, {}, r"^variants: motor\.torque_constant: got"),
+    ({"load.inertia": [1e-3]}, {"parameters": {"load.inertia": 1e-3}}, r"^variants: load\.inertia: got 'a parameter of"),
+    ({"motor.color": [1.0]}, {}, r"motor\.color")])
 def test_variants_that_are_none(servo, variants, more, words):
     with pytest.raises(ServotwinError, match=words):
         st.VectorSimulator(st.PulseServo(servo), 3, variants=variants, **more)

@@ -127,7 +127,8 @@ def test_what_was_saved_continues_there_and_on_the_processor(driver):
     (lambda sims: sims.reset(output_angle=9.0, lanes=[3]), InputError, "^output_angle of lane 3"),
     (lambda sims: sims.reset(lanes=[LANES]), InputError, "^lanes: got"),
     (lambda sims: sims.set(load_inertia=-1.0), InputError, "^load_inertia of lane 0: got -1.0"),
-    (lambda sims: sims.set(bus_voltage=5.0), InputError, "^bus_voltage on a GPU: allowed: nothing: device=\"cpu\" has"),
+    (lambda sims: sims.set(bus_voltage=-5.0), InputError, "^bus_voltage of lane 0: got -5.0"),
+    (lambda sims: sims.set(torque_enable=True), InputError, "^torque_enable of PulseServo"),
     (lambda sims: sims.set(parameters={"load.torque": 0.1}), InputError, "^parameters on a GPU"),
     (lambda sims: sims["impulse"], UnknownNameError, "^unknown signal of PulseServo on a GPU 'impulse'"),
     (lambda sims: sims.impulse_work, InputError, "^impulse_work on a GPU"),
@@ -159,7 +160,7 @@ VARIANTS = st.distributions.drawn_parameters(
 
 @pytest.mark.parametrize("model", [None, pytest.param(st.DigitalServo(st.load_servo(GOALS)), marks=pytest.mark.slow)])
 def test_a_reset_gives_a_lane_the_same_servo_there_and_here(shared, model):
-    """Inertias that were imposed stay, and what was saved there continues here."""
+    """Inertias and bus voltages that were imposed stay, and what was saved there continues here."""
     variants = {name: values for name, values in VARIANTS.items() if model is None or name.startswith("load.")}
     here, there = both(shared, model, variants=variants, load=None)
     rng, within, every = np.random.default_rng(2), 1e-11 if model is None else 1e-9, np.arange(LANES)
@@ -172,8 +173,12 @@ def test_a_reset_gives_a_lane_the_same_servo_there_and_here(shared, model):
             here.reset(command_angle=angles[some], lanes=some)
             there.reset(command_angle=Guest(angles), lanes=Guest(some))
         if k == 3:
-            here.set(load_inertia=2e-3, lanes=every[::2])
-            there.set(load_inertia=2e-3, lanes=every[::2])
+            volts = np.linspace(4.0, 7.0, LANES)
+            here.set(load_inertia=2e-3, bus_voltage=volts[::2], lanes=every[::2])
+            there.set(load_inertia=2e-3, bus_voltage=Guest(volts), lanes=Guest(every[::2].astype(np.int32)))
+        if k == 4 and model is not None:
+            here.set(torque_enable=False, lanes=some)
+            there.set(torque_enable=Guest(~some), lanes=Guest(np.append(np.flatnonzero(some), [-1, LANES])))
         if k == 5:
             here.reset(output_angle=0.5)
             there.reset(output_angle=0.5)

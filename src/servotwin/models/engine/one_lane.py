@@ -174,6 +174,17 @@ def hang(numbers: Any, j: int, bare: float, behind: float, J_L: float) -> None:
     cosim.put_shaft(numbers.shaft, j, Shaft(J_out + behind, own.b, J_out, own.b_out))
 
 
+def feed(numbers: Any, j: int, V: float) -> bool:
+    """Put a servo on a bus of a voltage [V]; false, and nothing happens, where its bridge drops as much."""
+    own = numbers_at(numbers, j)
+    if not own.bridge.D_drive < V < math.inf:
+        return False
+    fed = cosim.on_known_bus(own, V, 0.0, True)
+    cosim.put_bridge(numbers.bridge, j, fed.bridge)
+    cosim.put_source(numbers.source, j, fed.source)
+    return True
+
+
 def look_at_pulses(numbers: Any, j: int, curve: Floats, torque: float, N: float, stand: Stand, now: Frame) -> Observed:
     """Return the signals of an analog servo as it stands; N is the reduction of its gear."""
     own = at_pulses(numbers_at(numbers, j), now.silent)

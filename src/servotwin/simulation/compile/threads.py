@@ -82,15 +82,15 @@ def _leaves(path: str, kind: Any) -> Iterator[tuple[str, Any]]:
 
 
 _ADDRESSES = ("numbers", "arcs", "chips", "programs", "wirings", "curve", "seeds", "bare", "command", "torque",
-              "followed", "total", "angle", "speed", "inertia", "mask", "hung", "draws", "variant", "reals", "wholes",
-              "rings", "status", "seen", "left", "count")
+              "followed", "total", "angle", "speed", "inertia", "voltage", "torque_enable", "mask", "which", "hung", "fed",
+              "draws", "variant", "reals", "wholes", "rings", "status", "seen", "left", "count")
 
 
 @cache
 def table_type(floats: bool) -> type[Any]:
     """Return the struct that a text is called with: addresses, on the device where it runs there."""
     order = ("lanes", "places", "variants", *_ADDRESSES[:4], "program_step", "wirings", "curve", "curve_rows",
-             *_ADDRESSES[6:], "kind")
+             *_ADDRESSES[6:], "kind", "count_given")
     fields = [(name, ctypes.c_void_p if name in _ADDRESSES else ctypes.c_int64) for name in order]
     return type("Table", (ctypes.Structure,), {"_fields_": [*fields, ("duration", ctypes.c_float if floats
                                                                      else ctypes.c_double)]})
@@ -113,9 +113,11 @@ typedef struct {
     real *bare;                   /* a column each: torque of the load, inertias without it, reduction, period */
     const real *command, *torque; /* that are told: of a kind; beside the load [N m]; none of it: as before */
     real *followed, *total;       /* what that comes to: as the servo follows it; with the load's [N m] */
-    const real *angle, *speed, *inertia; /* that are imposed, or where lanes begin; nan, or none of it: not */
-    const uint8_t *mask;                 /* lanes of which that is said; none of it: all */
-    real *hung;                          /* inertias that were imposed; nan: none */
+    const real *angle, *speed, *inertia, *voltage; /* imposed, or where lanes begin; nan, or none of it: not */
+    const uint8_t *torque_enable;        /* whether torque is on; none of it: as before */
+    uint8_t *mask;                       /* lanes of which that is said; none of it: all */
+    const void *which;                   /* numbers of lanes, of 32 or 64 bits */
+    real *hung, *fed;                    /* inertias and voltages that were imposed; nan: none */
     int32_t *draws, *variant;            /* how many variants a lane has had before, and which one it is */
     real *reals;                         /* a column each: what a lane remembers */
     int32_t *wholes;
@@ -124,7 +126,8 @@ typedef struct {
     real *seen;      /* a column each: signals, and the time since a lane began */
     int32_t *left;   /* lanes that arcs leave to legs, and how many */
     int32_t *count;
-    int64_t kind;    /* of commands */
+    int64_t kind;    /* of commands, or bits of numbers of lanes */
+    int64_t count_given; /* how many those are */
     real duration;
 } lane_table;
 '''
@@ -181,12 +184,12 @@ _FOR_ALL = Template('''
 #if defined(__NVPTX__)
 void servotwin_$entry(const lane_table of) {
     const int32_t k = THREAD;
-    if (k < of.lanes)
+    if (k < of.$many)
         $entry(&of, k);
 }
 #else
 EXPORTED void servotwin_$entry(const lane_table *of, int64_t first, int64_t last) {
-    for (int64_t k = first; k < last; k++)
+    for (int64_t k = first; k < last && k < of->$many; k++)
         $entry(of, (int32_t)k);
 }
 #endif
@@ -265,7 +268,17 @@ INLINED void impose(const lane_table *of, int32_t lane) {
         }
         of->hung[lane] = of->inertia[lane];
         $hang(numbers, j, $output_inertia, $motor_inertia, of->hung[lane]);
+    }
+    if (of->voltage && of->voltage[lane] == of->voltage[lane]) {
+        of->fed[lane] = of->voltage[lane];
+        if (!$feed(numbers, j, of->fed[lane])) {
+            lose(of, lane);
+            return;
+        }
+    }
+    if (of->inertia || of->voltage) {
 $prepared    }
+$enable
     $stand stand = {0};
 $stand_loads
     stand = $impose(numbers, j, &stand, of->angle ? of->angle[lane] : NAN, of->speed ? of->speed[lane] : NAN);
@@ -293,11 +306,18 @@ $copies
     of->total[lane] += $load_torque - load_torque;
     if (of->hung[lane] == of->hung[lane])
         $hang(numbers, j, $output_inertia, $motor_inertia, of->hung[lane]);
+    if (of->fed[lane] == of->fed[lane] && !$feed(numbers, j, of->fed[lane]))
+        lose(of, lane);
 $prepared}
+INLINED void mark(const lane_table *of, int32_t k) {
+    const int64_t lane = of->kind == 64 ? ((const int64_t *)of->which)[k] : ((const int32_t *)of->which)[k];
+    if (0 <= lane && lane < of->lanes)
+        of->mask[lane] = 1;
+}
 ''')
 BARE = ("load_torque", "output_inertia", "motor_inertia", "reduction", "period")
 """Columns of what lanes are beside their tiles: of the load, of the shaft without it, and of frames or ticks."""
-_ENTRIES_BESIDE = ("tell", "begin", "impose", "change", "look")
+_ENTRIES_BESIDE = ("tell", "begin", "impose", "change", "mark", "look")
 SEEN = (*Observed._fields, "time")
 """Columns of what shows of lanes."""
 _THREAD = '''
@@ -393,7 +413,7 @@ def _signatures(own: LaneText) -> dict[str, tuple[Kind, ...]]:
         always |= {"begin": (numbers, wirings, INT64, _TABLE_OF, FLOAT64, FLOAT64)}
         always |= {"impose": (numbers, INT64, stand, FLOAT64, FLOAT64), "hang": (numbers, INT64, *[FLOAT64] * 3)}
         always |= {"prepare": (numbers, arcs, INT64)} if own.way == PULSES_BY_ARCS else {}
-        always |= {"chosen": (INT64, INT64, INT64)}
+        always |= {"chosen": (INT64, INT64, INT64), "feed": (numbers, INT64, FLOAT64)}
         looks = ("look_at_ticks", firm) if own.way == TICKS else ("look_at_pulses", chip)
         return {looks[0]: (numbers, INT64, _TABLE_OF, FLOAT64, FLOAT64, stand, looks[1])} | always
     if own.way == TICKS:
@@ -473,7 +493,7 @@ def _advancing(own: LaneText, words: dict[str, Any], names: Mapping[str, str], t
     else:
         words = words | {"arcs": types.record(_tile(ArcNumbers)), "chips": types.record(_tile(Chip))}
     if own.way == PULSES_BY_ARCS:
-        prepare = _PREPARE.substitute(words, prepare=names["prepare"]) + _FOR_ALL.substitute(entry="prepare")
+        prepare = _PREPARE.substitute(words, prepare=names["prepare"]) + _FOR_ALL.substitute(entry="prepare", many="lanes")
     lane = _LANE.substitute(words, call=(_TICKS if own.way == TICKS else _PULSES).substitute(words))
     many, kth = ("(of.left ? *of.count : of.lanes)", "(of.left ? of.left[k] : k)") if words["by"] else ("of.lanes", "k")
     return _AROUND.substitute(lane=lane + prepare, many=many, kth=kth)
@@ -496,16 +516,19 @@ def _beside(words: dict[str, Any], names: Mapping[str, str], places: Sequence[tu
         copies.append(f"({program})[lane] = ({program})[from];")
     return _BESIDE.substitute(
         words, **bare, **{entry: names[entry] for entry in ("follow", "begin", "impose", "hang",
-        "chosen")}, prepared=prepared, copies=_lines(copies), columns=len(BARE),
+        "chosen", "feed")}, prepared=prepared, copies=_lines(copies), columns=len(BARE),
         look=words["entry"], observed=words["gone"],
         memory="&stand, &firm" if by_ticks else "&stand, &now",
         rings=f"    firm.duties = of->rings + {2 * WAITING}LL * lane, firm.coming = firm.duties + {WAITING};\n"
         if by_ticks else "",
         begun=_lines(f"{place} = {begun.get(path, path)};" for path, place in places if path not in kept),
+        enable="" if not by_ticks else (
+            f"    if (of->torque_enable)\n        {dict(places)['firm.torque']} = of->torque_enable[lane] != 0;"),
         stand_loads=_lines(f"{path} = {place};" for path, place in places if path.startswith("stand.")),
         stand_stores=_lines(f"{place} = {path};" for path, place in places if path.startswith("stand.")),
         shown=_lines(f"seen[{k} * n] = lost ? NAN : {value};" for k, value in enumerate((*shown, time)))
-    ) + "".join(_FOR_ALL.substitute(entry=entry) for entry in _ENTRIES_BESIDE)
+    ) + "".join(_FOR_ALL.substitute(entry=entry, many="count_given" if entry == "mark" else "lanes")
+                for entry in _ENTRIES_BESIDE)
 
 
 def _lines(lines: Iterable[str]) -> str:

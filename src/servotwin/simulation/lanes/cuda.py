@@ -14,7 +14,7 @@ import weakref
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -353,31 +353,50 @@ def is_guest(values: Any) -> bool:
     return hasattr(values, "__dlpack_device__") and int(values.__dlpack_device__()[0]) == KDL_CUDA
 
 
-def guest(name: str, values: Any, gpu: Gpu, shape: tuple[int, ...], dtype: np.dtype[Any],
-          stream: int) -> tuple[int, Any]:
-    """Return the address of another library's array, and what keeps it there.
+class Visit(NamedTuple):
+    """An array of another library, as DLPack says: its address, shape and type, such as "f8", and what keeps it."""
+
+    address: int
+    shape: tuple[int, ...]
+    kind: str
+    capsule: Any
+
+
+def guest(name: str, values: Any, gpu: Gpu, stream: int) -> Visit:
+    """Return another library's array, which work on the stream may use.
 
     Raises
     ------
     InputError
-        If it is on another device, of another type or shape, or not in the order of C; names it.
+        If it is on another device, or not in the order of C; names it.
     """
-    kind, number = values.__dlpack_device__()
-    if (int(kind), int(number)) != (KDL_CUDA, gpu.number):
+    device, number = values.__dlpack_device__()
+    if (int(device), int(number)) != (KDL_CUDA, gpu.number):
         raise InputError(name, got="an array on another device", allowed=f"one on {gpu}")
     capsule = values.__dlpack__(stream=stream or 1)
-    address = _pointer(id(capsule), _NAME)
-    of = _Managed.from_address(address or 0).tensor
-    own = tuple(of.shape[k] for k in range(of.ndim))
-    kept = f"{_KINDS.get(of.code, '?')}{of.bits // 8}"
-    kept = "u1" if kept == "b1" and dtype == np.uint8 else kept  # a mask
-    if (kept, of.lanes) != (f"{dtype.kind}{dtype.itemsize}", 1):
-        raise InputError(name, got=f"an array of {_named(kept)}", allowed=f"one of {dtype.name}")
-    dense = not of.strides or all(own[k] == 1 or of.strides[k] == math.prod(own[k + 1:]) for k in range(of.ndim))
-    if own != shape or not dense:
-        raise InputError(name, got=f"an array of shape {own}{'' if dense else ', not dense'}",
-                         allowed=f"a dense one of shape {shape}")
-    return (of.data or 0) + of.byte_offset, capsule
+    of = _Managed.from_address(_pointer(id(capsule), _NAME) or 0).tensor
+    shape = tuple(of.shape[k] for k in range(of.ndim))
+    if of.strides and any(shape[k] != 1 and of.strides[k] != math.prod(shape[k + 1:]) for k in range(of.ndim)):
+        raise InputError(name, got=f"an array of shape {shape}, not dense", allowed="a dense one")
+    kind = f"{_KINDS.get(of.code, '?')}{of.bits // 8}" if of.lanes == 1 else "?"
+    return Visit((of.data or 0) + of.byte_offset, shape, kind, capsule)
+
+
+def for_each(name: str, values: Any, gpu: Gpu, shape: tuple[int, ...], dtype: np.dtype[Any], stream: int) -> Visit:
+    """Return another library's array of a shape and a type.
+
+    Raises
+    ------
+    InputError
+        If it has others, or as `guest` has it.
+    """
+    found = guest(name, values, gpu, stream)
+    kind = "u1" if found.kind == "b1" and dtype == np.uint8 else found.kind  # a mask
+    if kind != f"{dtype.kind}{dtype.itemsize}":
+        raise InputError(name, got=f"an array of {_named(kind)}", allowed=f"one of {dtype.name}")
+    if found.shape != shape:
+        raise InputError(name, got=f"an array of shape {found.shape}", allowed=f"a dense one of shape {shape}")
+    return found
 
 
 def _named(kept: str) -> str:

@@ -52,7 +52,7 @@ from servotwin.models.terms.wiring import Wiring
 from servotwin.simulation.compile import threads
 from servotwin.simulation.compile.c_types import identifier
 from servotwin.simulation.compile.threads import BARE, PULSES_BY_ARCS, PULSES_BY_LEGS, RINGS, SEEN, TICKS, LaneText
-from servotwin.simulation.lanes.cuda import Gpu, GpuArray, guest, is_guest, stream_of
+from servotwin.simulation.lanes.cuda import Gpu, GpuArray, Visit, for_each, guest, is_guest, stream_of
 from servotwin.simulation.lanes.forms import WORDS, Terms
 from servotwin.simulation.lanes.whole_runs import nothing_yet, taken
 
@@ -150,6 +150,9 @@ class OnProcessor:
         """Return an array, in place."""
         return self._arrays[name]
 
+    def numbers_of(self, lanes: Any) -> None:
+        """Return that an array is none of numbers of lanes on a GPU."""
+
     def given(self, name: str, values: Any) -> int:
         """Return the address of numbers that somebody gives, one for each lane or for all."""
         self._arrays[name][:] = values
@@ -202,11 +205,16 @@ class OnGpu:
         """Return the address of numbers that somebody gives: an array on the device stays where it is."""
         own = self._own[name]
         if is_guest(values):
-            address, self._guests[name] = guest(name, values, self._gpu, own.shape, own.dtype, self._stream)
-            return address
+            found = self._guests[name] = for_each(name, values, self._gpu, own.shape, own.dtype, self._stream)
+            return found.address
         self._arrays[name][:] = values
         own.write(self._arrays[name])
         return own.address
+
+    def numbers_of(self, lanes: Any) -> Visit | None:
+        """Return whole numbers that somebody gives for lanes; None where it is no array of such, but a mask."""
+        found = self._guests["which"] = guest("lanes", lanes, self._gpu, self._stream)
+        return found if found.kind in ("i4", "i8") and len(found.shape) == 1 else None
 
     def fetch(self, *names: str) -> None:
         """Bring arrays to the processor."""
@@ -260,8 +268,9 @@ class ThreadedLanes:
             "rings": np.zeros((count if by_ticks else 0, len(RINGS), WAITING), real),
             "wirings": self._typed(Wiring, [_wirings_of(own) for own in of]),
             "bare": np.zeros((len(BARE), places), real),
-            **{name: np.zeros(count, real) for name in ("angle", "speed", "inertia", "followed", "total")},
-            "mask": np.zeros(count, np.uint8), "hung": np.full(count, math.nan, real),
+            **{name: np.zeros(count, real) for name in ("angle", "speed", "inertia", "voltage", "followed", "total")},
+            **{name: np.zeros(count, np.uint8) for name in ("torque_enable", "mask")},
+            **{name: np.full(count, math.nan, real) for name in ("hung", "fed")},
             "draws": np.zeros(count, np.int32), "variant": np.zeros(count, np.int32),
             "seen": np.zeros((len(SEEN), count), real),
             "left": np.zeros(count, np.int32), "count": np.zeros(1, np.int32)}
@@ -327,9 +336,26 @@ class ThreadedLanes:
         """
         self._do("begin", angle=angle, mask=mask)
 
-    def impose(self, *, angle: Any = None, speed: Any = None, inertia: Any = None, mask: Any = None) -> None:
-        """Impose angles [rad], speeds [rad/s] and inertias of loads [kg m²] as `VectorSimulator.set` does; nan: not."""
-        self._do("impose", angle=angle, speed=speed, inertia=inertia, mask=mask)
+    def impose(self, *, angle: Any = None, speed: Any = None, inertia: Any = None, voltage: Any = None,
+               torque_enable: Any = None, mask: Any = None) -> None:
+        """Impose angles [rad], speeds [rad/s], inertias of loads [kg m²] and bus voltages [V]; nan: not.
+
+        As `VectorSimulator.set` does. `torque_enable` is whether torque of digital servos is on.
+        """
+        self._do("impose", angle=angle, speed=speed, inertia=inertia, voltage=voltage, torque_enable=torque_enable,
+                 mask=mask)
+
+    def mask_of(self, lanes: Any) -> Any:
+        """Return an array on the GPU, given for lanes, as a mask: numbers of lanes have another one made of them."""
+        numbers = self._at.numbers_of(lanes)
+        if numbers is None:
+            return lanes
+        self._of.kind, self._of.count_given, self._of.which = 8 * int(numbers.kind[1]), *numbers.shape, numbers.address
+        self._at.clear("mask")
+        self._of.mask = self._at.addresses["mask"]
+        if self._of.count_given:
+            self._at.call(len(self._texts) - 1, "servotwin_mark", self._of, self._of.count_given)
+        return self.array("mask")
 
     def change(self, *, mask: Any = None) -> None:
         """Let lanes be other servos, each the next that is drawn for it; memories and inertias that were imposed stay.

@@ -345,11 +345,7 @@ class VectorSimulator:
             None if value is None else numbers_of(name, value, which) for name, value in (
                 ("output_angle", output_angle), ("output_speed", output_speed), ("load_inertia", load_inertia),
                 ("bus_voltage", bus_voltage)))
-        self._check_imposed(angle, inertia, which)
-        if bus is not None:
-            _check_lanes("bus_voltage", bus, which, bus > 0.0, "a positive voltage")
-            _check_lanes("bus_voltage", bus, which, self._numbers.supplies.bus_of[which] < 0,
-                         "nothing: what all on its bus draw decides it")
+        self._check_imposed(angle, inertia, bus, which)
         anew = bool(parameters) and not self._numbers.retuned(which, parameters or {})
         if anew and parameters:
             part = self._numbers.repacked(which, parameters)
@@ -366,11 +362,16 @@ class VectorSimulator:
         if torque is not None:
             self._store.enable(which, torque)
 
-    def _check_imposed(self, angle: Array | None, inertia: Array | None, which: NDArray[np.int64]) -> None:
+    def _check_imposed(self, angle: Array | None, inertia: Array | None, bus: Array | None,
+                       which: NDArray[np.int64]) -> None:
         if inertia is not None:
             _check_lanes("load_inertia", inertia, which, inertia >= 0.0, "at least 0 kg m²")
         if angle is not None:
             self._numbers.check_angles(angle, which)
+        if bus is not None:
+            _check_lanes("bus_voltage", bus, which, bus > 0.0, "a positive voltage")
+            _check_lanes("bus_voltage", bus, which, self._numbers.supplies.bus_of[which] < 0,
+                         "nothing: what all on its bus draw decides it")
 
     # --- memory -------------------------------------------------------------------------------------------------------
 

@@ -136,14 +136,15 @@ class VectorSimulatorOnGpu(VectorSimulator):
               output_angle: Any = None, lanes: Any = None, stream: Any = None) -> None:
         """Put lanes at rest; arguments as of `VectorSimulator.reset`.
 
-        Arrays on the GPU have a number for each lane, whatever `lanes` says; that may be a mask there, bool or uint8.
+        Arrays on the GPU have a number for each lane, whatever `lanes` says; that may be there too: a mask of bool or
+        uint8, or numbers of lanes, whole ones of 32 or 64 bits, of which those beyond all lanes do not count.
         """
         which = None if is_guest(lanes) else pick(lanes, len(self))
         command, kind = self._command(pulse_width, command_angle, command_voltage, which)
         angle = self._spread("output_angle", output_angle, which)
-        self._check_given(angle, None, which)
-        mask = self._mask(lanes, which)
+        self._check_given(angle, None, None, which)
         self._on(stream)
+        mask = self._mask(lanes, which)
         if self._variants is not None:
             self._lanes.change(mask=mask)
         if command is not None:
@@ -153,18 +154,25 @@ class VectorSimulatorOnGpu(VectorSimulator):
     def set(self, *, output_angle: Any = None, output_speed: Any = None, load_inertia: Any = None,
             bus_voltage: Any = None, parameters: Mapping[str, Any] | None = None, torque_enable: Any = None,
             lanes: Any = None, stream: Any = None) -> None:
-        """Impose what another simulator decides, as `VectorSimulator.set` does; nan in an array on the GPU: not."""
-        for name, value in (("bus_voltage", bus_voltage), ("parameters", parameters), ("torque_enable", torque_enable)):
-            if value is not None:
-                raise _refused(name)
+        """Impose what another simulator decides, as `VectorSimulator.set` does; nan in an array on the GPU: not.
+
+        A lane whose bridge would drop all of its bus voltage has failed. `parameters` are refused: `variants` has other
+        numbers for lanes.
+        """
+        if parameters is not None:
+            raise _refused("parameters")
         which = None if is_guest(lanes) else pick(lanes, len(self))
         given = {name: self._spread(argument, value, which) for name, argument, value in (
             ("angle", "output_angle", output_angle), ("speed", "output_speed", output_speed),
-            ("inertia", "load_inertia", load_inertia))}
-        self._check_given(given["angle"], given["inertia"], which)
-        mask = self._mask(lanes, which)
+            ("inertia", "load_inertia", load_inertia), ("voltage", "bus_voltage", bus_voltage))}
+        if torque_enable is not None and not is_guest(torque_enable):
+            places = np.arange(len(self)) if which is None else which
+            whole = np.zeros(len(self), np.uint8)
+            whole[places] = self._torque_switch(torque_enable, places)
+            torque_enable = whole
+        self._check_given(given["angle"], given["inertia"], given["voltage"], which)
         self._on(stream)
-        self._lanes.impose(**given, mask=mask)
+        self._lanes.impose(**given, torque_enable=torque_enable, mask=self._mask(lanes, which))
 
     # --- what can be seen ---------------------------------------------------------------------------------------------
 
@@ -270,15 +278,17 @@ class VectorSimulatorOnGpu(VectorSimulator):
         found[places] = numbers_of(name, values, places)
         return found
 
-    def _check_given(self, angle: Any, inertia: Any, which: NDArray[np.int64] | None) -> None:
+    def _check_given(self, angle: Any, inertia: Any, voltage: Any, which: NDArray[np.int64] | None) -> None:
         """Check numbers that are not on the GPU: of some lanes, or of all where a mask there says of which."""
         places = np.arange(len(self)) if which is None else which
-        angle, inertia = (x[places] if isinstance(x, np.ndarray) else None for x in (angle, inertia))
-        self._check_imposed(None if self._variants is not None else angle, inertia, places)
+        angle, inertia, voltage = (x[places] if isinstance(x, np.ndarray) else None for x in (angle, inertia, voltage))
+        self._check_imposed(None if self._variants is not None else angle, inertia, voltage, places)
 
     def _mask(self, lanes: Any, which: NDArray[np.int64] | None) -> Any:
-        if lanes is None or which is None:
-            return lanes
+        if which is None:
+            return self._lanes.mask_of(lanes)
+        if lanes is None:
+            return None
         mask = np.zeros(len(self), np.uint8)
         mask[which] = 1
         return mask
