@@ -12,7 +12,6 @@ from servotwin.robots.mjcf_models import JOINTS, so101
 from servotwin.robots.trainers import joint_servos
 from servotwin.simulation.compile import threads
 from servotwin.simulation.lanes import cuda, lane_threads, vector_gpu
-from servotwin.studies.plan import drawn_parameters
 from simulation.test_cuda import built, driver, needs_compilers
 
 mjw = pytest.importorskip("mujoco_warp", reason="mujoco-warp is not installed")
@@ -151,24 +150,32 @@ def test_legs_with_play_that_fall_stand_and_rest():
 @pytest.mark.parametrize("vary", [
     {"friction.coulomb_torque_forward": "uniform:30%", "electronics.deadband": "uniform:4us..16us"},
     {"output_inertia": "uniform:40%", "stops.upper_angle": "uniform:0.3..0.5"}])
-def test_a_servo_that_varies_is_that_of_its_own_numbers(vary):
-    def last(servo, worlds, **more):
+def test_a_servo_that_varies_is_that_of_its_own_numbers_from_reset_to_reset(vary):
+    def last(servo, worlds, resets=0, **more):
         model = arm(2e-3)
         drive = WarpDrive(model, {"a": servo}, worlds, **more)
         own, data = mjw.put_model(model), mjw.put_data(model, mujoco.MjData(model), nworld=worlds)
         drive.attach(own)
-        data.ctrl.assign(np.full((worlds, 1), 0.6, np.float32))
-        for _ in range(120):
+        for _ in range(resets):
             mjw.step(own, data)
-        return data.qpos.numpy()[:, 0]
+            mjw.reset_data(own, data, wp.array(np.arange(worlds) != 1, dtype=bool))
+            drive.reset(np.arange(worlds) != 1)
+        data.ctrl.assign(np.full((worlds, 1), 0.6, np.float32))
+        for _ in range(60):
+            mjw.step(own, data)
+        return data.qpos.numpy()[:, 0], drive.parameters()
 
-    found = last(SERVO, 3, vary=vary, seed=5)
-    drawn = drawn_parameters(vary, SERVO, 3, 5)
-    assert np.ptp(found) > 1e-3
-    for world in range(3):
-        servo = SERVO.servo.replace({name: float(values[world]) for name, values in drawn.items()})
-        assert found[world] == pytest.approx(last(st.PulseServo(servo), 1)[0], abs=2e-5)
-    assert np.array_equal(last(SERVO, 3, vary={"a": vary}, seed=5), found)
+    first, drawn = last(SERVO, 3, vary=vary, seed=5)
+    found, others = last(SERVO, 3, resets=2, vary=vary, seed=5)
+    assert np.ptp(first) > 1e-3
+    assert last(SERVO, 1)[1] == {}
+    for name, values in others["a"].items():
+        assert (values == drawn["a"][name]).tolist() == [False, True, False]
+    for angles, numbers in ((first, drawn), (found, others)):
+        for world in (0, 1, 2) if angles is first else (0, 2):
+            servo = SERVO.servo.replace({name: float(values[world]) for name, values in numbers["a"].items()})
+            assert angles[world] == pytest.approx(last(st.PulseServo(servo), 1)[0][0], abs=2e-5)
+    assert np.array_equal(last(SERVO, 3, resets=2, vary={"a": vary}, seed=5)[0], found)
 
 
 def test_worlds_are_reset_by_a_mask_and_do_not_touch_each_other():
@@ -284,7 +291,8 @@ def test_servos_on_a_gpu_are_those_of_the_processor(servo, driver, monkeypatch):
 
     def run():
         model = arm(2e-3)
-        drive = WarpDrive(model, {"a": servo}, worlds=3)
+        drive = WarpDrive(model, {"a": servo}, worlds=3, seed=2, vary={
+            "output_inertia": "uniform:40%", "friction.coulomb_torque_forward": "uniform:30%"})
         own, data = mjw.put_model(model), mjw.put_data(model, mujoco.MjData(model), nworld=3)
         drive.attach(own)
         for k in range(120):
@@ -296,16 +304,19 @@ def test_servos_on_a_gpu_are_those_of_the_processor(servo, driver, monkeypatch):
             for _ in range(k % 2):
                 mjw.forward(own, data)
             mjw.step(own, data)
-        return data.qpos.numpy()[:, 0]
+        return data.qpos.numpy()[:, 0], drive.parameters()["a"], own.dof_armature.numpy()[:, 0]
 
-    here = run()
+    here, numbers, armature = run()
     monkeypatch.setattr(cuda, "KDL_CUDA", 1)
     for module in (lane_threads, vector_gpu):
         monkeypatch.setattr(module, "is_guest", lambda values: isinstance(values, wp.array))
     monkeypatch.setattr(wp.array, "__dlpack__", lambda self, stream=None: wp.to_dlpack(self))
     monkeypatch.setattr(joint_servos, "_Crew", There)
-    found = run()
+    found, drawn, own_armature = run()
     assert found == pytest.approx(here, abs=2e-6)
+    assert own_armature == pytest.approx(armature, rel=1e-6)
+    assert len(set(armature)) == 3
+    assert all(np.array_equal(drawn[name], values) for name, values in numbers.items())
     assert abs(here[1] - here[0]) > 1e-3
 
 

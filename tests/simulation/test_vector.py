@@ -620,5 +620,5 @@ def test_each_reset_gives_a_lane_another_servo(servo):
 def test_variants_that_are_none(servo, variants, more, words):
     with pytest.raises(ServotwinError, match=words):
         st.VectorSimulator(st.PulseServo(servo), 3, variants=variants, **more)
-    with pytest.raises(InputError, match="^variant: got 'a simulator without'"):
+    with pytest.raises(InputError, match=r"^variant: got 'a simulator without'"):
         _ = st.VectorSimulator(st.PulseServo(servo), 3).variant

@@ -51,7 +51,7 @@ class ServoActuator(ActuatorBase):
         maps = [CommandMap(name, -math.inf, math.inf) for name in self.joint_names]
         self._servos = JointServos(joints, maps, self._num_envs, wp.get_device(str(self._device)),
                                    torch.initial_seed() % 2**32, "a ServoActuator",
-                                   varied(cfg.vary, self.joint_names))
+                                   varied(cfg.vary, self.joint_names), moves_armature=False)
         self._servos.check_rigid()
         self.armature = torch.as_tensor(self._servos.armature, dtype=torch.float32, device=self._device)
         self.torque = wp.to_torch(self._servos.torque)  # of the servos in the latest step

@@ -15,6 +15,7 @@ from servotwin.robots.servos.command_map import CommandMap, told
 from servotwin.robots.servos.mount import Joint, Mount
 from servotwin.simulation import VectorSimulator
 from servotwin.simulation.lanes.vector import numbers_of
+from servotwin.simulation.lanes.vector_gpu import KINDS
 from servotwin.studies.plan import drawn_parameters
 
 if TYPE_CHECKING:
@@ -24,23 +25,60 @@ if TYPE_CHECKING:
     Vary = Mapping[str, Distribution | str]
 
 
+VARIANTS = 1024  # servos of each kind that varies, of which one is drawn for a joint
+
+
 class _Crew:
     """Servos of one model: a lane for each of its joints in each world, world after world."""
 
     kind: str  # of its commands
     ends: NDArray[np.float64]  # of each lane: of its travel [rad] and of its commands, which floats may be beyond
+    variants: NDArray[np.float64] | None = None  # of each servo that varies: these, and its own inertia [kg m²]
+    redraws = False  # a world that begins anew has others of these servos
     places: Any  # of its joints among all
     lanes: dict[str, Any]  # arrays of what lanes are given
     before: Any = None  # what lanes remembered before the last step
     hold: Any  # commands to stay where lanes begin
     mask: Any
+    variant: Any  # which of the variants each lane is
+    drawn: Any  # these
 
     def __init__(self, model: Model, which: list[int], worlds: int, device: str, seed: int, vary: Vary) -> None:
         self.which, self._here = which, device == "cpu"
-        lanes = worlds * len(which)
-        parameters = drawn_parameters(vary, model, lanes, seed)
         more: Any = {} if self._here else {"dtype": "float32", "device": device}
-        self.sims: Any = VectorSimulator(model, lanes, seed=seed, parameters=parameters, **more)
+        self.columns = drawn_parameters(vary, model, VARIANTS, seed) if vary else None
+        self.sims: Any = VectorSimulator(model, worlds * len(which), seed=seed, variants=self.columns, **more)
+
+    def look(self, mount: Mount) -> NDArray[np.float64]:
+        """Find the ends of lanes and of variants; return those of lanes with their own inertia [kg m²], (5, lanes)."""
+        self.kind = told(mount).kind
+
+        def seen(numbers: Any) -> NDArray[np.float64]:
+            return np.array([*numbers.travel(), *numbers.command_ends(self.kind), numbers.own_inertia()])
+
+        found = seen(self.sims._numbers)
+        self.ends = found[:4]
+        if self.columns is not None:
+            self.variants = seen(VectorSimulator(mount.model, VARIANTS, parameters=self.columns)._numbers)
+            self.redraws = True
+        return found
+
+    def numbers_of_variants(self, wp: Any) -> Any:
+        """Return which of its variants each lane is, as an array of Warp, in place on a GPU."""
+        variant = self.sims.variant
+        return wp.array(variant.astype(np.int32), dtype=int) if self._here else wp.from_dlpack(variant)
+
+    def draw(self, worlds: Any, stream: Any, wp: Any, kernels: Any) -> None:
+        """Let servos of worlds of a mask be other ones."""
+        if self._here:
+            lanes = np.flatnonzero(np.repeat(worlds.numpy(), len(self.which)))
+            self.sims._draw(lanes)
+            self.ends = self.variants[:4, self.sims.variant] if self.variants is not None else self.ends
+            self.variant.assign(self.sims.variant)
+            return
+        wp.launch(kernels.spread, dim=self.mask.shape, inputs=[worlds, len(self.which), self.mask])
+        self.sims._on(stream)
+        self.sims._draw(self.mask)
 
     def advance(self, duration: float, stream: Any, wp: Any) -> Any:
         """Advance by a step [s] from where the joints are; return the speeds after it, as an array of Warp."""
@@ -83,14 +121,14 @@ class _Crew:
     def begin(self, stream: Any) -> None:
         """Put those of the mask to rest."""
         if not self._here:
-            self.sims.reset(output_angle=self.lanes["angle"], lanes=self.mask, stream=stream,
-                            **{self.kind: self.hold})
+            self.sims._on(stream)
+            self.sims._begin(self.mask, self.lanes["angle"], self.hold, KINDS[self.kind])
             return
         which = np.flatnonzero(self.mask.numpy())
         if not which.size:
             return
         angle, command = self._within(self.lanes["angle"].numpy()[which], self.hold.numpy()[which], which)
-        self.sims.reset(output_angle=angle, lanes=which, **{self.kind: command})
+        self.sims._begin(which, angle, **{self.kind: command})
 
     def _within(self, angle: Any, command: Any, which: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         lower, upper, low, high = self.ends[:, which]
@@ -116,18 +154,21 @@ class JointServos:
     name : str
         Of what they belong to, for words.
     vary : sequence of mapping, optional
-        Of each joint: distributions of numbers that vary from world to world, by their dotted names, as of `sweep`.
+        Of each joint: distributions of numbers that vary from world to world, by their dotted names, as of `sweep`. A
+        world that begins anew has other servos.
+    moves_armature : bool
+        Whether the engine takes another `armature` with them; where it does not and rotors vary, servos stay as they
+        were drawn first.
 
     Attributes
     ----------
     torque : warp.array, shape (worlds, joints)
         Of the servos in the latest step, at the joints [N m].
-    armature : ndarray, shape (worlds, joints)
-        Inertia of rotor and gear at each joint [kg m²]; of the output wheel alone where the gear has play or a spring.
+    rotors_vary : bool
     """
 
     def __init__(self, own: Sequence[Joint], maps: Sequence[CommandMap], worlds: int, device: Any, seed: int,
-                 name: str, vary: Sequence[Vary] | None = None) -> None:
+                 name: str, vary: Sequence[Vary] | None = None, moves_armature: bool = True) -> None:
         self._wp, self._kernels = load_warp()
         self.names, self.worlds, self._device, self._name = [joint.name for joint in own], worlds, device, name
         groups = dict[Any, list[int]]()
@@ -139,24 +180,49 @@ class JointServos:
             self._crews.append(_Crew(of, which, worlds, str(device), seed, varied[which[0]]))
             seed += worlds * len(which)  # each lane has its own
         self._table, self._has_actuator = self._numbers(own, maps), [joint.command_at >= 0 for joint in own]
-        self.armature = self._table[:, :, 4] / self._table[:, :, 0] ** 2
+        self.rotors_vary = False
+        for crew in self._crews:
+            if crew.variants is not None and np.ptp(crew.variants[4]) > 0.0:
+                self.rotors_vary, crew.redraws = True, moves_armature
         self._lay_out(own)
 
     def _numbers(self, own: Sequence[Joint], maps: Sequence[CommandMap]) -> NDArray[np.float64]:
         """Return of each joint in each world: gain, zero, stops, own inertia, control and its map, command and ends."""
         found = np.zeros((self.worlds, len(own), 13))
         for crew in self._crews:
-            numbers = crew.sims._numbers
-            crew.kind = told(own[crew.which[0]].mount).kind
-            crew.ends = np.array([*numbers.travel(), *numbers.command_ends(crew.kind)])
             lower, upper, low, high, inertia = (
-                column.reshape(self.worlds, -1).T for column in (*crew.ends, numbers.own_inertia()))
+                column.reshape(self.worlds, -1).T for column in crew.look(own[crew.which[0]].mount))
             for n, k in enumerate(crew.which):
                 mount, one, how = own[k].mount, maps[k], told(own[k].mount)
                 found[:, k] = np.stack(np.broadcast_arrays(
                     mount.gain, mount.zero, lower[n], upper[n], inertia[n], one.low, one.high, one.scale, one.offset,
                     how.gain, how.zero, low[n], high[n]), axis=1)
         return found
+
+    @property
+    def armature(self) -> NDArray[np.float64]:
+        """Inertia of rotor and gear at each joint, or of the output wheel alone with play or a spring [kg m²].
+
+        Shape (worlds, joints).
+        """
+        if any(crew.redraws for crew in self._crews):
+            self._table = self._numbers_of.numpy().astype(np.float64)
+        return np.asarray(self._table[:, :, 4] / self._table[:, :, 0] ** 2)
+
+    def put_armature(self, into: Any) -> None:
+        """Put it into an array of Warp, shape (worlds, degrees of freedom)."""
+        self._wp.launch(self._kernels.put_armature, dim=self._numbers_of.shape[:2], device=self._device, inputs=[
+            self._numbers_of, self.speed_at, into])
+
+    def parameters(self) -> dict[str, dict[str, NDArray[Any]]]:
+        """Return the numbers that vary, as they are now: arrays (worlds,) by joint and dotted name."""
+        found = dict[str, dict[str, NDArray[Any]]]()
+        for crew in self._crews:
+            if crew.columns is not None:
+                variant = crew.variant.numpy().reshape(self.worlds, -1)
+                for n, k in enumerate(crew.which):
+                    found[self.names[k]] = {name: values[variant[:, n]] for name, values in crew.columns.items()}
+        return {name: found[name] for name in self.names if name in found}
 
     def check_rigid(self) -> None:
         """Raise InputError where a gear has play or a spring, for accelerations that are a step old."""
@@ -186,8 +252,11 @@ class JointServos:
                 crew.lanes = {name: wp.zeros(worlds * len(crew.which), dtype=float)
                               for name in ("angle", "speed", "inertia", "against", "command")}
                 crew.hold = wp.zeros_like(crew.lanes["command"])
+                if crew.variants is not None:
+                    crew.drawn = wp.array(np.ascontiguousarray(crew.variants.T, np.float32), dtype=float)
+                    crew.variant = crew.numbers_of_variants(wp)
                 crew.keep(wp)  # a captured graph cannot ask for memory
-        self.reset()
+            self._begin_anew(wp.full(worlds, True, dtype=wp.bool))
 
     @property
     def _stream(self) -> Any:
@@ -195,6 +264,8 @@ class JointServos:
 
     def reset(self, worlds: Any = None) -> None:
         """Let servos begin anew in the next step, at rest where their joints are, in worlds of a mask or in all.
+
+        Those that vary are other ones from now on.
 
         Raises
         ------
@@ -210,9 +281,17 @@ class JointServos:
                 raise InputError(f"worlds of {self._name}", got=f"an array of shape {mask.shape}",
                                  allowed=f"a mask of bool, shape ({self.worlds},)")
             mask = mask if isinstance(mask, wp.array) else wp.array(mask, dtype=wp.bool)
+            self._begin_anew(mask)
             for crew in self._crews:
-                wp.launch(self._kernels.begin_anew, dim=(self.worlds, len(crew.which)), inputs=[
-                    mask, crew.places, len(crew.which), self._fresh, self.torque, crew.lanes["command"]])
+                if crew.redraws:
+                    crew.draw(mask, self._stream, wp, self._kernels)
+                    wp.launch(self._kernels.take_variant, dim=(self.worlds, len(crew.which)), inputs=[
+                        crew.places, len(crew.which), crew.variant, crew.drawn, self._numbers_of])
+
+    def _begin_anew(self, mask: Any) -> None:
+        for crew in self._crews:
+            self._wp.launch(self._kernels.begin_anew, dim=(self.worlds, len(crew.which)), inputs=[
+                mask, crew.places, len(crew.which), self._fresh, self.torque, crew.lanes["command"]])
 
     def begin(self, angle: Any, again: Any = None) -> None:
         """Let servos begin that are to, where joints are, and those of some worlds stand as before the last step.
@@ -277,19 +356,14 @@ class JointServos:
             if k < 0 or self._has_actuator[k]:
                 raise InputError(f"command of joint {name}", allowed="joints with a servo and without an actuator")
             crew = next(crew for crew in self._crews if k in crew.which)
-            if isinstance(values, self._wp.array):
-                if values.shape != (self.worlds,) or values.dtype is not self._wp.float32:
-                    raise InputError(f"command of joint {name}", got=f"an array of {values.dtype.__name__}, shape "
-                                     f"{values.shape}", allowed=f"one of float32, shape ({self.worlds},)")
-                self._wp.launch(self._kernels.command, dim=self.worlds, device=self._device, inputs=[
-                    values, k, crew.which.index(k), len(crew.which), self._numbers_of, crew.lanes["command"]])
-                continue
-            gain, zero, low, high = self._table[:, k, [9, 10, 11, 12]].T
-            place = numbers_of(f"command of joint {name}", values, np.arange(self.worlds))
-            column = np.clip((place - zero) / gain, low, high)
-            lanes = crew.lanes["command"].numpy().reshape(self.worlds, -1).copy()
-            lanes[:, crew.which.index(k)] = column
-            crew.lanes["command"].assign(lanes.ravel())
+            if not isinstance(values, self._wp.array):
+                checked = numbers_of(f"command of joint {name}", values, np.arange(self.worlds))
+                values = self._wp.array(checked.astype(np.float32), dtype=float, device=self._device)
+            if values.shape != (self.worlds,) or values.dtype is not self._wp.float32:
+                raise InputError(f"command of joint {name}", got=f"an array of {values.dtype.__name__}, shape "
+                                 f"{values.shape}", allowed=f"one of float32, shape ({self.worlds},)")
+            self._wp.launch(self._kernels.command, dim=self.worlds, device=self._device, inputs=[
+                values, k, crew.which.index(k), len(crew.which), self._numbers_of, crew.lanes["command"]])
 
 
 def varied(vary: Mapping[str, Any] | None, joints: Sequence[str]) -> list[Vary]:

@@ -202,7 +202,7 @@ class DriveServo(DriveBase):
         self._device, self._count = device, count
         self._servos = JointServos(own, maps, worlds, device, robot.seed, "a robot", robot.vary)
         self._servos.check_rigid()
-        if np.ptp(self._servos.armature, axis=0).any():
+        if self._servos.rotors_vary:
             raise InputError("vary of a robot's servos", got="the inertia of rotors", allowed="all else: worlds of a "
                              "builder have one armature")
         self.torque = self._servos.torque

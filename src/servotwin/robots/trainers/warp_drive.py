@@ -50,7 +50,7 @@ class WarpDrive:
     vary : mapping, optional
         Distributions of servos' numbers that vary from world to world, by their dotted names and in the words of
         `sweep`, for all servos; or a mapping of joints to such mappings. `st.distributions.stated(servo)` has those of
-        a servo file. They are drawn once.
+        a servo file. A world whose servos are reset has others from then on; `parameters` returns them.
     timestep : float, optional
         Of a step [s]; that of the model unless given.
     device : str, optional
@@ -103,6 +103,7 @@ class WarpDrive:
         self.torque = self._servos.torque
         set_iterations(model, own, "raised")
         put_into_model(mujoco, model, own, np.median(self._servos.armature, axis=0))
+        self._armature: Any = None  # of the attached model, where rotors vary
         self._changed = [joint.speed_at for joint in own], [joint.actuator for joint in own if joint.actuator >= 0]
         count, nv = len(own), int(model.nv)
         with self._wp.ScopedDevice(self._device):
@@ -129,10 +130,11 @@ class WarpDrive:
             self._carry(model, field, slice(None))
         for name in LEAST:
             setattr(model.opt, name, max(getattr(model.opt, name), getattr(self._model.opt, name)))
-        if np.ptp(self._servos.armature, axis=0).any():
+        if self._servos.rotors_vary:
             whole = np.broadcast_to(model.dof_armature.numpy(), (self.worlds, model.nv)).copy()
             whole[:, dofs] = self._servos.armature
             model.dof_armature = self._wp.array(whole.astype(np.float32), dtype=float, device=self._device)
+            self._armature = model.dof_armature
         model.callback.control = self.control
 
     def _carry(self, model: Any, field: str, places: Any) -> None:
@@ -171,6 +173,8 @@ class WarpDrive:
     def reset(self, worlds: Any = None) -> None:
         """Put servos to rest where the next step finds their joints, with the command to stay there.
 
+        Where they vary they are other ones, with other armatures.
+
         Parameters
         ----------
         worlds : warp.array or array of bool, shape (worlds,), optional
@@ -182,6 +186,12 @@ class WarpDrive:
             If it is no such mask.
         """
         self._servos.reset(worlds)
+        if self._armature is not None:
+            self._servos.put_armature(self._armature)
+
+    def parameters(self) -> dict[str, dict[str, Any]]:
+        """Return the numbers of servos that vary, as they are now: arrays (worlds,) by joint and dotted name."""
+        return self._servos.parameters()
 
     def command(self, places: Mapping[str, Any]) -> None:
         """Tell joints without an actuator where to go [rad, m]: a number each, or an array (worlds,), of Warp in place.

@@ -151,6 +151,36 @@ def begin_anew(mask: wp.array[wp.bool], which: wp.array[int], count: int, fresh:
 
 
 @wp.kernel
+def spread(worlds: wp.array[wp.bool], count: int, lanes: wp.array[wp.uint8]):
+    """Mark the lanes of worlds."""
+    lane = wp.tid()
+    lanes[lane] = wp.uint8(0)
+    if worlds[lane // count]:
+        lanes[lane] = wp.uint8(1)
+
+
+@wp.kernel
+def take_variant(which: wp.array[int], count: int, variant: wp.array[int], drawn: wp.array2d[float],
+                 numbers: wp.array3d[float]):
+    """Take the ends of travel and commands, and the inertia, of the servos that lanes are now."""
+    world, n = wp.tid()
+    own, of = numbers[world, which[n]], variant[world * count + n]
+    own[2] = drawn[of, 0]
+    own[3] = drawn[of, 1]
+    own[11] = drawn[of, 2]
+    own[12] = drawn[of, 3]
+    own[4] = drawn[of, 4]
+
+
+@wp.kernel
+def put_armature(numbers: wp.array3d[float], speed_at: wp.array[int], armature: wp.array2d[float]):
+    """Put the inertias of servos at their joints in their places."""
+    world, k = wp.tid()
+    gain = numbers[world, k, 0]
+    armature[world, speed_at[k]] = numbers[world, k, 4] / (gain * gain)
+
+
+@wp.kernel
 def compare(time: wp.array[float], before: wp.array[float], again: wp.array[wp.bool]):
     """Find the worlds whose time has not passed since the last call."""
     world = wp.tid()

@@ -82,8 +82,8 @@ def _leaves(path: str, kind: Any) -> Iterator[tuple[str, Any]]:
 
 
 _ADDRESSES = ("numbers", "arcs", "chips", "programs", "wirings", "curve", "seeds", "bare", "command", "torque",
-              "followed", "total", "angle", "speed", "inertia", "voltage", "torque_enable", "mask", "which", "hung", "fed",
-              "draws", "variant", "reals", "wholes", "rings", "status", "seen", "left", "count")
+              "followed", "total", "angle", "speed", "inertia", "voltage", "torque_enable", "mask", "which", "hung",
+              "fed", "draws", "variant", "reals", "wholes", "rings", "status", "seen", "left", "count")
 
 
 @cache
@@ -493,7 +493,8 @@ def _advancing(own: LaneText, words: dict[str, Any], names: Mapping[str, str], t
     else:
         words = words | {"arcs": types.record(_tile(ArcNumbers)), "chips": types.record(_tile(Chip))}
     if own.way == PULSES_BY_ARCS:
-        prepare = _PREPARE.substitute(words, prepare=names["prepare"]) + _FOR_ALL.substitute(entry="prepare", many="lanes")
+        prepare = _PREPARE.substitute(words, prepare=names["prepare"])
+        prepare += _FOR_ALL.substitute(entry="prepare", many="lanes")
     lane = _LANE.substitute(words, call=(_TICKS if own.way == TICKS else _PULSES).substitute(words))
     many, kth = ("(of.left ? *of.count : of.lanes)", "(of.left ? of.left[k] : k)") if words["by"] else ("of.lanes", "k")
     return _AROUND.substitute(lane=lane + prepare, many=many, kth=kth)

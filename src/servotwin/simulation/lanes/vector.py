@@ -260,8 +260,17 @@ class VectorSimulator:
         """
         which = pick(lanes, len(self))
         angle = None if output_angle is None else numbers_of("output_angle", output_angle, which)
+        self._draw(which)
+        self._begin(which, angle, pulse_width, command_angle, command_voltage)
+
+    def _draw(self, which: NDArray[np.int64]) -> None:
+        """Let some lanes be others of their variants, if they have such."""
         if self._variants is not None and len(which):
             self.set(parameters=self._variants.drawn(which), lanes=which)
+
+    def _begin(self, which: NDArray[np.int64], angle: Array | None, pulse_width: Any = None, command_angle: Any = None,
+               command_voltage: Any = None) -> None:
+        """Put some lanes to rest, under a command that is given."""
         self._store.fresh[0] = 0
         command = self._store.command.copy()
         found = self._numbers.translate.command(pulse_width, command_angle, command_voltage, which)

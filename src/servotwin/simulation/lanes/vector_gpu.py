@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from servotwin.models.base import Model
     from servotwin.simulation.lanes.lane_numbers import Variants
 
-_KINDS = {"pulse_width": PULSE_WIDTH, "command_angle": COMMAND_ANGLE}
+KINDS = {"pulse_width": PULSE_WIDTH, "command_angle": COMMAND_ANGLE}
 _SHAFT = {"output_angle": "stand.y.q", "output_speed": "stand.y.w"}
 
 
@@ -145,8 +145,16 @@ class VectorSimulatorOnGpu(VectorSimulator):
         self._check_given(angle, None, None, which)
         self._on(stream)
         mask = self._mask(lanes, which)
+        self._draw(mask)
+        self._begin(mask, angle, command, kind)
+
+    def _draw(self, mask: Any) -> None:
+        """Let lanes of a mask be others of their variants, if they have such."""
         if self._variants is not None:
             self._lanes.change(mask=mask)
+
+    def _begin(self, mask: Any, angle: Any, command: Any, kind: int) -> None:  # type: ignore[override]
+        """Put lanes of a mask to rest, under a command of a kind if one is given."""
         if command is not None:
             self._lanes.tell(command, kind=kind, mask=mask)
         self._lanes.begin(angle, mask=mask)
@@ -257,15 +265,15 @@ class VectorSimulatorOnGpu(VectorSimulator):
         given = {"pulse_width": pulse_width, "command_angle": command_angle, "command_voltage": command_voltage}
         there = [name for name, value in given.items() if value is not None and is_guest(value)]
         if there and sum(value is not None for value in given.values()) == 1:
-            if there[0] not in _KINDS:
-                raise InputError(there[0], got="an array on a GPU", allowed=" or ".join(_KINDS))
-            return given[there[0]], _KINDS[there[0]]
+            if there[0] not in KINDS:
+                raise InputError(there[0], got="an array on a GPU", allowed=" or ".join(KINDS))
+            return given[there[0]], KINDS[there[0]]
         names = [name for name, value in given.items() if value is not None]
         if self._variants is not None and names:  # the GPU knows which servo each lane is
-            if len(names) > 1 or names[0] not in _KINDS:
+            if len(names) > 1 or names[0] not in KINDS:
                 raise InputError("command of lanes with variants on a GPU", got=" and ".join(names),
-                                 allowed=" or ".join(_KINDS))
-            return self._spread(names[0], given[names[0]], which), _KINDS[names[0]]
+                                 allowed=" or ".join(KINDS))
+            return self._spread(names[0], given[names[0]], which), KINDS[names[0]]
         found = self._numbers.translate.command(pulse_width, command_angle, command_voltage, which)
         return self._spread("command", found, which), FOLLOWED
 
