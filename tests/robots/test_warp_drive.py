@@ -9,6 +9,8 @@ from robots.test_energy import LEGS, quadruped
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.robots import Mount, ServoDrive, WarpDrive
 from servotwin.robots.mjcf_models import JOINTS, so101
+from servotwin.robots.servos.mount import joints_of
+from servotwin.robots.servos.servo_groups import maps_of, put_into_model
 from servotwin.robots.trainers import joint_servos
 from servotwin.simulation.compile import threads
 from servotwin.simulation.lanes import cuda, lane_threads, vector_gpu
@@ -262,6 +264,52 @@ def test_what_looks_at_a_state_lets_no_time_pass():
         return data.qpos.numpy()
 
     assert run(looks=1) == pytest.approx(run(looks=0), abs=2e-5)
+
+
+@pytest.mark.parametrize("servo", [SERVO, BUS], ids=["pulses", "bus"])
+def test_servos_meet_what_numbers_of_64_bits_say(servo):
+    """MuJoCo on the processor has joints, inertias and accelerations for 10 s, and NumPy the law that servos meet.
+
+    Angles are those that a step adds, beyond the rounding of a joint's own angle to 32 bits, 3e-8 rad.
+    """
+    model, step, count = arm(2e-3, (0.2, 0.1, 0.05)), 2e-3, 3
+    own = joints_of(model, dict.fromkeys("abc", servo))
+    maps = maps_of(model, own, None)
+    servos = joint_servos.JointServos(own, maps, 1, wp.get_device("cpu"), 7, "an arm")
+    put_into_model(mujoco, model, own, np.median(servos.armature, axis=0))
+    lanes = st.VectorSimulator(servo, count, seed=7)
+    behind = lanes._numbers.own_inertia()
+    data, torque, whole = mujoco.MjData(model), np.zeros(count), np.zeros((count, count))
+    angle, speed, control, free, into = (wp.zeros((1, count), dtype=float) for _ in range(5))
+    block = wp.zeros((1, count, count), dtype=float)
+    data.qpos[:] = 0.3
+    off, forces = [], []
+    for k in range(5000):
+        data.qfrc_applied[:] = 0.0
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, data, whole)
+        inverse, goals = np.linalg.inv(whole), [0.3 + 0.5 * goal for goal in sines(k * step, count)]
+        for array, values in ((angle, data.qpos), (speed, data.qvel), (control, goals), (free, data.qacc)):
+            array.assign(np.float32([values]))
+        block.assign(np.float32([inverse]))
+        if k == 0:
+            lanes.reset(command_angle=data.qpos, output_angle=data.qpos)
+        servos.begin(angle)
+        servos.advance(step, angle, speed, control, free, block, into)
+        a = data.qacc + inverse @ torque - np.diag(inverse) * torque
+        J = 1.0 / np.diag(inverse)
+        lanes.set(output_angle=data.qpos, output_speed=data.qvel, load_inertia=J - behind)
+        lanes.advance(step, command_angle=goals, external_torque=-J * a)
+        gained = (lanes["output_speed"] - data.qvel) / step
+        torque = (gained - a) * J
+        turned = servos._crews[0].sims["output_angle"] - np.float32(data.qpos)
+        off.append(np.abs(turned - (lanes["output_angle"] - data.qpos)).max())
+        data.qfrc_applied[:] = np.linalg.solve(inverse, gained - data.qacc)
+        forces.append(np.abs(into.numpy()[0] - data.qfrc_applied).max())
+        mujoco.mj_step(model, data)
+    assert np.quantile(off, 0.99) <= 1e-9  # 6e-10 and 8e-11; all of pulses 1.2e-9
+    assert max(off) <= 1e-6  # where rounding decides on a count of the encoder
+    assert np.quantile(forces, 0.999) <= 1e-5
 
 
 def test_what_lanes_remembered_is_put_back_on_a_gpu_by_columns_and_by_rings():
