@@ -109,6 +109,13 @@ def test_servos_vary_from_environment_to_environment():
     assert actuator.armature.shape == (4, 2)
     assert len(torch.unique(actuator.armature)) == 8
     assert len(torch.unique(actuator_of(envs=4).armature)) == 1
+    for vary, other in (("output_inertia", False), ("friction.coulomb_torque_forward", True)):
+        actuator = actuator_of(envs=4, vary={vary: "uniform:30%"})
+        before = actuator.parameters()
+        actuator.reset([2])
+        for joint, columns in actuator.parameters().items():
+            for name, values in columns.items():
+                assert (values == before[joint][name]).tolist() == [True, True, not other, True]
 
 
 def test_environments_are_reset_by_number():

@@ -119,6 +119,19 @@ def test_servos_vary_from_world_to_world_by_the_seed_of_pytorch():
     assert not np.array_equal(ends(2, vary=vary), found)
 
 
+def test_servos_that_vary_are_others_after_a_reset():
+    scene, sim = scene_of(ServoActuatorCfg(target_names_expr=(".*",), servo=SERVO, vary={
+        "output_inertia": "uniform:30%"}))
+    actuator = scene["arm"].actuators[0]
+    before, numbers = sim.model.dof_armature.clone(), actuator.drive.parameters()
+    scene["arm"].reset(torch.tensor([1]))
+    changed = (sim.model.dof_armature != before).any(dim=1)
+    assert changed.tolist() == [k == 1 for k in range(len(changed))]
+    for name, columns in actuator.drive.parameters().items():
+        for number, values in columns.items():  # of rotor and gear
+            assert (values == numbers[name][number]).tolist() == [k != 1 for k in range(len(changed))]
+
+
 def test_an_environment_decimates_resets_and_looks_as_it_does():
     arm = EntityCfg(spec_fn=lambda: mujoco.MjSpec.from_string(ARM), articulation=EntityArticulationInfoCfg(
         actuators=(ServoActuatorCfg(target_names_expr=(".*",), servo=BUS),)))

@@ -174,11 +174,16 @@ def test_worlds_begin_anew_by_a_mask_and_do_not_touch_each_other():
     assert angles[1] == pytest.approx(expected[0], abs=1e-4)
 
 
-def test_servos_vary_from_world_to_world():
+def test_servos_vary_from_world_to_world_and_from_reset_to_reset():
     run = Run({"shoulder": SERVO, "elbow": SERVO}, vary={"elbow": {"motor.torque_constant": "uniform:20%"}})
     for _ in range(40):
         angles = run.step(2e-3, [0.5, 0.5])
     assert abs(angles[0, 1] - angles[1, 1]) > 1e-3
+    (elbow, before), = run.actuator.drive.parameters().items()
+    run.own.reset(wp.array(np.repeat([False, True], 2), dtype=wp.bool))
+    run.step(2e-3, [0.5, 0.5])
+    after = run.actuator.drive.parameters()[elbow]
+    assert (after["motor.torque_constant"] == before["motor.torque_constant"]).tolist() == [True, False]
     with pytest.raises(InputError, match=r"^vary of a robot's servos: got 'the inertia of rotors'"):
         Run({"shoulder": SERVO, "elbow": SERVO}, vary={"output_inertia": "uniform:20%"})
 

@@ -92,6 +92,10 @@ class ServoActuator(ActuatorBase):
         control_action.joint_efforts = self.applied_effort
         return control_action
 
+    def parameters(self) -> dict[str, dict[str, Any]]:
+        """Return the numbers of servos that vary, as they are now: arrays (environments,) by joint and dotted name."""
+        return self._servos.parameters()
+
     def reset(self, env_ids: Any) -> None:
         """Let servos of some environments begin anew, at rest where the next step finds their joints."""
         mask = torch.zeros(self._num_envs, dtype=torch.bool, device=self.torque.device)
@@ -115,8 +119,8 @@ class ServoActuatorCfg(ActuatorBaseCfg):
     timestep : float
         Of physics [s]: `SimulationCfg.dt`.
     vary : mapping, optional
-        Distributions of the servo's numbers that vary from environment to environment, as of `sweep`; drawn by
-        PyTorch's seed.
+        Distributions of the servo's numbers that vary from environment to environment and from reset to reset, as of
+        `sweep`; drawn by PyTorch's seed. Where rotors vary servos stay as drawn first: armatures are read once.
     armature_in_mass_matrix : bool
         Whether the mass matrix that `meet` gets has the armature on its diagonal; assumed: it has. Compare it with that
         of a joint whose armature is 0.

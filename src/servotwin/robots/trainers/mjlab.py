@@ -45,7 +45,8 @@ class ServoActuatorCfg(ActuatorCfg):
     joint_friction : {"refuse", "clear", "keep"}
         Of the joints themselves, as of `ServoDrive`.
     vary : mapping, optional
-        Distributions of the servo's numbers that vary from world to world, as of `sweep`; drawn by PyTorch's seed.
+        Distributions of the servo's numbers that vary from world to world and from reset to reset, as of `sweep`; drawn
+        by PyTorch's seed. `ServoActuator.drive.parameters` returns them.
 
     Raises
     ------

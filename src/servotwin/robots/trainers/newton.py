@@ -55,7 +55,8 @@ def add_servos(builder: Any, servos: Mapping[str, Model | Mount], *, joint_frict
     joint_friction : {"refuse", "clear", "keep"}
         Of the joints themselves, as of `ServoDrive`.
     vary : mapping, optional
-        Distributions of servos' numbers that vary from world to world, as of `WarpDrive`; not the inertia of rotors.
+        Distributions of servos' numbers that vary from world to world and from reset to reset, as of `WarpDrive`; not
+        the inertia of rotors.
     seed : int
         Of all noise, and of what varies.
 
@@ -294,6 +295,10 @@ class DriveServo(DriveBase):
             self._servos.begin(self._angle)
             self._servos.advance(dt, self._angle, self._speed, self._goal, self._free, self._per_torque,
                                  forces.reshape(self._free.shape))
+
+    def parameters(self) -> dict[str, dict[str, Any]]:
+        """Return the numbers of servos that vary, as they are now: arrays (worlds,) by joint and dotted name."""
+        return self._servos.parameters()
 
     def is_stateful(self) -> bool:
         """Return True: servos have memories."""

@@ -269,7 +269,7 @@ class VectorSimulatorOnGpu(VectorSimulator):
                 raise InputError(there[0], got="an array on a GPU", allowed=" or ".join(KINDS))
             return given[there[0]], KINDS[there[0]]
         names = [name for name, value in given.items() if value is not None]
-        if self._variants is not None and names:  # the GPU knows which servo each lane is
+        if self._variants is not None and names:  # which servo a lane is, stands on the GPU
             if len(names) > 1 or names[0] not in KINDS:
                 raise InputError("command of lanes with variants on a GPU", got=" and ".join(names),
                                  allowed=" or ".join(KINDS))
@@ -312,7 +312,7 @@ def _pool_of(numbers: LaneNumbers, variants: Variants, load: Any, parameters: Ma
     """
     several = [name for name, value in parameters.items() if np.ndim(value)]
     if several or isinstance(load, list | tuple):
-        raise InputError(f"{several[0] if several else 'load'} beside variants on a GPU", got="one for each lane",
+        raise InputError(f"{several[0] if several else 'loads'} beside variants on a GPU", got="one for each lane",
                          allowed="one for all lanes")
     inputs = lanes_of(numbers.model, numbers.inputs.commands[0], load, {**parameters, **variants.columns}, None,
                       np.arange(variants.count))
