@@ -616,6 +616,8 @@ def test_each_reset_gives_a_lane_another_servo(servo):
     ({"motor.torque_constant": [3e-3], "load.inertia": [1e-3, 2e-3]}, {}, r"^variants: motor\.torque_constant: got"),
     ({"motor.torque_constant": []}, {}, r"^variants: motor\.torque_constant: got"),
     ({"load.inertia": [1e-3]}, {"parameters": {"load.inertia": 1e-3}}, r"^variants: load\.inertia: got 'a"),
+    ({"load.inertia": [1e-3, 2e-3, np.nan]}, {}, r"^load\.inertia of variant 2: got nan"),
+    ({"load.inertia": [1e-3, -1.0]}, {}, r"^load\.inertia of variant 1: got -1\.0"),
     ({"motor.color": [1.0]}, {}, r"motor\.color")])
 def test_variants_that_are_none(servo, variants, more, words):
     with pytest.raises(ServotwinError, match=words):

@@ -59,7 +59,7 @@ class _Crew:
         found = seen(self.sims._numbers)
         self.ends = found[:4]
         if self.columns is not None:
-            self.variants = seen(VectorSimulator(mount.model, VARIANTS, parameters=self.columns)._numbers)
+            self.variants = seen(self.sims._variants.numbers)
             self.redraws = True
         return found
 

@@ -210,46 +210,6 @@ def _in_rows(tiles: Any) -> Array:
     return found
 
 
-class Variants:
-    """Servos of which a lane is one from reset to reset; which, follows from its seed and how many it has had before.
-
-    Attributes
-    ----------
-    columns : dict of str to ndarray, shape (n,)
-        Their parameters by dotted name.
-    draws : ndarray of int, shape (lanes,)
-        How many each lane has had before the present one.
-    """
-
-    def __init__(self, columns: Any, parameters: Mapping[str, Any], seeds: NDArray[np.int64]) -> None:
-        if not isinstance(columns, Mapping) or not columns:
-            raise InputError("variants", got=columns, allowed="a mapping of names to arrays (SI)")
-        twice = next((name for name in columns if name in parameters), None)
-        if twice is not None:
-            raise InputError(f"variants: {twice}", got="a parameter of all lanes too", allowed="one of both")
-        self.columns = {name: np.asarray(values) for name, values in columns.items()}
-        self.count = max((values.size for values in self.columns.values()), default=0)
-        for name, values in self.columns.items():
-            if values.ndim != 1 or len(values) != self.count or self.count == 0:
-                raise InputError(f"variants: {name}", got=f"an array of shape {values.shape}",
-                                 allowed="an array (n,) with a value of each servo, of one length n for all names")
-        self._seeds, self.draws = seeds, np.zeros(len(seeds), np.int64)
-
-    def of(self, which: Any) -> Indices:
-        """Return which of them lanes are now."""
-        found: Indices = np.asarray(chosen(cast("Any", self._seeds[which]), cast("Any", self.draws[which]), self.count))
-        return found
-
-    def now(self, which: Any = slice(None)) -> dict[str, NDArray[Any]]:
-        """Return the parameters of lanes as they are now."""
-        return {name: values[self.of(which)] for name, values in self.columns.items()}
-
-    def drawn(self, which: Indices) -> dict[str, NDArray[Any]]:
-        """Return those of lanes that are the next ones from now on."""
-        self.draws[which] += 1
-        return self.now(which)
-
-
 class Imposed(NamedTuple):
     """Decisions of another simulator; nan where there are none, shape (lanes,)."""
 
@@ -593,3 +553,64 @@ class LaneNumbers:
         for chunk in self.chunks:
             found[chunk.which] = chunk.model.command_signal(name, command[chunk.which, None])[:, 0]
         return found
+
+
+# --- Lanes that are other servos from reset to reset ------------------------------------------------------------------
+
+class Variants:
+    """Servos of which a lane is one from reset to reset; which, follows from its seed and how many it has had before.
+
+    Attributes
+    ----------
+    columns : dict of str to ndarray, shape (n,)
+        Their parameters by dotted name.
+    draws : ndarray of int, shape (lanes,)
+        How many each lane has had before the present one.
+    numbers : LaneNumbers
+        All of them, a lane of each; where lanes differ otherwise too, as in the first.
+
+    Raises
+    ------
+    InputError
+        Or one of its kinds, if one of them is not possible; names it.
+    """
+
+    def __init__(self, columns: Any, inputs: tuple[Model, Any, Any], parameters: Mapping[str, Any],
+                 seeds: NDArray[np.int64], accuracy: float) -> None:
+        if not isinstance(columns, Mapping) or not columns:
+            raise InputError("variants", got=columns, allowed="a mapping of names to arrays (SI)")
+        twice = next((name for name in columns if name in parameters), None)
+        if twice is not None:
+            raise InputError(f"variants: {twice}", got="a parameter of all lanes too", allowed="one of both")
+        self.columns = {name: np.asarray(values) for name, values in columns.items()}
+        self.count = max((values.size for values in self.columns.values()), default=0)
+        for name, values in self.columns.items():
+            if values.ndim != 1 or len(values) != self.count or self.count == 0:
+                raise InputError(f"variants: {name}", got=f"an array of shape {values.shape}",
+                                 allowed="an array (n,) with a value of each servo, of one length n for all names")
+        self._seeds, self.draws = seeds, np.zeros(len(seeds), np.int64)
+        model, command, load = inputs
+        first = {name: np.asarray(value).ravel()[0] for name, value in parameters.items() if np.size(value)}
+        try:
+            own = lanes_of(model, command, load[0] if isinstance(load, list | tuple) and load else load,
+                           first | self.columns, None, np.arange(self.count))
+            self.numbers = LaneNumbers(own, accuracy, Supplies((), (), self.count))
+        except InputError as error:
+            if " of lane " not in error.what:
+                raise
+            raise type(error)(error.what.replace(" of lane ", " of variant "), got=error.got,
+                              allowed=error.allowed) from None
+
+    def of(self, which: Any) -> Indices:
+        """Return which of them lanes are now."""
+        found: Indices = np.asarray(chosen(cast("Any", self._seeds[which]), cast("Any", self.draws[which]), self.count))
+        return found
+
+    def now(self, which: Any = slice(None)) -> dict[str, NDArray[Any]]:
+        """Return the parameters of lanes as they are now."""
+        return {name: values[self.of(which)] for name, values in self.columns.items()}
+
+    def drawn(self, which: Indices) -> dict[str, NDArray[Any]]:
+        """Return those of lanes that are the next ones from now on."""
+        self.draws[which] += 1
+        return self.now(which)

@@ -124,15 +124,16 @@ class VectorSimulator:
         if LAWS.get(type(model), "voltage") == "voltage":
             raise InputError("model of a VectorSimulator", got=model,
                              allowed=" or ".join(kind.__name__ for kind, law in LAWS.items() if law != "voltage"))
-        supplies = supplies_of(bus, model, len(seeds))
-        self._variants = None if variants is None else Variants(variants, parameters or {}, seeds)
-        if self._variants is not None:
+        supplies, accuracy = supplies_of(bus, model, len(seeds)), accuracy_of(accuracy)
+        command, self._variants = _first_command(model), None
+        if variants is not None:
+            self._variants = Variants(variants, (model, command, load), parameters or {}, seeds, accuracy)
             parameters = {**(parameters or {}), **self._variants.now()}
-        inputs = lanes_of(model, _first_command(model), load, parameters, None, seeds)
+        inputs = lanes_of(model, command, load, parameters, None, seeds)
         if inputs.count != len(seeds):
             raise InputError("numbers of lanes", got=f"lanes: {len(seeds)}, parameters or loads: {inputs.count}",
                              allowed="arrays of one number for each lane")
-        return LaneNumbers(inputs, accuracy_of(accuracy), supplies)
+        return LaneNumbers(inputs, accuracy, supplies)
 
     @property
     def _numbers(self) -> LaneNumbers:

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models.engine.memory import ACCURACY, Memories
 from servotwin.models.engine.one_lane import COMMAND_ANGLE, FOLLOWED, PULSE_WIDTH
-from servotwin.simulation.bus import Supplies
 from servotwin.simulation.compile.threads import SEEN
 from servotwin.simulation.lanes.batch import Failure
 from servotwin.simulation.lanes.cuda import GpuArray, is_guest
-from servotwin.simulation.lanes.inputs import lanes_of, pick
+from servotwin.simulation.lanes.inputs import pick
 from servotwin.simulation.lanes.lane_numbers import LaneNumbers
 from servotwin.simulation.lanes.lane_threads import REMEMBERED, ThreadedLanes, period_of
 from servotwin.simulation.lanes.many import real_type
@@ -28,8 +27,6 @@ if TYPE_CHECKING:
 
     from servotwin import loads
     from servotwin.models.base import Model
-    from servotwin.simulation.lanes.lane_numbers import Variants
-
 KINDS = {"pulse_width": PULSE_WIDTH, "command_angle": COMMAND_ANGLE}
 _SHAFT = {"output_angle": "stand.y.q", "output_speed": "stand.y.w"}
 
@@ -63,8 +60,10 @@ class VectorSimulatorOnGpu(VectorSimulator):
         if watch_supply:
             raise _refused("watch_supply")
         numbers = self._laid_out(model, seeds_of(lanes, seed), load, parameters, bus, accuracy, variants)
-        self._pool = None if self._variants is None else _pool_of(numbers, self._variants, load, parameters or {})
-        self._lanes, self._device = ThreadedLanes(numbers, real_type(dtype), device, self._pool), device
+        variety = None if self._variants is None else self._variants.numbers
+        if variety is not None:
+            _check_common(variety, load, parameters or {})
+        self._lanes, self._device = ThreadedLanes(numbers, real_type(dtype), device, variety), device
         self._given, self._fresh = numbers, False
         self._lanes.tell(numbers.neutral)
         self._lanes.begin()
@@ -83,12 +82,12 @@ class VectorSimulatorOnGpu(VectorSimulator):
 
     def _as_now(self) -> LaneNumbers:
         """Return the numbers of the lanes as they are now; with variants this asks the GPU."""
-        if self._variants is not None and self._pool is not None:
+        if self._variants is not None:
             draws = self._lanes.array("draws").read().astype(np.int64)
             others = np.flatnonzero(draws != self._variants.draws)
             self._variants.draws[:] = draws
             if others.size:
-                self._given.take(others, self._pool, (), self._variants.of(others))
+                self._given.take(others, self._variants.numbers, (), self._variants.of(others))
         return self._given
 
     def __repr__(self) -> str:
@@ -302,25 +301,15 @@ class VectorSimulatorOnGpu(VectorSimulator):
         return mask
 
 
-def _pool_of(numbers: LaneNumbers, variants: Variants, load: Any, parameters: Mapping[str, Any]) -> LaneNumbers:
-    """Return the numbers of all variants, a lane of each.
-
-    Raises
-    ------
-    InputError
-        If lanes differ otherwise too, or variants in how long their frames last, or their ticks.
-    """
+def _check_common(variants: LaneNumbers, load: Any, parameters: Mapping[str, Any]) -> None:
+    """Raise InputError if lanes differ beside their variants, or these in how long frames last, or ticks."""
     several = [name for name, value in parameters.items() if np.ndim(value)]
     if several or isinstance(load, list | tuple):
         raise InputError(f"{several[0] if several else 'loads'} beside variants on a GPU", got="one for each lane",
                          allowed="one for all lanes")
-    inputs = lanes_of(numbers.model, numbers.inputs.commands[0], load, {**parameters, **variants.columns}, None,
-                      np.arange(variants.count))
-    found = LaneNumbers(inputs, numbers.accuracy, Supplies((), (), variants.count))
-    if np.ptp(period_of(found)) > 0.0:
+    if np.ptp(period_of(variants)) > 0.0:
         raise InputError("variants on a GPU", got="frames, or ticks, that last longer in some",
                          allowed="servos that have them in common")
-    return found
 
 
 def _refused(name: str) -> InputError:
