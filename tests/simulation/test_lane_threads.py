@@ -4,6 +4,7 @@ Here a processor goes through the text; on a GPU it is the same text, made to PT
 """
 
 import ctypes
+import math
 import re
 import shutil
 import subprocess
@@ -15,8 +16,11 @@ import servotwin as st
 from servotwin.errors import InputError
 from servotwin.models.engine.one_lane import BY_ARCS, COMMAND_ANGLE, PULSE_WIDTH, Stand, pulses
 from servotwin.models.state.modes import Vector
+from servotwin.models.terms.dependence import REGULATED
 from servotwin.models.terms.frame import AT_START
+from servotwin.models.terms.friction import Friction
 from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.source import Source
 from servotwin.models.terms.stops import Stops
 from servotwin.simulation.compile import threads
 from servotwin.simulation.compile.standalone import Standalone
@@ -25,6 +29,8 @@ from servotwin.simulation.lanes.lane_threads import ThreadedLanes, text_of
 from servotwin.simulation.start import Status
 
 PLAIN, GOALS, PULSES = "hitec-hs-755hb", "feetech-sts3215-12v", "dsservo-ds3218"
+FADING_BEHIND_PLAY = {"friction.stribeck_speed": 5.0, "friction.breakaway_ratio": 1.4, "gear.output_inertia": 1e-5,
+                      "gear.backlash": np.array([0.0, 0.01])}
 
 
 def chosen(rng, lanes, share=0.5, **numbers):
@@ -81,11 +87,41 @@ def goals(rng, lanes):
         firmware__bus_latency=(1e-4, 2e-3, 0.0))
 
 
+def limited(draw):
+    """Return the same behind regulators, most of which give less than the servo takes at a standstill."""
+    def drawn(rng, lanes):
+        return draw(rng, lanes) | chosen(rng, lanes, 0.8, supply__current_limit=(0.3, 1.5, 9.0),
+                                         stops__upper_angle=(1.2, 2.0, 4.0), stops__restitution=(0.1, 0.8, 0.0))
+    return drawn
+
+
+def creeping(draw):
+    """Return the same with static friction that fades, without play; some have a potentiometer with play."""
+    def drawn(rng, lanes):
+        own = limited(draw)(rng, lanes) | chosen(
+            rng, lanes, 0.7, friction__breakaway_ratio=(1.1, 1.8, 1.0), friction__stribeck_speed=(0.5, 100.0, 5.0),
+            friction__stribeck_exponent=(0.4, 3.0, 1.0), **{
+                f"friction__load_friction_{side}{part}": bounds for side in ("motor", "external")
+                for part, bounds in (("", (0.05, 0.3, 0.0)), ("_stribeck", (0.02, 0.2, 0.0)),
+                                     ("_quad", (0.1, 0.5, 0.0)))})
+        own.pop("friction.load_friction", None)
+        if "electronics.deadband" in own:
+            own |= chosen(rng, lanes, potentiometer__backlash=(1e-3, 1e-2, 0.0))
+        return own | {"gear.backlash": np.zeros(lanes)}
+    return drawn
+
+
 CASES = {  # servo, what its lanes have, way, how many, and how far they may be off [rad]; play multiplies rounding
     "arcs": (st.PulseServo, PLAIN, plain, PULSES_BY_ARCS, 120, 1e-12),
     "legs": (st.PulseServo, PLAIN, analog, PULSES_BY_LEGS, 240, 1e-11),
     "goals": (st.DigitalServo, GOALS, goals, TICKS, 160, 1e-9),
-    "pulses": (st.DigitalServo, PULSES, programmed, TICKS, 80, 1e-11)}
+    "pulses": (st.DigitalServo, PULSES, programmed, TICKS, 80, 1e-11),
+    "legs, limited": (st.PulseServo, PLAIN, limited(analog), PULSES_BY_LEGS, 240, 1e-11),
+    "legs, creeping": (st.PulseServo, PLAIN, creeping(analog), PULSES_BY_LEGS, 240, 1e-11),
+    "goals, limited": (st.DigitalServo, GOALS, limited(goals), TICKS, 200, 1e-11),
+    "goals, creeping": (st.DigitalServo, GOALS, creeping(goals), TICKS, 200, 1e-11),
+    "pulses, limited": (st.DigitalServo, PULSES, limited(programmed), TICKS, 80, 1e-11),
+    "pulses, creeping": (st.DigitalServo, PULSES, creeping(programmed), TICKS, 80, 1e-11)}
 
 
 def made(case, lanes=None, seed=5):
@@ -104,9 +140,26 @@ def entered(sims, dtype="float64"):
     return own, every
 
 
+def met_by(sims):
+    """Return which lanes creep where friction fades, are at their regulator's most, and are at a stop."""
+    stops, own, source = (sims._numbers.now(kind) for kind in (Stops, Friction, Source))
+    q, w, i = sims["output_angle"], np.abs(sims["output_speed"]), np.abs(sims["armature_current"])
+    slow = np.where((own.varies > 0.0) & (own.w_s > 0.0), own.w_s * 39.0 ** (1.0 / own.alpha), 0.0)
+    part = np.abs(sims["duty"]) if "duty" in sims.signals else 1.0  # of a mean current, at the source
+    most = np.isclose(i, source.I_max, 1e-9, 0.0) | np.isclose(i * part, source.I_max, 1e-9, 0.0)
+    return np.array([(w > 0.0) & (w < slow), most, (q == stops.lower) | (q == stops.upper)])
+
+
 def advanced(sims, own, low, high, rng, steps=40):
-    """Advance both under the same commands, torques and resets; return by how much each lane is off at the most."""
-    lanes, worst, left = len(sims), np.zeros(len(sims)), 0
+    """Advance both under the same commands, torques and resets.
+
+    Return by how much each lane is off at the most, how many lanes arcs have left, and how many have met what. Those
+    behind regulators are pushed against their stops; digital ones go in parts of a tick there, for lanes follow them
+    from event to event so, and not by power series.
+    """
+    lanes, worst, left, met = len(sims), np.zeros(len(sims)), 0, np.zeros((3, len(sims)), bool)
+    limited, digital = own.text.flags & REGULATED, own.text.way == TICKS
+    most, push = 9e-4 if digital and limited else math.inf, (5.0 if digital else 1.5) if limited else 0.05
     for k in range(steps):
         if k % 10 == 5:
             mask = np.flatnonzero(rng.random(lanes) < 0.4)
@@ -118,25 +171,30 @@ def advanced(sims, own, low, high, rng, steps=40):
             speeds = rng.uniform(-15.0, 15.0, lanes)
             sims.set(output_speed=speeds)
             own.put(np.arange(lanes), sims._store.memories())
-        duration, torque = rng.choice([1e-3, 0.02, 0.0137, 0.11]), rng.uniform(-0.05, 0.05, lanes)
-        sims.advance(duration, command_angle=rng.uniform(low, high, lanes), external_torque=torque)
+        duration, torque = rng.choice([1e-3, 0.02, 0.0137, 0.11]), rng.uniform(-push, push, lanes)
+        parts, angles = 1 + int(duration / most), rng.uniform(low, high, lanes)
+        for _ in range(parts):
+            sims.advance(duration / parts, command_angle=angles, external_torque=torque)
         own.advance(duration, sims._store.command, sims._store.torque)
-        left += own.left
+        left, met = left + own.left, met | met_by(sims)
         assert np.array_equal(own.status != 0, sims.status != 0)
         np.testing.assert_allclose(own.time, sims.time, rtol=0.0, atol=1e-6 if own.text.floats else 1e-9)
         worst = np.fmax(worst, np.abs(own.column("stand.y.q") - sims["output_angle"]))
-    return worst, left
+    return worst, left, met.sum(axis=1)
 
 
 @pytest.mark.parametrize("case", [
     pytest.param(case, marks=() if case == "arcs" else pytest.mark.slow) for case in CASES])
-def test_six_hundred_random_servos_are_those_of_lanes(case):
+def test_random_servos_are_those_of_lanes(case):
     sims, low, high, rng = made(case)
     own, _ = entered(sims)
     assert own.text.way == CASES[case][3]
-    worst, left = advanced(sims, own, low, high, rng)
+    worst, left, (creep, most, stand) = advanced(sims, own, low, high, rng)
     assert worst.max() <= CASES[case][5], np.argmax(worst)
     assert (left > 0) == (case == "arcs")  # some met a stop
+    assert (most > 20) == ("limited" in case or "creeping" in case)
+    assert (creep > 40) == ("creeping" in case)
+    assert stand > 0 or case in ("arcs", "goals", "pulses")
 
 
 @pytest.mark.slow
@@ -144,7 +202,7 @@ def test_floats_are_off_by_what_they_round():
     sims, low, high, rng = made("arcs")
     own, _ = entered(sims, "float32")
     assert own.array("reals").dtype == np.float32
-    worst, _ = advanced(sims, own, low, high, rng)
+    worst, *_ = advanced(sims, own, low, high, rng)
     assert 0.0 < np.quantile(worst, 0.99) <= 5e-6  # where a pulse more or less is decided by a digit, more
 
 
@@ -282,6 +340,7 @@ def test_a_lane_that_has_failed_is_nan_until_it_is_put_anew_and_harms_no_other()
     (st.PulseServo, PLAIN, {"load": st.loads.Recorded(time=[0.0, 1.0], torque=[0.0, 0.1])}, "float64", "recorded"),
     pytest.param(st.PulseServoInductive, PLAIN, {}, "float64", "inductance", marks=pytest.mark.slow),
     (st.BoundedServo, PLAIN, {}, "float64", "follows the error"),
+    (st.PulseServo, PLAIN, {"parameters": FADING_BEHIND_PLAY}, "float64", "friction that fades behind play"),
     (st.PulseServo, PLAIN, {"bus": st.Supply(open_circuit_voltage=6.0, internal_resistance=0.2)}, "float64", "supply"),
     pytest.param(st.DigitalServo, PULSES, {}, "float32", "pulses, in float32", marks=pytest.mark.slow)])
 def test_lanes_that_it_does_not_follow_are_refused_by_name(kind, name, more, dtype, words):

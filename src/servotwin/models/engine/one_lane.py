@@ -1,8 +1,9 @@
 """One lane by itself from call to call, by legs: analog servos from pulse to pulse, digital ones from tick to tick.
 
 Between two switches of its bridge a servo moves by legs, or by arcs where it has neither play nor friction by torque.
-No motion is kept, so a lane is a handful of numbers. Times count from the latest edge or tick, and whole ones are
-counted, so that floats have digits for them however long a servo runs.
+Where static friction fades, legs below the speed at which none is left are creeps (`legs.fading_legs`). No motion is
+kept, so a lane is a handful of numbers. Times count from the latest edge or tick, and whole ones are counted, so that
+floats have digits for them however long a servo runs.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from servotwin.models.engine import controller, cosim
 from servotwin.models.engine.batch.segments import linear_segments
 from servotwin.models.engine.batch.segments.linear_segments import ArcNumbers
 from servotwin.models.engine.lanes import chip_at, numbers_at
-from servotwin.models.engine.legs import legs
+from servotwin.models.engine.legs import fading_legs, legs
 from servotwin.models.engine.memory import SAME, Inputs, Point
 from servotwin.models.engine.motions.elementary import anew
 from servotwin.models.engine.observe import Observed, at_motor, observed, told_by
@@ -23,6 +24,7 @@ from servotwin.models.state.modes import INSIDE, RIGID, Mode, Vector, one_body
 from servotwin.models.state.records import reader, writer
 from servotwin.models.terms import bridge, duty, frame, play
 from servotwin.models.terms.frame import Frame
+from servotwin.models.terms.friction import fades
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import wiper_at
 from servotwin.models.terms.shaft import Shaft
@@ -84,7 +86,10 @@ def pulses(by: int, numbers: Any, arcs: Any, chips: Any, j: int, curve: Floats, 
         else:
             own = numbers_at(anew(numbers), j)
             own, u = at_pulses(own, now.silent) if heeds else own, now.drive * own.source.V
-            gone = legs.go(own, torque, u, y, legs.mode_from(own, torque, u, y, mesh), wiper, end - t)
+            if fades(own.friction):
+                gone = fading_legs.go(own, torque, u, y, legs.mode_from(own, torque, u, y, mesh), wiper, end - t)
+            else:
+                gone = legs.go(own, torque, u, y, legs.mode_from(own, torque, u, y, mesh), wiper, end - t)
             y, mesh, wiper = gone.y, gone.mode.mesh, gone.wiper
             status = COMPLETED if gone.done > 0.0 else DIVERGED
         if now.number == frame.CROWDED:
@@ -117,7 +122,10 @@ def ticks(numbers: Any, j: int, inputs: Inputs, firm: Any, stand: Stand, duratio
         end = min(controller.next_due(firmware, firm, frames), T_c if left > 0 else rest)
         own = duty.at_duty(own, firm.duty)
         u = duty.voltage(own.source, firm.duty)
-        gone = legs.go(own, torque, u, y, legs.mode_from(own, torque, u, y, mesh), wiper, end - t)
+        if fades(own.friction):
+            gone = fading_legs.go(own, torque, u, y, legs.mode_from(own, torque, u, y, mesh), wiper, end - t)
+        else:
+            gone = legs.go(own, torque, u, y, legs.mode_from(own, torque, u, y, mesh), wiper, end - t)
         y, mesh, wiper, t = gone.y, gone.mode.mesh, gone.wiper, end
         status = COMPLETED if gone.done > 0.0 else DIVERGED
         if left > 0 and t >= T_c:

@@ -30,12 +30,14 @@ from servotwin.models.terms.dependence import (
     BY_SHARE,
     DROPS,
     DRY,
+    FADING,
     ON_Q,
     ONE_WAY,
     PLAY,
     PROGRAM,
     PULSES,
     PWM,
+    REGULATED,
     SHOWN,
     SILENCE,
     SLACK,
@@ -60,7 +62,7 @@ if TYPE_CHECKING:
     from servotwin.simulation.lanes.lane_numbers import LaneNumbers
 
 _BY_ARCS = STRAIGHT | DRY | AT_STOPS | SHOWN | PULSES | SLACK | STEPS | TABLE
-_BY_LEGS = _BY_ARCS | DROPS | SILENCE | PLAY | TWO_BODIES | BY_SHARE
+_BY_LEGS = _BY_ARCS | DROPS | SILENCE | PLAY | TWO_BODIES | BY_SHARE | REGULATED | FADING
 _BY_TICKS = _BY_LEGS & ~PULSES | PROGRAM | PWM | ONE_WAY | AT_COMMANDS | BEYOND
 REMEMBERED = ("reals", "wholes", "rings", "status")
 PLAIN_REGISTERS, MOST_REGISTERS = 128, 168  # of a thread by arcs, and by anything else: more threads, or no spills
@@ -79,10 +81,13 @@ def text_of(numbers: LaneNumbers, dtype: str) -> LaneText:
     packed = numbers.packed()
     own = packed.lanes
     program = own.firmware or NO_FIRMWARE
-    flags = Terms(own.numbers, own.chips, program, inputs=TABLE if packed.curve.size else 0).followed
+    terms = Terms(own.numbers, own.chips, program, inputs=TABLE if packed.curve.size else 0)
+    flags = terms.followed
     digital, floats = numbers.digital, dtype == "float32"
     left = flags & ~(_BY_TICKS if digital else _BY_LEGS)
     words = [word for flag, word in _WORDS.items() if left & flag]
+    if np.any(terms.ask(FADING) & terms.ask(PLAY)):
+        words.append("friction that fades behind play of the gear")
     if numbers.supplies.lanes:
         words.append("several servos on a supply")
     if numbers.recorded:
@@ -93,8 +98,8 @@ def text_of(numbers: LaneNumbers, dtype: str) -> LaneText:
         words.append("goals told by pulses, in float32")
     if words or left:
         raise InputError("lanes one a thread", got=", ".join(words) or "a term that no text follows",
-                         allowed="pulse servos and digital servos without heat, inductance, springs, pendulums, "
-                                 "fading friction and regulators, each on a supply of its own")
+                         allowed="pulse servos and digital servos without heat, inductance, springs, pendulums and "
+                                 "friction that fades behind play of the gear, each on a supply of its own")
     if digital:
         return LaneText(TICKS, flags, floats)
     return LaneText(PULSES_BY_LEGS if flags & ~_BY_ARCS else PULSES_BY_ARCS, flags, floats)
