@@ -10,8 +10,9 @@ from scipy.optimize import brentq
 import servotwin as st
 from servotwin.models.engine.batch.segments import piecewise_segments
 from servotwin.models.engine.dynamics import contacts, currents
+from servotwin.models.engine.legs import fading_legs, legs
 from servotwin.models.engine.motions import dormand_prince, stribeck
-from servotwin.models.state.modes import NOWHERE, RIGID, Mode, Vector
+from servotwin.models.state.modes import NOWHERE, ON_LOWER, ON_UPPER, RIGID, Mode, Vector
 from servotwin.models.terms import friction
 from servotwin.models.terms.bridge import NO_BRIDGE, Off
 from servotwin.models.terms.friction import NO_FRICTION, creeping_speed
@@ -19,6 +20,7 @@ from servotwin.models.terms.motor import Motor
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.shaft import Shaft
 from servotwin.models.terms.source import Source
+from servotwin.models.terms.stops import Stops
 
 FINE = 1e-12  # tolerance of a creep
 FRICTION = NO_FRICTION._replace(F_forward=0.2, F_backward=0.25, breakaway=1.5, varies=1.0)
@@ -131,6 +133,53 @@ def test_a_creep_knows_where_it_stands_in_between():
     for part in (0.01, 0.4, 0.99):
         q, w = stribeck.at_time(numbers, mode, 6.0, 0.1, start, end, went.time, part * went.time)
         np.testing.assert_allclose((q, w), fine(numbers, 0.1, 1.0, 0.2, 0.0, part * went.time), rtol=0, atol=1e-9)
+
+
+def gone(numbers, torque, drive, q, w, time):
+    """Return where legs lead to."""
+    u, y = drive * numbers.source.V, Vector(q, w, 0.0, 0.0, 0.0, q, w)
+    found = fading_legs.go(numbers, torque, u, y, legs.mode_from(numbers, torque, u, y, RIGID), q, time)
+    assert found.done == 1.0
+    assert (found.y.q_m, found.y.w_m) == (found.y.q, found.y.w)
+    return found
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_legs_lead_where_slides_do(law):
+    for source in SOURCES:
+        numbers = numbers_of(law, source)
+        for torque in LOADS:
+            begins = piecewise_segments.starts(numbers, torque)
+            for drive, w in ((1.0, 0.0), (1.0, -2.0), (-1.0, 0.3), (0.0, 1.5), (0.0, -0.04)):
+                slid = piecewise_segments.slide(numbers, torque, begins, drive, 0.3, w, 0.03, FINE)
+                y = gone(numbers, torque, drive, 0.3, w, 0.03).y
+                np.testing.assert_allclose((y.q, y.w), (slid.q, slid.w), rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("law", ["M2, wide", "M4", "M6"])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_creep_meets_a_stop_and_rebounds_or_rests_until_its_torque_turns(law, way):
+    stop, numbers = way * 2e-3, numbers_of(law)
+    begins = piecewise_segments.starts(numbers, 0.0)
+
+    def slid(time):
+        return piecewise_segments.slide(numbers, 0.0, begins, way, 0.0, 0.0, time, FINE)
+
+    met = brentq(lambda time: slid(time).q - stop, 1e-4, 0.1, xtol=1e-16, rtol=1e-15)
+    speed = abs(slid(met).w)
+    assert law == "M4" or speed < creeping_speed(numbers.friction)
+    for restitution in (0.0, 0.5):
+        there = numbers._replace(stops=Stops(-abs(stop), abs(stop), restitution))
+        assert gone(there, 0.0, way, 0.0, 0.0, 0.999 * met).y.w == pytest.approx(slid(0.999 * met).w, rel=1e-9)
+        after = gone(there, 0.0, way, 0.0, 0.0, met + 1e-9).y
+        assert after.q == pytest.approx(stop, abs=1e-8)
+        assert after.w == pytest.approx(-way * restitution * speed, abs=1e-5)
+        rests = gone(there, 0.0, way, 0.0, 0.0, 0.5)
+        assert (rests.y.q, rests.y.w) == (stop, 0.0)
+        assert rests.mode.contact == (ON_UPPER if way > 0.0 else ON_LOWER)
+        leaves = gone(there, 0.0, -way, rests.y.q, 0.0, 0.3 * met).y
+        assert way * leaves.w < 0.0
+        assert abs(leaves.q) < abs(stop)
 
 
 def test_a_shaft_that_creeps_for_ever_comes_close_to_its_final_speed(servo):

@@ -198,26 +198,28 @@ def test_random_servos_are_those_of_lanes(case):
 
 
 @pytest.mark.slow
-def test_floats_are_off_by_what_they_round():
-    sims, low, high, rng = made("arcs")
+@pytest.mark.parametrize("case", ["arcs", "legs, creeping"])
+def test_floats_are_off_by_what_they_round(case):
+    sims, low, high, rng = made(case)
     own, _ = entered(sims, "float32")
     assert own.array("reals").dtype == np.float32
     worst, *_ = advanced(sims, own, low, high, rng)
     assert 0.0 < np.quantile(worst, 0.99) <= 5e-6  # where a pulse more or less is decided by a digit, more
 
 
-def test_a_lane_is_the_same_alone_among_others_and_in_any_order():
-    sims, low, high, rng = made("arcs")
+@pytest.mark.parametrize("case", ["arcs", pytest.param("legs, creeping", marks=pytest.mark.slow)])
+def test_a_lane_is_the_same_alone_among_others_and_in_any_order(case):
+    (sims, low, high, rng), draw = made(case), CASES[case][2]
     own, every = entered(sims)
     command = sims._numbers.translate.command(None, rng.uniform(low, high, len(sims)), None, None)
     order = rng.permutation(every)
-    others = {name: values[order] for name, values in plain(np.random.default_rng(5), len(sims)).items()}
+    others = {name: values[order] for name, values in draw(np.random.default_rng(5), len(sims)).items()}
     shuffled = st.VectorSimulator(sims._numbers.model, len(sims), parameters=others)
     shuffled._numbers.columns.seeds[:] = sims._numbers.columns.seeds[order]
     again = ThreadedLanes(shuffled._numbers)
     again.put(every, sims._store.memories(order))
     alone = st.VectorSimulator(sims._numbers.model, 1, seed=8, parameters={
-        name: values[3] for name, values in plain(np.random.default_rng(5), len(sims)).items()})
+        name: values[3] for name, values in draw(np.random.default_rng(5), len(sims)).items()})
     one = ThreadedLanes(alone._numbers)
     one.put(np.arange(1), sims._store.memories(np.arange(3, 4)))
     for duration in (0.02, 1e-3, 0.3):
@@ -230,12 +232,15 @@ def test_a_lane_is_the_same_alone_among_others_and_in_any_order():
 
 
 @pytest.mark.parametrize("case", ["arcs", pytest.param("legs", marks=pytest.mark.slow),
-                                  pytest.param("goals", marks=pytest.mark.slow)])
+                                  pytest.param("goals", marks=pytest.mark.slow),
+                                  pytest.param("legs, creeping", marks=pytest.mark.slow),
+                                  pytest.param("goals, limited", marks=pytest.mark.slow)])
 def test_lanes_begin_and_show_what_lanes_show(case):
     """They begin by a mask, at an angle or under a command of a kind; angles, speeds and inertias are imposed."""
     sims, low, high, rng = made(case, 60)
     own, every = entered(sims)
-    kinds = {COMMAND_ANGLE: "command_angle", PULSE_WIDTH: "command_angle" if case == "goals" else "pulse_width"}
+    kinds = {COMMAND_ANGLE: "command_angle",
+             PULSE_WIDTH: "command_angle" if case.startswith("goals") else "pulse_width"}
     for k in range(12):
         kind = [COMMAND_ANGLE, PULSE_WIDTH][k % 2]
         angles = rng.uniform(low, high, 60)
@@ -359,8 +364,9 @@ def on_device():
 
 @pytest.mark.slow
 @pytest.mark.skipif(not on_device(), reason="no clang that makes PTX")
-@pytest.mark.parametrize("case", ["arcs", "goals"])
-def test_ptx_of_floats_calls_nothing_and_has_no_doubles(case):
+@pytest.mark.parametrize(("case", "most"), [
+    ("arcs", 3e5), ("goals", 3e5), ("legs, creeping", 4e5), ("goals, limited", 6e5), ("goals, creeping", 5e5)])
+def test_ptx_of_floats_calls_nothing_and_has_no_doubles(case, most):
     sims, *_ = made(case, 2)
     text = text_of(sims._numbers, "float32")
     found = threads.ptx(text)
@@ -371,7 +377,7 @@ def test_ptx_of_floats_calls_nothing_and_has_no_doubles(case):
     assert sizes == {str(ctypes.sizeof(threads.table_type(True)))}
     assert ".extern" not in found
     assert ".f64" not in found
-    assert len(found) <= 3e5
+    assert len(found) <= most
     assert ".f64" in threads.ptx(LaneText(text.way, text.flags, False))
 
 

@@ -6,6 +6,7 @@ body here: with play between them the motor alone may creep, for which there is 
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from servotwin.models.engine.dynamics import guards
@@ -14,13 +15,12 @@ from servotwin.models.engine.events import crossings
 from servotwin.models.engine.legs import legs
 from servotwin.models.engine.legs.legs import MOST_LEGS, Gone
 from servotwin.models.engine.motions import stribeck
-from servotwin.models.state.modes import UNIT, Mode, Vector, moving
+from servotwin.models.state.modes import UNIT, Mode, Vector, one_body
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import wiper_at
 
 TOLERANCE = 1e-12  # rad, rad/s: of a creep, as of one at the accuracy that is usual
-_MOST_TRIES = 200  # of the time at which a creep meets a stop
-_HALVINGS = 40  # of the time of a creep whose end is not found
+_TRIES = 200  # of the time at which a creep meets a stop
 IN_FLOATS = {"TOLERANCE": 1e-6}
 
 
@@ -37,7 +37,7 @@ def go(numbers: Numbers, torque: float, u: float, y: Vector, mode: Mode, wiper: 
     """Return where a servo goes within a time [s], as `legs.go` has it."""
     for _ in range(MOST_LEGS):
         if legs.stands(mode) or not time > 0.0:
-            return Gone(y, mode, wiper, 1.0)
+            return Gone(y, mode, wiper, 1.0 if math.isfinite(y.q) else 0.0)
         if stribeck.creeps(numbers, mode, u, torque, y):
             gone, y, kind, done = crept(numbers, mode, u, torque, y, time)
             if done == 0.0:
@@ -63,12 +63,7 @@ def laws_of(numbers: Numbers, mode: Mode, u: float, torque: float, w: float) -> 
 def crept(numbers: Numbers, mode: Mode, u: float, torque: float, y: Vector, time: float) -> Crept:
     """Return where a shaft creeps to within a time [s]: to where its law changes, to a stop, or a part of the way."""
     end = stribeck.creep(numbers, mode, u, torque, y, time, TOLERANCE)
-    for _ in range(_HALVINGS):
-        if end.done > 0.0:
-            break
-        time *= 0.5
-        end = stribeck.creep(numbers, mode, u, torque, y, time, TOLERANCE)
-    after, stops = moving(y, end.q, end.w, end.w), numbers.stops
+    after, stops = one_body(end.q, end.w, y), numbers.stops
     kind = guards.UPPER if stops.upper - end.q < guards.BELOW else (
         guards.LOWER if end.q - stops.lower < guards.BELOW else -1)
     if kind < 0 or end.done == 0.0:
@@ -81,11 +76,11 @@ def _to(numbers: Numbers, mode: Mode, u: float, torque: float, y: Vector, after:
     """Return where a creep that goes beyond a stop within a time [s] meets it."""
     stop = numbers.stops.upper if kind == guards.UPPER else numbers.stops.lower
     a, b, s, at = 0.0, time, time, after
-    for _ in range(_MOST_TRIES):
+    for _ in range(_TRIES):
         guess = s - (at.q - stop) / at.w if at.w != 0.0 else a
         s = guess if a < guess < b else 0.5 * (a + b)
         q, w = stribeck.at_time(numbers, mode, u, torque, y, after, TOLERANCE, s)
-        at = moving(y, q, w, w)
+        at = one_body(q, w, y)
         if q == stop:
             break
         a, b = (a, s) if (q > stop) == (kind == guards.UPPER) else (s, b)
