@@ -54,3 +54,83 @@ def test_numbers_that_only_some_have_are_told():
     with pytest.raises(InputError, match="elbow"):
         differing([model("dynamixel-xl330-m288", **{"gear.backlash": 0.01, "gear.output_inertia": 1e-6}),
                    model("dynamixel-xl330-m288")], ["shoulder", "elbow"])
+
+
+# ------------------------------------------------------------------------------------------------- other numbers later
+
+BATTERY = st.Supply(open_circuit_voltage=VOLTS, internal_resistance=0.2)
+FLAT = st.Supply(open_circuit_voltage=6.0, internal_resistance=0.5)
+OTHERS = {"motor.torque_constant": [1.1, 0.9], "motor.rotor_inertia": [2.0, 0.6], "gear.backlash": [0.5, 1.5],
+          "firmware.proportional_gain": [1.2, 0.7]}  # times what they are, shoulder and elbow
+
+
+def other(servo, factors=OTHERS):
+    """Return numbers of both servos."""
+    return {name: servo.get(name) * np.array(times) for name, times in factors.items()}
+
+
+def driven(drive, data, steps=300):
+    """Return where the joints are under goals that change, from the beginning on."""
+    import mujoco
+
+    mujoco.mj_resetData(drive.model, data)
+    drive.reset(data)
+    found = []
+    for k in range(steps):
+        drive.command(data, {"shoulder": 0.4 * np.sin(0.02 * k), "elbow": 0.5 if k > 100 else 0.0})
+        drive.step(data)
+        found.append(data.qpos.copy())
+    return np.array(found)
+
+
+@pytest.mark.long(but="bus0-after0")
+@pytest.mark.parametrize(("bus", "after"), [(BATTERY, FLAT), (None, None)])
+def test_servos_given_other_numbers_are_those_of_a_drive_made_with_them(bus, after):
+    import mujoco
+
+    one = model("feetech-sts3215-7v4")
+    drive = st.robots.ServoDrive(mujoco.MjModel.from_xml_string(ARM), {"shoulder": one, "elbow": one}, bus=bus)
+    data, numbers = mujoco.MjData(drive.model), other(one.servo)
+    first = driven(drive, data)
+    drive.set(parameters=numbers, bus=after)
+    changed = driven(drive, data)
+    anew = st.robots.ServoDrive(mujoco.MjModel.from_xml_string(ARM), {
+        joint: model("feetech-sts3215-7v4", **{name: float(column[k]) for name, column in numbers.items()})
+        for k, joint in enumerate(("shoulder", "elbow"))}, bus=after)
+    expected = driven(anew, mujoco.MjData(anew.model))
+    assert np.abs(first - expected).max() > 5e-3
+    np.testing.assert_allclose(changed, expected, atol=1e-10)
+    np.testing.assert_allclose(driven(drive, mujoco.MjData(drive.model)), expected, atol=1e-10)  # in data that is new
+    np.testing.assert_allclose(drive.model.dof_armature, anew.model.dof_armature, rtol=1e-12)
+    drive.set(parameters={name: one.servo.get(name) for name in numbers}, bus=bus)
+    np.testing.assert_allclose(driven(drive, data), first, atol=1e-10)
+
+
+def test_a_number_may_be_given_to_some_joints_alone():
+    import mujoco
+
+    one = model("feetech-sts3215-7v4")
+    drive = st.robots.ServoDrive(mujoco.MjModel.from_xml_string(ARM), {"shoulder": one, "elbow": one}, bus=BATTERY)
+    before = drive.model.dof_armature.copy()
+    drive.set(parameters={"gear.output_inertia": 1e-4}, joints=["elbow"])
+    gained = drive.model.dof_armature - before
+    assert gained == pytest.approx([0.0, 1e-4 - one.servo.gear.output_inertia], abs=1e-12)
+
+
+@pytest.mark.parametrize(("more", "words"), [
+    ({"parameters": {"motor.rotor_inertia": -1.0}}, "motor.rotor_inertia"),
+    ({"parameters": {"motor.rotor_inertia": [1e-7] * 3}}, "shape"),
+    ({"parameters": {"motor.spin": 1.0}}, "motor.spin"),
+    ({"joints": ["wrist"], "parameters": {"gear.backlash": 0.0}}, "wrist"),
+    ({"bus": [(FLAT, ["elbow"])]}, "on the buses that they are on"),
+    ({"parameters": {"supply.open_circuit_voltage": 5.0}}, "that of its bus")])
+def test_what_cannot_be_set_is_said_and_changes_nothing(more, words):
+    import mujoco
+
+    one = model("feetech-sts3215-7v4")
+    drive = st.robots.ServoDrive(mujoco.MjModel.from_xml_string(ARM), {"shoulder": one, "elbow": one}, bus=BATTERY)
+    data = mujoco.MjData(drive.model)
+    first = driven(drive, data, 20)
+    with pytest.raises(InputError, match=words):
+        drive.set(**more)
+    assert np.array_equal(driven(drive, data, 20), first)

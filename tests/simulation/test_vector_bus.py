@@ -160,6 +160,28 @@ def test_inertia_speed_and_parameters_may_be_set_on_a_bus(servo):
 
 
 @pytest.mark.slow
+def test_another_supply_may_be_set_for_the_same_lanes(servo):
+    """Half-way through the servos go on under the regulator, and begun anew they are those of a bus with it."""
+    model = st.PulseServo(servo)
+    sims, under = (st.VectorSimulator(model, 3, bus=supply, threads=1) for supply in (BATTERY, REGULATOR))
+    for one in (sims, under):
+        one.reset(pulse_width=WIDTHS[0][:3])
+        one.advance(0.05, pulse_width=WIDTHS[1][:3])
+    before = sims["output_angle"].copy()
+    sims.set(bus=REGULATOR)
+    np.testing.assert_array_equal(sims["output_angle"], before)
+    sims.advance(0.02)
+    assert np.abs(sims["bus_voltage"] - under["bus_voltage"]).max() > 1e-3  # they have got to other places
+    sims.reset(pulse_width=WIDTHS[0][:3])
+    under.reset(pulse_width=WIDTHS[0][:3])
+    for one in (sims, under):
+        one.advance(0.05, pulse_width=WIDTHS[1][:3])
+    np.testing.assert_allclose(sims["output_angle"], under["output_angle"], atol=1e-12)
+    with pytest.raises(InputError, match="on the buses that they are on"):
+        sims.set(bus=[(BATTERY, [0, 1])])
+
+
+@pytest.mark.slow
 def test_the_energy_of_a_bus_closes(servo):
     """What the source gives is what windings, bridges, friction and loads have taken, and what is stored."""
     model = st.PulseServo(servo.replace({"motor.brush_drop_voltage": 0.1, "supply.bridge_drop_resistance": 0.2}))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NoReturn
 
@@ -20,15 +20,18 @@ from servotwin.robots.servos.joints_layout import BLOCK, FAILED, FOREIGN, INSTAN
 from servotwin.robots.servos.mount import Mount, heat_notes, joints_of, treat_friction, warm_mounts
 from servotwin.robots.servos.record import TOO_FEW, Record, set_iterations
 from servotwin.robots.servos.servo_groups import (
+    Change,
     Harbour,
     Instance,
     arrays_of,
+    buses_of,
     check_options,
     close_books,
     crews_of,
     goals_in,
     maps_of,
     put_into_model,
+    put_numbers,
     words_of,
 )
 from servotwin.simulation import VectorSimulator
@@ -397,6 +400,55 @@ class ServoDrive:
             berth.refresh()
         first = self._harbour.head + instance.size * (1 - int(block[BLOCK.index("half")]))
         block[first:first + instance.size] = instance.remembered().view(np.float64)
+
+    def set(self, *, parameters: Mapping[str, Any] | None = None, joints: Sequence[str] | None = None,
+            bus: Any = None) -> None:
+        """Give servos other numbers, in all data, and the model their rotors; each data is to begin anew after it.
+
+        So robots get servos that differ from episode to episode, in a third of the time of a new drive: after it comes
+        `mujoco.mj_resetData(model, data)` or the like, and `reset(data)`.
+
+        Parameters
+        ----------
+        parameters : mapping of str to number or array, optional
+            By dotted name (SI), such as "motor.torque_constant": one for all of `joints`, or one for each.
+        joints : sequence of str, optional
+            All unless given.
+        bus : Supply or sequence of tuple (Supply, joints), optional
+            Supplies in place of those that servos share, each with the same joints as before.
+
+        Raises
+        ------
+        InputError
+            Or one of its kinds, if a joint has no servo, a number is not possible, or it makes servos remember more.
+
+        Examples
+        --------
+        >>> import mujoco
+        >>> import servotwin as st
+        >>> model = mujoco.MjModel.from_xml_string('<mujoco><worldbody><body><joint name="elbow"/><geom size=".05"/>'
+        ...                                        "</body></worldbody></mujoco>")
+        >>> drive = ServoDrive(model, {"elbow": st.PulseServo(st.load_servo("hitec-hs-755hb"))})
+        >>> before = model.dof_armature[0]
+        >>> drive.set(parameters={"motor.rotor_inertia": 2e-6})
+        >>> bool(model.dof_armature[0] > before)
+        True
+        """
+        names = self.joints if joints is None else tuple(joints)
+        for name in names:
+            if name not in self.joints:
+                raise UnknownNameError("joint with a servo", name, self.joints)
+        columns = {}
+        for name, value in (parameters or {}).items():
+            column = np.asarray(value)
+            if column.shape not in ((), (len(names),)):
+                raise InputError(name, got=f"an array of shape {column.shape}",
+                                 allowed=f"a number, or an array ({len(names)},)")
+            columns[name] = np.broadcast_to(column, (len(names),))
+        self._harbour.change(Change([self.joints.index(name) for name in names], columns,
+                                    buses_of(self._joints, bus)))
+        put_numbers(self._arrays, self._harbour.first.berths)
+        put_into_model(load_mujoco(), self.model, self._joints, self._arrays["armature"])
 
     def reset(self, data: Any) -> None:
         """Let the servos begin anew at the next step, at rest where their joints are then, as if time had gone back.

@@ -7,6 +7,7 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -86,15 +87,18 @@ class Continuous(Distribution):
 
     def quantile(self, p: Array) -> Array:
         """Return the values at probabilities `p`."""
-        from scipy import stats
-
-        return np.asarray(self._law(stats).ppf(p), dtype=np.float64)
+        return np.asarray(_frozen(self).ppf(p), dtype=np.float64)
 
     def cdf(self, x: float) -> float:
         """Return the probability of a draw of at most `x`."""
-        from scipy import stats
+        return float(_frozen(self).cdf(x))
 
-        return float(self._law(stats).cdf(x))
+
+@lru_cache(256)  # SciPy takes a millisecond for it, and robots draw anew in each episode
+def _frozen(kind: Continuous) -> Any:
+    from scipy import stats
+
+    return kind._law(stats)
 
 
 @dataclass(frozen=True)

@@ -197,6 +197,41 @@ def drawn(distributions: Mapping[str, Distribution], lanes: int, seed: int, samp
             for name, distribution in distributions.items()}
 
 
+class Draw:
+    """Parameters of servos that differ from lane to lane, as `simulate_many` takes them: checked once, drawn often.
+
+    Parameters
+    ----------
+    vary : mapping of str to Distribution or str
+        By dotted names, about what the model says; what is beyond the physical range is never drawn.
+    model : Model
+
+    Raises
+    ------
+    InputError
+        Or one of its kinds, if a name or a distribution is not possible.
+    """
+
+    def __init__(self, vary: Mapping[str, Distribution | str], model: Model) -> None:
+        load = as_load(None)
+        self._distributions = distributions_of(vary, model, load, truncate=True)
+        self._known = [parameter(name, model, load) for name in self._distributions]
+        self._together = Together(model)
+
+    def lanes(self, lanes: int, seed: int) -> dict[str, Column]:
+        """Return the parameters of so many lanes that follow from what is drawn.
+
+        Raises
+        ------
+        ParameterError
+            If one leaves its range; names parameter and lane.
+        """
+        columns = drawn(self._distributions, lanes, seed, "random")
+        for known in self._known:
+            _check_range(columns[known.name], known, advice="")
+        return {**self._together.read(columns), **self._together.follow(columns)}
+
+
 def drawn_parameters(vary: Mapping[str, Distribution | str], model: Model, lanes: int, seed: int) -> dict[str, Column]:
     """Return servos that are drawn, within ranges, as `parameters` of `simulate_many`, or `variants`, take them.
 
@@ -219,11 +254,7 @@ def drawn_parameters(vary: Mapping[str, Distribution | str], model: Model, lanes
     InputError
         Or one of its kinds, if a name or a distribution is not possible.
     """
-    load = as_load(None)
-    columns = drawn(distributions_of(vary, model, load, truncate=True), lanes, seed, "random")
-    check_ranges(columns, model, load, advice="")
-    together = Together(model)
-    return {**together.read(columns), **together.follow(columns)}
+    return Draw(vary, model).lanes(lanes, seed)
 
 
 def noise_seeds(lanes: int, seed: int) -> NDArray[np.int64]:
@@ -279,13 +310,16 @@ def checked_table(draws: Mapping[str, Any], model: Model, load: Load) -> dict[st
 def check_ranges(columns: Mapping[str, Column], model: Model, load: Load, *, advice: str) -> None:
     """Raise ParameterError that names parameter and lane where a value leaves the physical range."""
     for name, column in columns.items():
-        known = parameter(name, model, load)
-        if column.dtype.kind != "f":
-            continue
-        good = np.isfinite(column) & (column >= known.lower) & (column <= known.upper)
-        if not good.all():
-            lane = int(np.argmin(good))
-            raise ParameterError(f"{name} of lane {lane}", got=float(column[lane]), allowed=known.allowed + advice)
+        _check_range(column, parameter(name, model, load), advice=advice)
+
+
+def _check_range(column: Column, known: Parameter, *, advice: str) -> None:
+    if column.dtype.kind != "f":
+        return
+    good = np.isfinite(column) & (column >= known.lower) & (column <= known.upper)
+    if not good.all():
+        lane = int(np.argmin(good))
+        raise ParameterError(f"{known.name} of lane {lane}", got=float(column[lane]), allowed=known.allowed + advice)
 
 
 # --- A study before it runs -------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ import threading
 import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,6 +129,33 @@ class Crew:
         return VectorSimulator(self.model, len(self.which), parameters=self.parameters, bus=list(self.bus) or None,
                                threads=1, watch_supply=self.watched)
 
+    def changed(self, change: Change) -> Crew:
+        """Return them with other numbers."""
+        numbers, (own, columns) = dict(self.parameters), self.part(change)
+        for name, column in columns.items():
+            whole = np.full(len(self.which), numbers.get(name, self.model.servo.get(name)), object)
+            whole[own] = column
+            numbers[name] = np.array(whole.tolist())
+        return replace(self, parameters=numbers, bus=self._on(change.bus) or self.bus)
+
+    def part(self, change: Change) -> tuple[Indices, dict[str, NDArray[Any]]]:
+        """Return lanes of which numbers change, and their columns."""
+        own = np.flatnonzero(np.isin(self.which, change.which))
+        at = [change.which.index(k) for k in self.which[own].tolist()]
+        return own, {name: column[at] for name, column in change.columns.items()} if at else {}
+
+    def _on(self, bus: Sequence[tuple[Supply, list[int]]]) -> list[tuple[Supply, list[int]]]:
+        places = {k: n for n, k in enumerate(self.which.tolist())}
+        return [(supply, [places[k] for k in own]) for supply, own in bus] if self.bus else []
+
+
+class Change(NamedTuple):
+    """Other numbers of servos: of `which` of all, columns by dotted name; supplies with the servos on each, if any."""
+
+    which: list[int]
+    columns: Mapping[str, NDArray[Any]]
+    bus: Sequence[tuple[Supply, list[int]]]
+
 
 def crews_of(joints: Sequence[Joint], bus: Any, watched: bool) -> list[Crew]:
     """Return all servos as crews, whose supplies may be watched.
@@ -138,7 +165,7 @@ def crews_of(joints: Sequence[Joint], bus: Any, watched: bool) -> list[Crew]:
     InputError
         If `bus` is no supply, names a joint without a servo or one twice, or has servos of several kinds.
     """
-    buses = _buses(joints, bus)
+    buses = buses_of(joints, bus)
     shared = [k for _, own in buses for k in own]
     crews = [_sharing(joints, buses)] if buses else []
     alone = [k for k in range(len(joints)) if k not in shared]
@@ -154,7 +181,7 @@ def _alike(a: Model, b: Model) -> bool:
     return a is b or (type(a) is type(b) and a.servo == b.servo)
 
 
-def _buses(joints: Sequence[Joint], bus: Any) -> list[tuple[Supply, list[int]]]:
+def buses_of(joints: Sequence[Joint], bus: Any) -> list[tuple[Supply, list[int]]]:
     """Return supplies with the numbers of the servos on each."""
     if bus is None:
         return []
@@ -206,20 +233,35 @@ class Berth:
             set_output_speed=own["speed"], set_load_inertia=own["inertia"], output_angle=own["reached"],
             output_speed=own["after"], armature_current=np.zeros(count), status=self._status)
         self._look = type(self.tick).armature_current.offset
-        self.pieces = self.entry.memory()
-        self._pieces = np.array(self.pieces, np.int64)
         self.words = np.zeros(len(GROUP), np.int64)
         at = ctypes.addressof(self.tick)
         values = {"advance": self.entry.address, "tick": at, "duration": at + type(self.tick).duration.offset,
                   "look": at + self._look, "lanes": count, "which": crew.which.ctypes.data,
                   **{name: array.ctypes.data for name, array in own.items()}, "status": self._status.ctypes.data,
-                  "seen": self.entry.seen.ctypes.data, "pieces": self._pieces.ctypes.data, "count": len(self.pieces)}
-        self.words[:] = [values[name] for name in GROUP]
+                  "seen": self.entry.seen.ctypes.data}
+        self.words[:] = [values.get(name, 0) for name in GROUP]
+        self.refresh()
 
     def refresh(self) -> None:
         """Find the memories where they are after numbers of the servos have changed."""
         self.pieces = self.entry.memory()
-        self._pieces[:] = self.pieces
+        self._pieces = np.array(self.pieces, np.int64)
+        self.words[[GROUP.index("pieces"), GROUP.index("count")]] = self._pieces.ctypes.data, len(self.pieces)
+
+    def change(self, change: Change) -> None:
+        """Take other numbers of the servos.
+
+        Raises
+        ------
+        InputError
+            Or one of its kinds, if one is not possible; names the lane.
+        """
+        after, (own, columns) = self.crew.changed(change), self.crew.part(change)
+        bus = list(after.bus) if change.bus and after.bus else None
+        if columns or bus is not None:
+            self.sims.set(parameters=columns or None, lanes=own if bus is None else None, bus=bus)
+            self.crew = after
+            self.refresh()
 
     @property
     def size(self) -> int:
@@ -334,6 +376,24 @@ class Instance:
             berth.reset(angle, goal)
         self.record_words[RECORD.index("used")] = 0
 
+    def change(self, change: Change) -> None:
+        """Take other numbers of servos, which begin anew.
+
+        Raises
+        ------
+        InputError
+            If one is not possible, or needs more memory than there is.
+        """
+        for k, (berth, begin) in enumerate(zip(self.berths, self._begin, strict=True)):
+            berth.change(change)
+            berth.sims.restore(begin)  # noise begins anew too
+            self._begin[k] = berth.sims.save()
+        if sum(berth.size for berth in self.berths) != self.size:
+            raise InputError("numbers of servos", got="some by which they remember more, as with play that they have"
+                             " not had", allowed="a new ServoDrive for these")
+        at = INSTANCE.index("fresh")
+        self.words[at:at + 3], self._start = 0, None  # what they remember at rest is found when they begin
+
     def keep(self, row: int, capacity: int) -> None:
         """Keep rows of so many numbers of what shows, as many as there were and up to `capacity`; 0: none."""
         rows = np.zeros((capacity, max(row, 1)))
@@ -401,6 +461,19 @@ class Harbour:
                 self._known[address] = weakref.finalize(data, self._forget, address)
                 self._known[address].atexit = False
         return self._found[address]
+
+    def change(self, change: Change) -> None:
+        """Take other numbers of servos, in all data.
+
+        Raises
+        ------
+        InputError
+            If one is not possible.
+        """
+        with self._lock:
+            for instance in {id(one): one for one in (self.first, *self._found.values())}.values():
+                instance.change(change)
+            self._crews = [berth.crew for berth in self.first.berths]
 
     def known(self, data: Any) -> Instance | None:
         """Return the servos in some data that was asked for before."""
@@ -504,12 +577,17 @@ def arrays_of(joints: Sequence[Joint], berths: Sequence[Berth], maps: Sequence[C
                "told_zero": how.zero, "rest": how.rest}
         for name, value in own.items():
             arrays[name][k] = value
+    put_numbers(arrays, berths)
+    return arrays
+
+
+def put_numbers(arrays: Arrays, berths: Sequence[Berth]) -> None:
+    """Put what follows from the numbers of servos into the arrays of all."""
     for berth in berths:
         which = berth.crew.which
         arrays["lower"][which], arrays["upper"][which] = berth.entry.travel()
         arrays["low"][which], arrays["high"][which] = berth.entry.commands(berth.kind)
         arrays["armature"][which] = berth.entry.own_inertia() / arrays["gain"][which] ** 2
-    return arrays
 
 
 def put_into_model(mujoco: Any, model: Any, joints: Sequence[Joint], armature: NDArray[np.float64]) -> None:

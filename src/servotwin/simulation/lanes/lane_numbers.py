@@ -31,7 +31,7 @@ from servotwin.models.terms.play import Play
 from servotwin.models.terms.shaft import Shaft
 from servotwin.models.terms.stops import Stops
 from servotwin.models.terms.wiring import PULSE_RANGE, TRAVEL_SLACK
-from servotwin.simulation.bus import Supplies, check_rigid
+from servotwin.simulation.bus import Supplies, check_rigid, supplies_of
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.compile.layout import GIVEN
 from servotwin.simulation.lanes.forms import TICKS
@@ -365,8 +365,8 @@ class LaneNumbers:
         self.inputs = replace(self.inputs, numbers=numbers)
         return True
 
-    def changed(self, which: Indices, parameters: Mapping[str, Any]) -> LaneNumbers:
-        """Return these lanes with other parameters in some of them.
+    def changed(self, which: Indices, parameters: Mapping[str, Any], bus: Any = None) -> LaneNumbers:
+        """Return these lanes with other parameters in some of them, and other supplies on their buses.
 
         Raises
         ------
@@ -381,7 +381,8 @@ class LaneNumbers:
         known = {**inputs.numbers, **inputs.words}
         loads = [inputs.loads[k] for k in inputs.load_of.tolist()]
         inputs = lanes_of(inputs.model, inputs.commands[0], loads, {**known, **merged}, None, inputs.seeds)
-        return LaneNumbers(inputs, self.accuracy, self.supplies, self.imposed)
+        supplies = self.supplies if bus is None else supplies_of(bus, inputs.model, inputs.count)
+        return LaneNumbers(inputs, self.accuracy, supplies, self.imposed)
 
     def repacked(self, which: Indices, parameters: Mapping[str, Any]) -> LaneNumbers | None:
         """Return some lanes with other parameters, packed by themselves; None where they need more than their places.
@@ -524,9 +525,10 @@ class LaneNumbers:
 
     def own_inertia(self) -> Array:
         """Return of each lane what turns with the output without its load, the motor included unless it has play."""
-        shaft, apart = self.now(Shaft), (self.now(Play).half > 0.0) | (self.now(Elastic).k > 0.0)
-        load = np.where(np.isnan(self.imposed.load_inertia), self.load_total, self.imposed.load_inertia)
-        return np.asarray(np.where(apart, shaft.J_out, shaft.J) - load)
+        name = next(name for name, term in fields_of(Numbers) if term is Shaft)
+        shaft = columns_of(Shaft, self.given[name], slice(self.count))  # the same whatever load is imposed
+        apart = (self.now(Play).half > 0.0) | (self.now(Elastic).k > 0.0)
+        return np.asarray(np.where(apart, shaft.J_out, shaft.J) - self.load_total)
 
     def check_recorded(self, now: Array, duration: float) -> None:
         """Raise LoadError if a recorded torque ends before lanes that advance by a duration [s] do; names the lane."""

@@ -323,7 +323,7 @@ class VectorSimulator:
     def set(self, *, output_angle: ArrayLike | None = None, output_speed: ArrayLike | None = None,
             load_inertia: ArrayLike | None = None, bus_voltage: ArrayLike | None = None,
             parameters: Mapping[str, Any] | None = None, torque_enable: ArrayLike | None = None,
-            lanes: ArrayLike | None = None) -> None:
+            lanes: ArrayLike | None = None, bus: Any = None) -> None:
         """Impose what another simulator decides, or change numbers; all else that lanes remember stays.
 
         Parameters
@@ -342,6 +342,8 @@ class VectorSimulator:
             Whether the torque of digital servos is on.
         lanes : array of bool, shape (lanes,), or of int, optional
             For which lanes; arrays have one number for each of them.
+        bus : Supply or sequence of tuple (Supply, lanes), optional
+            Supplies in place of those that all lanes share, on which the same lanes are as before.
 
         Raises
         ------
@@ -349,21 +351,23 @@ class VectorSimulator:
             On bad input, before anything changes; names lane and argument.
         """
         which = pick(lanes, len(self))
+        if bus is not None:
+            self._check_bus(bus, which)
         self._store.fresh[0] = 0
         torque = None if torque_enable is None else self._torque_switch(torque_enable, which)
-        angle, speed, inertia, bus = (
+        angle, speed, inertia, voltage = (
             None if value is None else numbers_of(name, value, which) for name, value in (
                 ("output_angle", output_angle), ("output_speed", output_speed), ("load_inertia", load_inertia),
                 ("bus_voltage", bus_voltage)))
-        self._check_imposed(angle, inertia, bus, which)
-        anew = bool(parameters) and not self._numbers.retuned(which, parameters or {})
-        if anew and parameters:
-            part = self._numbers.repacked(which, parameters)
-            if part is None or not self._store.takes(part, which, parameters):
-                self._store.renew(self._numbers.changed(which, parameters), which)
+        self._check_imposed(angle, inertia, voltage, which)
+        anew = bus is not None or (bool(parameters) and not self._numbers.retuned(which, parameters or {}))
+        if anew:
+            part = self._numbers.repacked(which, parameters) if parameters and bus is None else None
+            if part is None or not self._store.takes(part, which, parameters or {}):
+                self._store.renew(self._numbers.changed(which, parameters or {}, bus), which)
         otherwise = False
-        if inertia is not None or bus is not None:
-            otherwise = self._numbers.impose(which, inertia, bus)
+        if inertia is not None or voltage is not None:
+            otherwise = self._numbers.impose(which, inertia, voltage)
             self._store.refit(which, otherwise)
         if self._entry is not None and (anew or otherwise):
             self._entry.refresh()
@@ -372,15 +376,22 @@ class VectorSimulator:
         if torque is not None:
             self._store.enable(which, torque)
 
-    def _check_imposed(self, angle: Array | None, inertia: Array | None, bus: Array | None,
+    def _check_bus(self, bus: Any, which: NDArray[np.int64]) -> None:
+        before = self._numbers.supplies.bus_of
+        after = supplies_of(bus, self._numbers.model, len(self)).bus_of
+        if len(which) < len(self) or not np.array_equal(before, after):
+            raise InputError("set(bus=...)", got=f"lanes on buses {after.tolist()}",
+                             allowed=f"all lanes at once, on the buses that they are on: {before.tolist()}")
+
+    def _check_imposed(self, angle: Array | None, inertia: Array | None, voltage: Array | None,
                        which: NDArray[np.int64]) -> None:
         if inertia is not None:
             _check_lanes("load_inertia", inertia, which, inertia >= 0.0, "at least 0 kg m²")
         if angle is not None:
             self._numbers.check_angles(angle, which)
-        if bus is not None:
-            _check_lanes("bus_voltage", bus, which, bus > 0.0, "a positive voltage")
-            _check_lanes("bus_voltage", bus, which, self._numbers.supplies.bus_of[which] < 0,
+        if voltage is not None:
+            _check_lanes("bus_voltage", voltage, which, voltage > 0.0, "a positive voltage")
+            _check_lanes("bus_voltage", voltage, which, self._numbers.supplies.bus_of[which] < 0,
                          "nothing: what all on its bus draw decides it")
 
     # --- memory -------------------------------------------------------------------------------------------------------

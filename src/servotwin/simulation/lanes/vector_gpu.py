@@ -161,14 +161,15 @@ class VectorSimulatorOnGpu(VectorSimulator):
 
     def set(self, *, output_angle: Any = None, output_speed: Any = None, load_inertia: Any = None,
             bus_voltage: Any = None, parameters: Mapping[str, Any] | None = None, torque_enable: Any = None,
-            lanes: Any = None, stream: Any = None) -> None:
+            lanes: Any = None, bus: Any = None, stream: Any = None) -> None:
         """Impose what another simulator decides, as `VectorSimulator.set` does; nan in an array on the GPU: not.
 
         A lane whose bridge would drop all of its bus voltage has failed. `parameters` are refused: `variants` has other
         numbers for lanes.
         """
-        if parameters is not None:
-            raise _refused("parameters")
+        for name, value in (("parameters", parameters), ("bus", bus)):
+            if value is not None:
+                raise _refused(name)
         which = None if is_guest(lanes) else pick(lanes, len(self))
         given = {name: self._spread(argument, value, which) for name, argument, value in (
             ("angle", "output_angle", output_angle), ("speed", "output_speed", output_speed),
