@@ -158,9 +158,9 @@ class Camera:
         self._scene = mujoco.MjvScene(model, maxgeom=_MOST_SHAPES)
         self._open: list[Callable[[], object]] = []
         try:
-            context = _context_class()(width, height)
-            self._open.append(context.free)
-            context.make_current()
+            self._gl = _context_class()(width, height)
+            self._open.append(self._gl.free)
+            self._gl.make_current()
             self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
             self._open.append(self._context.free)
             mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
@@ -186,6 +186,7 @@ class Camera:
             Lines in space.
         """
         mujoco, scene = self._mujoco, self._scene
+        self._gl.make_current()  # another camera may have drawn since
         all_of_it = mujoco.mjtCatBit.mjCAT_ALL.value
         self._put(self._data, pose)
         mujoco.mjv_updateScene(self._model, self._data, self._option, None, self._view, all_of_it, scene)
