@@ -1,4 +1,7 @@
-"""`ServoActuated`: servos in the place of the actuators of a Gymnasium environment."""
+"""`ServoActuated`: servos in the place of the actuators of a Gymnasium environment.
+
+Importing this gives Gymnasium the names of servotwin's own: `servotwin/SO101Reach-v0` and `servotwin/Biped-v0`.
+"""
 
 from __future__ import annotations
 
@@ -22,9 +25,22 @@ except ImportError:
     raise MissingExtraError("gymnasium", "robots") from None
 
 _T = TypeVar("_T")
+_OWN = {"SO101Reach": 100, "Biped": 500}  # environments, and steps of an episode
+for _name, _steps in _OWN.items():
+    if f"servotwin/{_name}-v0" not in gymnasium.registry:
+        gymnasium.register(f"servotwin/{_name}-v0", entry_point=f"servotwin.robots.trainers.environments:{_name}",
+                           max_episode_steps=_steps)
 _LOOKS = {"servo_current": "armature_current", "servo_voltage": "bus_voltage",
           "servo_temperature": "winding_temperature", "servo_trip": "trip"}
 _LOST = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")  # after each of these MuJoCo starts anew
+
+
+def seen(drive: ServoDrive, data: Any) -> dict[str, Any]:
+    """Return what `info` has of servos, in the order of `drive.joints`; a signal that not all have is left out."""
+    found = {name: drive.look(data, signal) for name, signal in _LOOKS.items()}
+    found["servo_trip"] = np.nan_to_num(found["servo_trip"])  # what has no protection does not trip
+    known = {name: values for name, values in found.items() if np.isfinite(values).all()}
+    return {"servo_torque": drive.torque(data), **known}
 
 
 class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordConstructorArgs):
@@ -123,7 +139,7 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
         if lost:
             raise SimulationError("MUJOCO", float(self.data.time), "MuJoCo has met a number that is not finite, or too "
                                   f"large, and has started anew ({', '.join(lost)})")
-        return observation, reward, terminated, truncated, {**info, **self._seen()}
+        return observation, reward, terminated, truncated, {**info, **seen(self.drive, self.data)}
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Let the environment begin anew, and the servos with it, at rest.
@@ -157,13 +173,6 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
             mujoco.set_mjcb_control(before)
         self.drive.raise_failure(self.data)
         return result
-
-    def _seen(self) -> dict[str, Any]:
-        """Return what `info` has of the servos, in the order of `drive.joints`."""
-        seen = {name: self.drive.look(self.data, signal) for name, signal in _LOOKS.items()}
-        seen["servo_trip"] = np.nan_to_num(seen["servo_trip"])  # what has no protection does not trip
-        known = {name: values for name, values in seen.items() if np.isfinite(values).all()}
-        return {"servo_torque": self.drive.torque(self.data), **known}
 
     # --- what shows ---------------------------------------------------------------------------------------------------
 

@@ -454,3 +454,103 @@ def so101(*, scene: bool = True, motors: bool = False) -> str:
         for joint in JOINTS:
             Xml.SubElement(actuators, "motor", name=joint, joint=joint)
     return text(root)
+
+
+# --- A biped of the size of a hobbyist's robot as a MuJoCo model: ten joints, each of them turned by a servo ----------
+
+# No robot that somebody sells: all sizes and masses are assumed, but for the servos' mass, which is that of Feetech's
+# list of the STS3215, as in its file of the catalog. Legs have a hand's length, so that servos of 3 N m carry its
+# weight on one bent leg with a seventh of their torque. A link has the servo that turns the next one. Feet have rubber
+# (friction 1, assumed), and contacts are damped critically within 10 ms; legs do not touch each other. Joints have
+# neither damping nor friction nor armature: the servos bring these.
+
+BIPED_JOINTS: tuple[str, ...] = tuple(f"{side}_{joint}" for side in ("left", "right") for joint in (
+    "hip_roll", "hip_pitch", "knee", "ankle_pitch", "ankle_roll"))
+"""Names of the biped's joints, from the hip on."""
+BIPED_LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType({
+    joint: limits for joint in BIPED_JOINTS for part, limits in (
+        ("hip_roll", (-0.6, 0.6)), ("hip_pitch", (-1.5, 0.9)), ("knee", (-0.1, 2.2)), ("ankle_pitch", (-1.2, 1.2)),
+        ("ankle_roll", (-0.6, 0.6))) if joint.endswith(part)})
+"""Limits of the biped's joints [rad], assumed: those of brackets that do not hit each other."""
+_BEND = 0.35  # rad: of hip and ankle, and half of the knee, as it stands
+BIPED_STANCE: Mapping[str, float] = MappingProxyType({
+    joint: {"hip_pitch": -_BEND, "knee": 2.0 * _BEND, "ankle_pitch": -_BEND}.get(joint.partition("_")[2], 0.0)
+    for joint in BIPED_JOINTS})
+"""Angles of the biped's joints as it stands, knees bent, its middle above its feet [rad]."""
+_STS3215, _BRACKET, _FOOT, _BODY = 0.055, 0.02, 0.03, 0.55  # kg: a servo; bracket of a link, foot, body
+_HIP_AT, _HIP_LINK, _BONE, _ANKLE_LINK, _SOLE = 0.042, 0.03, 0.085, 0.03, 0.012  # m: beside the middle; between axes
+_SOLE_HALF = (0.055, 0.032, 0.004)  # half of a foot [m]
+_BODY_HALF = (0.04, 0.065, 0.055)  # half of the body [m]
+BIPED_HEIGHT = _BODY_HALF[2] + _HIP_LINK + 2.0 * _BONE * float(np.cos(_BEND)) + _ANKLE_LINK + _SOLE
+"""Height of the middle of the biped's body as it stands [m]."""
+
+
+def biped(*, scene: bool = True) -> str:
+    """Return the MJCF of a biped of 1.3 kg that stands at the origin and looks along x.
+
+    Its body is `body`, which the joint `floating` frees; each of its joints has a `motor` of its name, whose control is
+    that of the servo there. Both legs are straight at angle 0, and positive angles of hip, knee and ankle turn what is
+    below backwards; it stands as `BIPED_STANCE` says. Feet are the geoms `left_foot` and `right_foot`.
+
+    Parameters
+    ----------
+    scene : bool
+        With light and sky, and the camera `follow` that keeps beside it; the ground is there in any case.
+
+    Returns
+    -------
+    str
+        XML, for `mujoco.MjModel.from_xml_string`.
+
+    Examples
+    --------
+    >>> biped().count("<joint "), biped().count("<motor "), round(BIPED_HEIGHT, 3)
+    (10, 10, 0.287)
+    """
+    root, assets, world = new_robot("biped")
+    if scene:
+        add_scene(root, assets, world, (0.9, -1.1, 0.55), (0.0, 0.0, 0.16))
+    else:
+        Xml.SubElement(world, "geom", name="ground", type="plane", size="0 0 0.05")
+    body = Xml.SubElement(world, "body", name="body", childclass="biped", pos=words((0.0, 0.0, BIPED_HEIGHT)))
+    Xml.SubElement(body, "freejoint", name="floating")
+    if scene:
+        Xml.SubElement(body, "camera", name="follow", mode="track", pos="0.55 -0.85 0.2", fovy="40",
+                       xyaxes="0.84 0.543 0 -0.12 0.186 0.975")
+    low = -_BODY_HALF[2]
+    servos = [Block(_STS3215, (0.0, side * _HIP_AT, low + _SERVO[2]), _SERVO) for side in (1.0, -1.0)]
+    add_blocks(body, [Block(_BODY, (0.0, 0.0, 0.0), _BODY_HALF), *servos])
+    add_shapes(body, (box("printed", (0.0, 0.0, 0.0), _BODY_HALF),
+                      box("board", (0.0, 0.0, 0.01), (0.042, 0.045, 0.03)),
+                      box("servo", (0.03, 0.0, 0.035), (0.014, 0.03, 0.008))))
+    for name, side in (("left", 1.0), ("right", -1.0)):
+        _add_leg(body, name, side * _HIP_AT, low)
+    actuators = Xml.SubElement(root, "actuator")
+    for joint in BIPED_JOINTS:
+        Xml.SubElement(actuators, "motor", name=joint, joint=joint)
+    return text(root)
+
+
+def _add_leg(body: Xml.Element, name: str, aside: float, low: float) -> None:
+    """Add a leg at a place of the body [m]: hip link, thigh, shank, ankle link, foot."""
+    at, drop = (0.0, aside, low), 0.0
+    for joint, axis, length in (
+            ("hip_roll", "1 0 0", _HIP_LINK), ("hip_pitch", "0 1 0", _BONE), ("knee", "0 1 0", _BONE),
+            ("ankle_pitch", "0 1 0", _ANKLE_LINK), ("ankle_roll", "1 0 0", _SOLE)):
+        full = f"{name}_{joint}"
+        body = Xml.SubElement(body, "body", name=full, pos=words(at if not drop else (0.0, 0.0, -drop)))
+        Xml.SubElement(body, "joint", name=full, type="hinge", axis=axis, range=words(BIPED_LIMITS[full]))
+        drop = length
+        if joint == "ankle_roll":
+            sole = (0.008, 0.0, -_SOLE + _SOLE_HALF[2])
+            add_blocks(body, [Block(_FOOT, sole, _SOLE_HALF)])
+            add_shapes(body, ({**box("pad", sole, _SOLE_HALF), "name": f"{name}_foot", "friction": "1 0.005 0.0001",
+                               "solref": "0.01 1"},))
+            return
+        upright = (_SERVO[1], _SERVO[0], _SERVO[2])
+        servo = (0.0, 0.0, -length + (0.0 if length == _BONE else 0.5 * length))
+        add_blocks(body, [Block(_STS3215, servo, upright),
+                          Block(_BRACKET, (0.0, 0.0, -0.5 * length), (0.012, 0.018, 0.5 * length))])
+        no_touch = {"contype": "0", "conaffinity": "0"}
+        add_shapes(body, ({**box("servo", servo, upright), **no_touch},
+                          {**box("printed", (0.0, 0.0, -0.5 * length), (0.009, 0.02, 0.5 * length)), **no_touch}))
