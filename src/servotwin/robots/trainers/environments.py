@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -72,7 +73,7 @@ class ServoTask(gymnasium.Env[Observation, Observation], gymnasium.utils.EzPickl
     vary : mapping or "stated", optional
         Distributions of numbers, by dotted name, as of `sweep`, or by joint such mappings: at each reset each joint
         draws its own, by the environment's seed; numbers of the supply are drawn once for all. "stated": all that the
-        file of the servo says of itself.
+        file of the servo says of itself. Whatever varies, the rest of an episode is the same for a seed.
     render_mode : str, optional
         "rgb_array".
     width, height : int
@@ -181,9 +182,9 @@ class ServoTask(gymnasium.Env[Observation, Observation], gymnasium.utils.EzPickl
         super().reset(seed=seed)
         if options:
             raise UnknownNameError("option of reset", next(iter(options)), (), allowed="none")
-        drawn = {}
+        own, drawn = int(self.np_random.integers(_MOST_SEED)), {}  # where none vary too: a seed is the same task then
         if self._draws:
-            values, supply = self._draws.drawn(int(self.np_random.integers(_MOST_SEED)))
+            values, supply = self._draws.drawn(own)
             self.drive.set(parameters=values, bus=supply)
             drawn = {"servo_parameters": {**values, **self._draws.of_supply(supply)}}
         mujoco = load_mujoco()
@@ -293,8 +294,7 @@ class _Draws:
         supply = self._supply
         if self._of_bus is not None:
             values = self._of_bus.lanes(1, seed)
-            supply = supply.__class__(**{**vars(supply), **{
-                name.partition(".")[2]: float(column[0]) for name, column in values.items()}})
+            supply = replace(supply, **{name.partition(".")[2]: float(column[0]) for name, column in values.items()})
         return {name: np.array(whole) for name, whole in found.items()}, supply
 
     def of_supply(self, supply: Supply) -> dict[str, float]:
