@@ -50,7 +50,7 @@ _FASTEST = 20.0  # rad/s: no hobby servo turns as fast
 _MOST_SEED = 2**63
 
 
-# --- What all tasks share: servos, their draw, time, pictures ---------------------------------------------------------
+# --- The part that all tasks share: servos, their draw, time, pictures ------------------------------------------------
 
 class ServoTask(gymnasium.Env[Observation, Observation], gymnasium.utils.EzPickle):
     """A robot in MuJoCo whose joints servos move, all of them on one supply, and something for it to do.
@@ -73,7 +73,7 @@ class ServoTask(gymnasium.Env[Observation, Observation], gymnasium.utils.EzPickl
     vary : mapping or "stated", optional
         Distributions of numbers, by dotted name, as of `sweep`, or by joint such mappings: at each reset each joint
         draws its own, by the environment's seed; numbers of the supply are drawn once for all. "stated": all that the
-        file of the servo says of itself. Whatever varies, the rest of an episode is the same for a seed.
+        file of the servo says of itself. For a seed all else of an episode is the same as without it.
     render_mode : str, optional
         "rgb_array".
     width, height : int
@@ -253,7 +253,7 @@ class ServoTask(gymnasium.Env[Observation, Observation], gymnasium.utils.EzPickl
 
 
 class _Draws:
-    """What differs among the servos of a robot from episode to episode; false where nothing does."""
+    """Numbers in which the servos of a robot differ from episode to episode; false where there are none."""
 
     def __init__(self, vary: Mapping[str, Any] | str | None, joints: list[str], models: list[Model],
                  supply: Supply) -> None:
@@ -317,9 +317,9 @@ def _supply(given: Any, model: Model) -> Supply:
 class SO101Reach(ServoTask):
     """An SO-101 brings the tip of its gripper to a point: `servotwin/SO101Reach-v0`.
 
-    Six STS3215 have the registers that LeRobot writes, the gripper its own. An action is by how much the goals of the
-    six joints go on, 1 for `STEP`, as a leader arm or a policy of LeRobot's gives goals, within the limits of the
-    joints. The arm begins folded, the point is drawn where the tip gets to without the table.
+    Six STS3215 have the registers that LeRobot writes, the gripper its own. An action moves the goals of the six
+    joints, 1 by `STEP`, within the limits of the joints; a leader arm and a policy of LeRobot's give goals too. The arm
+    begins folded, the point is drawn where the tip gets to without the table.
 
     Observed are angles of the joints [rad] as their encoders show them, their mean speeds over the last step [rad/s],
     goals [rad], the last action, the point, the tip, and the way from the tip to the point [m].
