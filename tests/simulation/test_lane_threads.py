@@ -96,18 +96,21 @@ def limited(draw):
 
 
 def creeping(draw):
-    """Return the same with static friction that fades, without play; some have a potentiometer with play."""
+    """Return the same with static friction that fades, or play of the gear; potentiometers with play and steps."""
     def drawn(rng, lanes):
-        own = limited(draw)(rng, lanes) | chosen(
-            rng, lanes, 0.7, friction__breakaway_ratio=(1.1, 1.8, 1.0), friction__stribeck_speed=(0.5, 100.0, 5.0),
-            friction__stribeck_exponent=(0.4, 3.0, 1.0), **{
-                f"friction__load_friction_{side}{part}": bounds for side in ("motor", "external")
-                for part, bounds in (("", (0.05, 0.3, 0.0)), ("_stribeck", (0.02, 0.2, 0.0)),
-                                     ("_quad", (0.1, 0.5, 0.0)))})
+        own, fading = limited(draw)(rng, lanes), rng.random(lanes) < 0.8
+        own |= {name: np.where(fading, values, 1.0 if name == "friction.breakaway_ratio" else 0.0)
+                for name, values in chosen(rng, lanes, 0.7, friction__breakaway_ratio=(1.1, 1.8, 1.0), **{
+                    f"friction__load_friction_{side}{part}": bounds for side in ("motor", "external")
+                    for part, bounds in (("", (0.05, 0.3, 0.0)), ("_stribeck", (0.02, 0.2, 0.0)),
+                                         ("_quad", (0.1, 0.5, 0.0)))}).items()}
+        own |= chosen(rng, lanes, 0.7, friction__stribeck_speed=(0.5, 100.0, 5.0),
+                      friction__stribeck_exponent=(0.4, 3.0, 1.0))
+        if "electronics.off_state" in own:
+            own |= chosen(rng, lanes, potentiometer__backlash=(1e-3, 1e-2, 0.0),
+                          potentiometer__quantisation=(1e-3, 2e-2, 1e-6))
         own.pop("friction.load_friction", None)
-        if "electronics.deadband" in own:
-            own |= chosen(rng, lanes, potentiometer__backlash=(1e-3, 1e-2, 0.0))
-        return own | {"gear.backlash": np.zeros(lanes)}
+        return own | {"gear.backlash": np.where(fading, 0.0, rng.uniform(2e-3, 2e-2, lanes))}
     return drawn
 
 

@@ -39,7 +39,12 @@ def same(here, there, *, within=1e-11):
         assert there[name].read() == pytest.approx(here[name], abs=within * scale), name
 
 
-@pytest.mark.parametrize("model", [None, pytest.param(st.DigitalServo(st.load_servo(GOALS)), marks=pytest.mark.slow)])
+FADING = {"friction.stribeck_speed": 20.0, "friction.breakaway_ratio": 1.4, "supply.current_limit": 0.8}
+
+
+@pytest.mark.parametrize("model", [
+    None, pytest.param(st.DigitalServo(st.load_servo(GOALS)), marks=pytest.mark.slow),
+    pytest.param(st.PulseServo(st.load_servo(PLAIN).replace(FADING)), marks=pytest.mark.slow)])
 def test_numbers_that_are_given_are_those_of_the_processor(driver, model):
     here, there = both(driver, model, **({} if model else {"parameters": NUMBERS}))
     assert isinstance(there, VectorSimulatorOnGpu)

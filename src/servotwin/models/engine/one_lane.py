@@ -24,7 +24,6 @@ from servotwin.models.state.modes import INSIDE, RIGID, Mode, Vector, one_body
 from servotwin.models.state.records import reader, writer
 from servotwin.models.terms import bridge, duty, frame, play
 from servotwin.models.terms.frame import Frame
-from servotwin.models.terms.friction import fades
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import wiper_at
 from servotwin.models.terms.shaft import Shaft
@@ -33,7 +32,8 @@ from servotwin.models.terms.wiring import TRAVEL_SLACK, Wiring, followed, possib
 if TYPE_CHECKING:
     from servotwin.models.engine.lanes import Floats
 
-BY_ARCS, BY_LEGS = range(2)
+BY_ARCS, BY_LEGS, BY_CREEPS = range(3)
+SLOWEST = BY_CREEPS  # of which a text has nothing where no friction fades: `BY_CREEPS` is nothing there
 FOLLOWED, PULSE_WIDTH, COMMAND_ANGLE = range(3)  # kinds of commands: as the engine follows it, or of the servo
 arc_at, put_arcs = reader("arc_at", ArcNumbers), writer("put_arcs", ArcNumbers)
 wiring_at = reader("wiring_at", Wiring)
@@ -86,7 +86,7 @@ def pulses(by: int, numbers: Any, arcs: Any, chips: Any, j: int, curve: Floats, 
         else:
             own = numbers_at(anew(numbers), j)
             own, u = at_pulses(own, now.silent) if heeds else own, now.drive * own.source.V
-            if fades(own.friction):
+            if SLOWEST == BY_CREEPS:
                 gone = fading_legs.go(own, torque, u, y, legs.mode_from(own, torque, u, y, mesh), wiper, end - t)
             else:
                 gone = legs.go(own, torque, u, y, legs.mode_from(own, torque, u, y, mesh), wiper, end - t)
@@ -122,7 +122,7 @@ def ticks(numbers: Any, j: int, inputs: Inputs, firm: Any, stand: Stand, duratio
         end = min(controller.next_due(firmware, firm, frames), T_c if left > 0 else rest)
         own = duty.at_duty(own, firm.duty)
         u = duty.voltage(own.source, firm.duty)
-        if fades(own.friction):
+        if SLOWEST == BY_CREEPS:
             gone = fading_legs.go(own, torque, u, y, legs.mode_from(own, torque, u, y, mesh), wiper, end - t)
         else:
             gone = legs.go(own, torque, u, y, legs.mode_from(own, torque, u, y, mesh), wiper, end - t)

@@ -29,7 +29,7 @@ from servotwin.models.engine.step import REFUSED
 from servotwin.models.state.records import TILE, fields_of, record_of, rows_of
 from servotwin.models.terms import control, frame
 from servotwin.models.terms.control import WAITING, Firm
-from servotwin.models.terms.dependence import PROGRAM, PWM
+from servotwin.models.terms.dependence import FADING, PROGRAM, PWM
 from servotwin.models.terms.firmware import Firmware
 from servotwin.models.terms.frame import Chip, Frame
 from servotwin.models.terms.numbers import Numbers
@@ -378,11 +378,12 @@ class LaneText:
     @property
     def recipe(self) -> Recipe:
         """The kernels within it."""
-        never = "BY_LEGS" if self.way == PULSES_BY_ARCS else "BY_ARCS"
+        never = ("BY_LEGS" if self.way == PULSES_BY_ARCS else "BY_ARCS", *(
+            () if self.flags & FADING else ("BY_CREEPS",)))
         entries = tuple(f"servotwin.models.{'state.noise' if entry == 'chosen' else 'engine.one_lane'}:{entry}"
                         for entry in _signatures(self))
         return Recipe(f"lane_{self.way}{'_beside' if self.beside else ''}", entries, knows=self.flags,
-                      always=PROGRAM | PWM if self.way == TICKS else 0, never=(never,), in_floats=self.floats)
+                      always=PROGRAM | PWM if self.way == TICKS else 0, never=never, in_floats=self.floats)
 
     @property
     def text(self) -> str:

@@ -13,12 +13,14 @@ from servotwin.models.engine.dynamics import guards
 from servotwin.models.engine.dynamics.coefficients import Apart, linear_coefficients
 from servotwin.models.engine.events import crossings
 from servotwin.models.engine.legs import legs
-from servotwin.models.engine.legs.legs import MOST_LEGS, Gone
+from servotwin.models.engine.legs.legs import MOST_SHORT, SHORT, Gone
 from servotwin.models.engine.motions import stribeck
-from servotwin.models.state.modes import UNIT, Mode, Vector, one_body
+from servotwin.models.state.modes import INSIDE, UNIT, Mode, Vector, one_body
+from servotwin.models.terms import play
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import wiper_at
 
+_LEGS = 4000  # under one drive: more than of `legs`, for there is nothing that those it gives up are left to
 TOLERANCE = 1e-12  # rad, rad/s: of a creep, as of one at the accuracy that is usual
 _TRIES = 200  # of the time at which a creep meets a stop
 IN_FLOATS = {"TOLERANCE": 1e-6}
@@ -34,8 +36,9 @@ class Crept(NamedTuple):
 
 
 def go(numbers: Numbers, torque: float, u: float, y: Vector, mode: Mode, wiper: float, time: float) -> Gone:
-    """Return where a servo goes within a time [s], as `legs.go` has it."""
-    for _ in range(MOST_LEGS):
+    """Return where a servo goes within a time [s], as `legs.go` has it; with play in its gear no friction may fade."""
+    short = 0
+    for _ in range(_LEGS):
         if legs.stands(mode) or not time > 0.0:
             return Gone(y, mode, wiper, 1.0 if math.isfinite(y.q) else 0.0)
         if stribeck.creeps(numbers, mode, u, torque, y):
@@ -43,13 +46,17 @@ def go(numbers: Numbers, torque: float, u: float, y: Vector, mode: Mode, wiper: 
             if done == 0.0:
                 return Gone(y, mode, wiper, 0.0)
         else:
-            laws = laws_of(numbers, mode, u, torque, y.w)
+            inside = mode.mesh == INSIDE
+            laws = legs.laws_of(numbers, mode, u, torque) if inside else laws_of(numbers, mode, u, torque, y.w)
             end = legs.ending(numbers, mode, laws, u, torque, y, time)
             gone, kind = min(end.time, time), end.kind
             y = end.after if kind < 0 else legs.moved(numbers, mode, laws, y, end.time)
         wiper = wiper_at(numbers.sensor, wiper, y.q)
         if kind >= 0:
             mode, y = crossings.cross(numbers, mode, kind, u, torque, y)
+        short = short + 1 if gone <= SHORT * time else 0
+        if short >= MOST_SHORT and play.present(numbers.play):
+            _, mode, y = legs.together(numbers, mode, u, torque, y)
         time -= gone
     return Gone(y, mode, wiper, 0.0)
 
