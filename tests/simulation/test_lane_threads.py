@@ -368,7 +368,7 @@ def on_device():
 @pytest.mark.slow
 @pytest.mark.skipif(not on_device(), reason="no clang that makes PTX")
 @pytest.mark.parametrize(("case", "most"), [
-    ("arcs", 3e5), ("goals", 3e5), ("legs, creeping", 4e5), ("goals, limited", 6e5), ("goals, creeping", 5e5)])
+    ("arcs", 3e5), ("goals", 3e5), ("legs, creeping", 4.5e5), ("goals, limited", 6e5), ("goals, creeping", 5e5)])
 def test_ptx_of_floats_calls_nothing_and_has_no_doubles(case, most):
     sims, *_ = made(case, 2)
     text = text_of(sims._numbers, "float32")
