@@ -120,9 +120,9 @@ CASES = {  # servo, what its lanes have, way, how many, and how far they may be 
     "goals": (st.DigitalServo, GOALS, goals, TICKS, 160, 1e-9),
     "pulses": (st.DigitalServo, PULSES, programmed, TICKS, 80, 1e-11),
     "legs, limited": (st.PulseServo, PLAIN, limited(analog), PULSES_BY_LEGS, 240, 1e-11),
-    "legs, creeping": (st.PulseServo, PLAIN, creeping(analog), PULSES_BY_LEGS, 240, 1e-11),
+    "legs, creeping": (st.PulseServo, PLAIN, creeping(analog), PULSES_BY_LEGS, 240, 1e-12),
     "goals, limited": (st.DigitalServo, GOALS, limited(goals), TICKS, 200, 1e-11),
-    "goals, creeping": (st.DigitalServo, GOALS, creeping(goals), TICKS, 200, 1e-11),
+    "goals, creeping": (st.DigitalServo, GOALS, creeping(goals), TICKS, 200, 1e-12),
     "pulses, limited": (st.DigitalServo, PULSES, limited(programmed), TICKS, 80, 1e-11),
     "pulses, creeping": (st.DigitalServo, PULSES, creeping(programmed), TICKS, 80, 1e-11)}
 
