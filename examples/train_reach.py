@@ -1,6 +1,6 @@
 """A policy learns to bring the tip of an SO-101 to a point, by PPO of Stable-Baselines3; then it meets other servos.
 
-`python train_reach.py` takes six minutes on two cores; `python train_reach.py 5000` is a short run, which learns little.
+It takes six minutes on two cores; `python train_reach.py 5000` is a short run, which learns little.
 """
 
 import sys
