@@ -41,6 +41,16 @@ def test_a_picture_shows_the_robot_and_its_shadow(model):
     assert np.abs(written.astype(int) - alone)[:16].max() > 20
 
 
+def test_two_cameras_draw_in_turn_as_each_alone(model):
+    """The second one left its context current, and the first drew noise."""
+    with Camera(model, 96, 64) as first:
+        alone = first.picture(POSE)
+        with Camera(model, 64, 48) as second:
+            second.picture(POSE)
+            np.testing.assert_array_equal(first.picture(POSE), alone)
+        np.testing.assert_array_equal(first.picture(POSE), alone)
+
+
 def test_all_of_a_motion_is_in_the_picture(model):
     """The border of no picture shows the robot: without a sky it is black all around."""
     poses = np.linspace([-1.5, 0.0], [1.5, 1.5], 9)
