@@ -276,6 +276,8 @@ class Camera:
 
     def close(self) -> None:
         """Give back what the drawing holds."""
+        if self._open:
+            self._gl.make_current()  # or another camera's pictures would go
         while self._open:
             self._open.pop()()
 
