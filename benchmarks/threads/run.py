@@ -29,11 +29,15 @@ from servotwin.simulation.lanes.lane_threads import ThreadedLanes, text_of
 LANES, FRAME = 512, 0.02
 MANY, CALLS = (1 << 16, 1 << 20), 100
 ARCHITECTURE = "sm_90"
-CASES = {  # what it is, its servo and model, and the most registers that its kernel gets
-    "plain servo, by arcs": ("hitec-hs-755hb", st.PulseServo, 128),
-    "play and load friction, by legs": ("geekservo-2kg", st.PulseServo, 168),
-    "digital, play: STS3215": ("feetech-sts3215-12v", st.DigitalServo, 168),
-    "digital: XL330-M288": ("dynamixel-xl330-m288", st.DigitalServo, 168)}
+FADES = {"friction.breakaway_ratio": 1.3, "friction.stribeck_speed": 3.0}
+CASES = {  # what it is, its servo, model and other numbers, and the most registers that its kernel gets
+    "plain servo, by arcs": ("hitec-hs-755hb", st.PulseServo, {}, 128),
+    "friction that fades, by legs": ("hitec-hs-755hb", st.PulseServo, FADES, 168),
+    "play and load friction, by legs": ("geekservo-2kg", st.PulseServo, {}, 168),
+    "digital, play: STS3215": ("feetech-sts3215-12v", st.DigitalServo, {}, 168),
+    "digital: XL330-M288": ("dynamixel-xl330-m288", st.DigitalServo, {}, 168),
+    "  its supply gives 0.5 A": ("dynamixel-xl330-m288", st.DigitalServo, {"supply.current_limit": 0.5}, 168),
+    "  its friction fades": ("dynamixel-xl330-m288", st.DigitalServo, FADES, 168)}
 
 
 def assembler() -> str | None:
@@ -130,7 +134,8 @@ def on_gpu(title: str, model: object, dtype: str, lanes: int) -> None:
 
 def main() -> None:
     """Print the tables."""
-    models = {title: (kind(st.load_servo(name)), most) for title, (name, kind, most) in CASES.items()}
+    models = {title: (kind(st.load_servo(name).replace(more)), most)
+              for title, (name, kind, more, most) in CASES.items()}
     texts = {title: {dtype: text_of(st.VectorSimulator(model, 1, load=st.loads.Inertia(1e-3))._numbers, dtype)
                      for dtype in ("float32", "float64")} for title, (model, _) in models.items()}
     print(f"A text as PTX, read by ptxas for {ARCHITECTURE}; first use with an empty cache, both compilers")
