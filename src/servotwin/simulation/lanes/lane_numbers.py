@@ -577,10 +577,12 @@ class Variants:
         Or one of its kinds, if one of them is not possible; names it.
     """
 
-    def __init__(self, columns: Any, inputs: tuple[Model, Any, Any], parameters: Mapping[str, Any],
-                 seeds: NDArray[np.int64], accuracy: float) -> None:
+    def __init__(self, columns: Any, seeds: NDArray[np.int64], *, model: Model, command: Any, load: Any,
+                 parameters: Mapping[str, Any], accuracy: float) -> None:
         if not isinstance(columns, Mapping) or not columns:
             raise InputError("variants", got=columns, allowed="a mapping of names to arrays (SI)")
+        if not isinstance(parameters, Mapping):
+            raise InputError("parameters", got=parameters, allowed="a mapping of names to numbers or arrays (SI)")
         twice = next((name for name in columns if name in parameters), None)
         if twice is not None:
             raise InputError(f"variants: {twice}", got="a parameter of all lanes too", allowed="one of both")
@@ -591,7 +593,6 @@ class Variants:
                 raise InputError(f"variants: {name}", got=f"an array of shape {values.shape}",
                                  allowed="an array (n,) with a value of each servo, of one length n for all names")
         self._seeds, self.draws = seeds, np.zeros(len(seeds), np.int64)
-        model, command, load = inputs
         first = {name: np.asarray(value).ravel()[0] for name, value in parameters.items() if np.size(value)}
         try:
             own = lanes_of(model, command, load[0] if isinstance(load, list | tuple) and load else load,

@@ -127,7 +127,8 @@ class VectorSimulator:
         supplies, accuracy = supplies_of(bus, model, len(seeds)), accuracy_of(accuracy)
         command, self._variants = _first_command(model), None
         if variants is not None:
-            self._variants = Variants(variants, (model, command, load), parameters or {}, seeds, accuracy)
+            self._variants = Variants(variants, seeds, model=model, command=command, load=load,
+                                      parameters=parameters or {}, accuracy=accuracy)
             parameters = {**(parameters or {}), **self._variants.now()}
         inputs = lanes_of(model, command, load, parameters, None, seeds)
         if inputs.count != len(seeds):
