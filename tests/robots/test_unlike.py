@@ -122,6 +122,7 @@ def test_a_number_may_be_given_to_some_joints_alone():
     ({"parameters": {"motor.rotor_inertia": [1e-7] * 3}}, "shape"),
     ({"parameters": {"motor.spin": 1.0}}, "motor.spin"),
     ({"joints": ["wrist"], "parameters": {"gear.backlash": 0.0}}, "wrist"),
+    ({"parameters": [1.0]}, "^parameters: got"),
     ({"bus": [(FLAT, ["elbow"])]}, "on the buses that they are on"),
     ({"parameters": {"supply.open_circuit_voltage": 5.0}}, "that of its bus")])
 def test_what_cannot_be_set_is_said_and_changes_nothing(more, words):
@@ -134,3 +135,23 @@ def test_what_cannot_be_set_is_said_and_changes_nothing(more, words):
     with pytest.raises(InputError, match=words):
         drive.set(**more)
     assert np.array_equal(driven(drive, data, 20), first)
+
+
+def test_a_supply_of_servos_that_share_none_is_refused():
+    import mujoco
+
+    one = model("feetech-sts3215-7v4")
+    drive = st.robots.ServoDrive(mujoco.MjModel.from_xml_string(ARM), {"shoulder": one, "elbow": one})
+    with pytest.raises(InputError, match=r"^set\(bus=\.\.\.\): got 'servos that share none'"):
+        drive.set(bus=FLAT)
+
+
+def test_noise_begins_anew_with_other_numbers():
+    import mujoco
+
+    one = st.PulseServo(st.load_servo("hitec-hs-755hb").replace({"potentiometer.noise": 2e-3}))
+    drive = st.robots.ServoDrive(mujoco.MjModel.from_xml_string(ARM), {"shoulder": one, "elbow": one})
+    data = mujoco.MjData(drive.model)
+    first = driven(drive, data)
+    drive.set(parameters={"motor.torque_constant": one.servo.motor.torque_constant})
+    assert np.array_equal(driven(drive, data), first)

@@ -94,6 +94,31 @@ def test_arrays_of_the_gpu_are_taken_in_place_and_nothing_is_allocated(shared):
     assert np.isnan(seen).tolist() == mask.tolist()
 
 
+def test_a_bus_voltage_that_the_bridge_drops_fails_its_lane_until_another_comes(shared):
+    volts, mask = np.full(LANES, 6.0), np.arange(LANES) == 3
+    _, there = both(shared, variants={"electronics.deadband": [4e-6, 8e-6]})
+    volts[3] = 0.0
+    there.set(bus_voltage=Guest(volts))
+    for lanes in (None, Guest(mask), Guest(np.array([3]))):
+        assert np.flatnonzero(there.status.read()).tolist() == [3]
+        there.reset(command_angle=0.5, lanes=lanes)
+    there.set(bus_voltage=6.0, lanes=[3])
+    assert there.status.read()[3] != 0
+    with pytest.raises(InputError, match=r"^torque_enable of PulseServo"):
+        there.set(torque_enable=Guest(mask))
+
+
+@pytest.mark.parametrize("dtype", [np.int32, np.int64])
+def test_numbers_of_lanes_are_those_of_their_call_alone(shared, dtype):
+    _, there = both(shared)
+    for lane in (5, 7, 2):
+        there.set(output_speed=0.0)
+        there.set(output_speed=1.0, lanes=Guest(np.array([lane, LANES, -1], dtype)))
+        assert np.flatnonzero(there["output_speed"].read()).tolist() == [lane]
+    there.set(output_speed=2.0, lanes=Guest(np.zeros(0, dtype)))
+    assert there["output_speed"].read().max() == 1.0
+
+
 def test_numbers_beside_a_mask_of_the_gpu_are_checked(shared):
     _, there = both(shared)
     mask = Guest(np.ones(LANES, bool))

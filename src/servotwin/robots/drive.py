@@ -406,7 +406,7 @@ class ServoDrive:
         """Give servos other numbers, in all data, and the model their rotors; each data is to begin anew after it.
 
         So robots get servos that differ from episode to episode, in a third of the time of a new drive: after it comes
-        `mujoco.mj_resetData(model, data)` or the like, and `reset(data)`.
+        `mujoco.mj_resetData(model, data)` or the like, and `reset(data)`. After an error a drive is to be made anew.
 
         Parameters
         ----------
@@ -420,7 +420,8 @@ class ServoDrive:
         Raises
         ------
         InputError
-            Or one of its kinds, if a joint has no servo, a number is not possible, or it makes servos remember more.
+            Or one of its kinds, if a joint has no servo, a number is not possible or makes servos remember more, or
+            servos have no supply in common.
 
         Examples
         --------
@@ -438,6 +439,10 @@ class ServoDrive:
         for name in names:
             if name not in self.joints:
                 raise UnknownNameError("joint with a servo", name, self.joints)
+        if not isinstance(parameters or {}, Mapping):
+            raise InputError("parameters", got=parameters, allowed="a mapping of names to numbers or arrays (SI)")
+        if bus is not None and not any(berth.crew.bus for berth in self._harbour.first.berths):
+            raise InputError("set(bus=...)", got="servos that share none", allowed="those of ServoDrive(..., bus=...)")
         columns = {}
         for name, value in (parameters or {}).items():
             column = np.asarray(value)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     Vary = Mapping[str, Distribution | str]
 
 
-VARIANTS = 1024  # servos of each kind that varies, of which one is drawn for a joint
+VARIANTS = 1024  # servos of each kind that varies, of which one is drawn for a joint; assumed
 
 
 class _Crew:

@@ -117,7 +117,7 @@ typedef struct {
     const uint8_t *torque_enable;        /* whether torque is on; none of it: as before */
     uint8_t *mask;                       /* lanes of which that is said; none of it: all */
     const void *which;                   /* numbers of lanes, of 32 or 64 bits */
-    real *hung, *fed;                    /* inertias and voltages that were imposed; nan: none */
+    real *hung, *fed;                    /* inertias and voltages that were imposed; nan: none, -1: not possible */
     int32_t *draws, *variant;            /* how many variants a lane has had before, and which one it is */
     real *reals;                         /* a column each: what a lane remembers */
     int32_t *wholes;
@@ -233,7 +233,7 @@ INLINED void begin(const lane_table *of, int32_t lane) {
     const real command = of->followed[lane];
     const $stand stand = $begin(($numbers *)(uintptr_t)of->numbers + tile, wiring, j, curve, command,
         of->angle ? of->angle[lane] : NAN);
-    if (command != command || stand.y.q != stand.y.q || !FINITE(of->total[lane])) {
+    if (command != command || stand.y.q != stand.y.q || !FINITE(of->total[lane]) || of->fed[lane] < 0) {
         lose(of, lane);
         return;
     }
@@ -270,8 +270,8 @@ INLINED void impose(const lane_table *of, int32_t lane) {
         $hang(numbers, j, $output_inertia, $motor_inertia, of->hung[lane]);
     }
     if (of->voltage && of->voltage[lane] == of->voltage[lane]) {
-        of->fed[lane] = of->voltage[lane];
-        if (!$feed(numbers, j, of->fed[lane])) {
+        of->fed[lane] = $feed(numbers, j, of->voltage[lane]) ? of->voltage[lane] : -1;
+        if (of->fed[lane] < 0) {
             lose(of, lane);
             return;
         }
@@ -306,8 +306,8 @@ $copies
     of->total[lane] += $load_torque - load_torque;
     if (of->hung[lane] == of->hung[lane])
         $hang(numbers, j, $output_inertia, $motor_inertia, of->hung[lane]);
-    if (of->fed[lane] == of->fed[lane] && !$feed(numbers, j, of->fed[lane]))
-        lose(of, lane);
+    if (of->fed[lane] >= 0 && !$feed(numbers, j, of->fed[lane]))
+        of->fed[lane] = -1;
 $prepared}
 INLINED void mark(const lane_table *of, int32_t k) {
     const int64_t lane = of->kind == 64 ? ((const int64_t *)of->which)[k] : ((const int32_t *)of->which)[k];

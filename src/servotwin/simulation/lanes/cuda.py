@@ -376,7 +376,8 @@ def guest(name: str, values: Any, gpu: Gpu, stream: int) -> Visit:
     capsule = values.__dlpack__(stream=stream or 1)
     of = _Managed.from_address(_pointer(id(capsule), _NAME) or 0).tensor
     shape = tuple(of.shape[k] for k in range(of.ndim))
-    if of.strides and any(shape[k] != 1 and of.strides[k] != math.prod(shape[k + 1:]) for k in range(of.ndim)):
+    wanted = [math.prod(shape[k + 1:]) for k in range(of.ndim)]
+    if of.strides and 0 not in shape and any(shape[k] != 1 and of.strides[k] != wanted[k] for k in range(of.ndim)):
         raise InputError(name, got=f"an array of shape {shape}, not dense", allowed="a dense one")
     kind = f"{_KINDS.get(of.code, '?')}{of.bits // 8}" if of.lanes == 1 else "?"
     return Visit((of.data or 0) + of.byte_offset, shape, kind, capsule)

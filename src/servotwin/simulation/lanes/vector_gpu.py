@@ -164,8 +164,8 @@ class VectorSimulatorOnGpu(VectorSimulator):
             lanes: Any = None, bus: Any = None, stream: Any = None) -> None:
         """Impose what another simulator decides, as `VectorSimulator.set` does; nan in an array on the GPU: not.
 
-        A lane whose bridge would drop all of its bus voltage has failed. `parameters` are refused: `variants` has other
-        numbers for lanes.
+        A lane whose bridge would drop all of its bus voltage has failed until another comes. `parameters` are refused:
+        `variants` has other numbers for lanes.
         """
         for name, value in (("parameters", parameters), ("bus", bus)):
             if value is not None:
@@ -174,7 +174,7 @@ class VectorSimulatorOnGpu(VectorSimulator):
         given = {name: self._spread(argument, value, which) for name, argument, value in (
             ("angle", "output_angle", output_angle), ("speed", "output_speed", output_speed),
             ("inertia", "load_inertia", load_inertia), ("voltage", "bus_voltage", bus_voltage))}
-        if torque_enable is not None and not is_guest(torque_enable):
+        if torque_enable is not None and not (is_guest(torque_enable) and self._numbers.digital):
             places = np.arange(len(self)) if which is None else which
             whole = np.zeros(len(self), np.uint8)
             whole[places] = self._torque_switch(torque_enable, places)
