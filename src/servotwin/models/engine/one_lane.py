@@ -1,8 +1,8 @@
 """One lane by itself from call to call, by legs: analog servos from pulse to pulse, digital ones from tick to tick.
 
 Between two switches of its bridge a servo moves by legs, or by arcs where it has neither play nor friction by torque.
-Where static friction fades, legs below the speed at which none is left are creeps (`legs.fading_legs`). No motion is
-kept, so a lane is a handful of numbers. Times count from the latest edge or tick, and whole ones are counted, so that
+Where static friction fades, legs below the speed at which none is left are creeps (`legs.fading_legs`); where windings
+warm up, legs are power series (`legs.warm_legs`). No motion is kept, so a lane is a handful of numbers. Times count from the latest edge or tick, and whole ones are counted, so that
 floats have digits for them however long a servo runs.
 """
 
@@ -15,16 +15,16 @@ from servotwin.models.engine import controller, cosim
 from servotwin.models.engine.batch.segments import linear_segments
 from servotwin.models.engine.batch.segments.linear_segments import ArcNumbers
 from servotwin.models.engine.lanes import chip_at, numbers_at
-from servotwin.models.engine.legs import fading_legs, legs
+from servotwin.models.engine.legs import fading_legs, legs, warm_legs
 from servotwin.models.engine.memory import SAME, Inputs, Point
 from servotwin.models.engine.motions.elementary import anew
 from servotwin.models.engine.observe import Observed, at_motor, observed, told_by
 from servotwin.models.engine.step import COMPLETED, CROWDED, DIVERGED, at_pulses, measured
 from servotwin.models.state.modes import INSIDE, RIGID, Mode, Vector, one_body
 from servotwin.models.state.records import reader, writer
-from servotwin.models.terms import bridge, duty, frame, play
+from servotwin.models.terms import bridge, duty, frame, friction, heat, play
 from servotwin.models.terms.frame import Frame
-from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.models.terms.sensor import wiper_at
 from servotwin.models.terms.shaft import Shaft
 from servotwin.models.terms.wiring import TRAVEL_SLACK, Wiring, followed, possible, rest_angle
@@ -32,8 +32,9 @@ from servotwin.models.terms.wiring import TRAVEL_SLACK, Wiring, followed, possib
 if TYPE_CHECKING:
     from servotwin.models.engine.lanes import Floats
 
-BY_ARCS, BY_LEGS, BY_CREEPS = range(3)
+BY_ARCS, BY_LEGS, BY_CREEPS, BY_SERIES = range(4)
 SLOWEST = BY_CREEPS  # of which a text has nothing where no friction fades: `BY_CREEPS` is nothing there
+WARMEST = BY_SERIES  # in the same way, where nothing warms up
 FOLLOWED, PULSE_WIDTH, COMMAND_ANGLE = range(3)  # kinds of commands: as the engine follows it, or of the servo
 arc_at, put_arcs = reader("arc_at", ArcNumbers), writer("put_arcs", ArcNumbers)
 wiring_at = reader("wiring_at", Wiring)
@@ -86,7 +87,9 @@ def pulses(by: int, numbers: Any, arcs: Any, chips: Any, j: int, curve: Floats, 
         else:
             own = numbers_at(anew(numbers), j)
             own, u = at_pulses(own, now.silent) if heeds else own, now.drive * own.source.V
-            if SLOWEST == BY_CREEPS:
+            if WARMEST == BY_SERIES and not friction.fades(own.friction):
+                gone = warm_legs.go(own, torque, u, y, mesh, wiper, end - t)
+            elif SLOWEST == BY_CREEPS:
                 gone = fading_legs.go(own, torque, u, y, legs.mode_from(own, torque, u, y, mesh), wiper, end - t)
             else:
                 gone = legs.go(own, torque, u, y, legs.mode_from(own, torque, u, y, mesh), wiper, end - t)
@@ -122,7 +125,9 @@ def ticks(numbers: Any, j: int, inputs: Inputs, firm: Any, stand: Stand, duratio
         end = min(controller.next_due(firmware, firm, frames), T_c if left > 0 else rest)
         own = duty.at_duty(own, firm.duty)
         u = duty.voltage(own.source, firm.duty)
-        if SLOWEST == BY_CREEPS:
+        if WARMEST == BY_SERIES and not friction.fades(own.friction):
+            gone = warm_legs.go(own, torque, u, y, mesh, wiper, end - t)
+        elif SLOWEST == BY_CREEPS:
             gone = fading_legs.go(own, torque, u, y, legs.mode_from(own, torque, u, y, mesh), wiper, end - t)
         else:
             gone = legs.go(own, torque, u, y, legs.mode_from(own, torque, u, y, mesh), wiper, end - t)
@@ -164,7 +169,7 @@ def begin(numbers: Any, wirings: Any, j: int, curve: Floats, command: float, ang
     q = angle if angle == angle else rest_angle(wiring, curve, command)
     q = q if wiring.lower - TRAVEL_SLACK <= q <= wiring.upper + TRAVEL_SLACK else math.nan
     mesh = INSIDE if play.present(own.play) else RIGID
-    return Stand(Vector(q, 0.0, 0.0, 0.0, 0.0, q, 0.0), mesh, q, 0, 0.0)
+    return Stand(Vector(q, 0.0, 0.0, own.heat.T_amb, own.heat.T_amb, q, 0.0), mesh, q, 0, 0.0)
 
 
 def impose(numbers: Any, j: int, stand: Stand, angle: float, speed: float) -> Stand:
@@ -207,5 +212,7 @@ def look_at_ticks(numbers: Any, j: int, curve: Floats, torque: float, N: float, 
 
 
 def _seen(own: Numbers, curve: Floats, torque: float, stand: Stand, u: float, drive: float, error: float) -> Observed:
+    if heat.present(own.heat):
+        own = warm(own, stand.y)
     mode = legs.mode_from(own, torque, u, stand.y, stand.mesh)
     return observed(own, curve, mode, u, torque, stand.y, stand.wiper, drive, error)

@@ -29,7 +29,7 @@ from servotwin.models.engine.step import REFUSED
 from servotwin.models.state.records import TILE, fields_of, record_of, rows_of
 from servotwin.models.terms import control, frame
 from servotwin.models.terms.control import WAITING, Firm
-from servotwin.models.terms.dependence import FADING, PROGRAM, PWM
+from servotwin.models.terms.dependence import FADING, ON_HEAT, PROGRAM, PWM
 from servotwin.models.terms.firmware import Firmware
 from servotwin.models.terms.frame import Chip, Frame
 from servotwin.models.terms.numbers import Numbers
@@ -54,7 +54,7 @@ _STATE: dict[str, tuple[tuple[str, Any], ...]] = {
 
 
 _MOVES = re.compile(r"stand\.y\.(q|w|q_m|w_m)$")
-_STILL = re.compile(r"stand\.y\.(i|T_w|T_h)$")  # nothing here has inductance or heat
+_COLD = re.compile(r"stand\.y\.(T_w|T_h)$")  # where nothing warms up these stay
 RINGS = ("duties", "coming")
 """Rings of a program, with what waits there: they stay in memory, those of one lane beside those of the next."""
 
@@ -379,7 +379,7 @@ class LaneText:
     def recipe(self) -> Recipe:
         """The kernels within it."""
         never = ("BY_LEGS" if self.way == PULSES_BY_ARCS else "BY_ARCS", *(
-            () if self.flags & FADING else ("BY_CREEPS",)))
+            () if self.flags & FADING else ("BY_CREEPS",)), *(() if self.flags & ON_HEAT else ("BY_SERIES",)))
         entries = tuple(f"servotwin.models.{'state.noise' if entry == 'chosen' else 'engine.one_lane'}:{entry}"
                         for entry in _signatures(self))
         return Recipe(f"lane_{self.way}{'_beside' if self.beside else ''}", entries, knows=self.flags,
@@ -464,7 +464,8 @@ def _printed(own: LaneText) -> str:
     types, by_ticks = text.types, own.way == TICKS
     reals, wholes = columns(own.way)
     places = [(path, f"{name}[{k} * n]") for name, paths in (("reals", reals), ("wholes", wholes))
-              for k, path in enumerate(paths) if not _STILL.match(path)]
+              for k, path in enumerate(paths)
+              if path != "stand.y.i" and (own.flags & ON_HEAT or not _COLD.match(path))]  # no current has inertia
     stand, firm = types.of(named(Stand)), types.record(Record(record_of(Firm)))
     words = {
         "tile": TILE, "refused": REFUSED, "by": int(own.way == PULSES_BY_LEGS), "room": 2 * WAITING, "stand": stand,

@@ -31,6 +31,7 @@ from servotwin.models.terms.dependence import (
     DROPS,
     DRY,
     FADING,
+    ON_HEAT,
     ON_Q,
     ONE_WAY,
     PLAY,
@@ -62,7 +63,7 @@ if TYPE_CHECKING:
     from servotwin.simulation.lanes.lane_numbers import LaneNumbers
 
 _BY_ARCS = STRAIGHT | DRY | AT_STOPS | SHOWN | PULSES | SLACK | STEPS | TABLE
-_BY_LEGS = _BY_ARCS | DROPS | SILENCE | PLAY | TWO_BODIES | BY_SHARE | REGULATED | FADING
+_BY_LEGS = _BY_ARCS | DROPS | SILENCE | PLAY | TWO_BODIES | BY_SHARE | REGULATED | FADING | ON_HEAT
 _BY_TICKS = _BY_LEGS & ~PULSES | PROGRAM | PWM | ONE_WAY | AT_COMMANDS | BEYOND
 REMEMBERED = ("reals", "wholes", "rings", "status")
 PLAIN_REGISTERS, MOST_REGISTERS = 128, 168  # of a thread by arcs, and by anything else: more threads, or no spills
@@ -88,6 +89,8 @@ def text_of(numbers: LaneNumbers, dtype: str) -> LaneText:
     words = [word for flag, word in _WORDS.items() if left & flag]
     if np.any(terms.ask(FADING) & terms.ask(PLAY)):
         words.append("friction that fades behind play of the gear")
+    if flags & FADING and flags & ON_HEAT:
+        words.append("friction that fades beside heat")
     if numbers.supplies.lanes:
         words.append("several servos on a supply")
     if numbers.recorded:
@@ -98,8 +101,8 @@ def text_of(numbers: LaneNumbers, dtype: str) -> LaneText:
         words.append("goals told by pulses, in float32")
     if words or left:
         raise InputError("lanes one a thread", got=", ".join(words) or "a term that no text follows",
-                         allowed="pulse servos and digital servos without heat, inductance, springs, pendulums and "
-                                 "friction that fades behind play of the gear, each on a supply of its own")
+                         allowed="pulse servos and digital servos without inductance, springs, pendulums and friction "
+                                 "that fades beside heat or behind play of the gear, each on a supply of its own")
     if digital:
         return LaneText(TICKS, flags, floats)
     return LaneText(PULSES_BY_LEGS if flags & ~_BY_ARCS else PULSES_BY_ARCS, flags, floats)
