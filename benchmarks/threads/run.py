@@ -30,6 +30,8 @@ LANES, FRAME = 512, 0.02
 MANY, CALLS = (1 << 16, 1 << 20), 100
 ARCHITECTURE = "sm_90"
 FADES = {"friction.breakaway_ratio": 1.3, "friction.stribeck_speed": 3.0}
+HEAT = {"thermal.winding_capacity": 1.5, "thermal.housing_capacity": 40.0, "thermal.winding_to_housing": 6.0,
+        "thermal.housing_to_ambient": 12.0, "thermal.magnet_coefficient": -1.2e-3}
 CASES = {  # what it is, its servo, model and other numbers, and the most registers that its kernel gets
     "plain servo, by arcs": ("hitec-hs-755hb", st.PulseServo, {}, 128),
     "friction that fades, by legs": ("hitec-hs-755hb", st.PulseServo, FADES, 168),
@@ -37,7 +39,9 @@ CASES = {  # what it is, its servo, model and other numbers, and the most regist
     "digital, play: STS3215": ("feetech-sts3215-12v", st.DigitalServo, {}, 168),
     "digital: XL330-M288": ("dynamixel-xl330-m288", st.DigitalServo, {}, 168),
     "  its supply gives 0.5 A": ("dynamixel-xl330-m288", st.DigitalServo, {"supply.current_limit": 0.5}, 168),
-    "  its friction fades": ("dynamixel-xl330-m288", st.DigitalServo, FADES, 168)}
+    "  its friction fades": ("dynamixel-xl330-m288", st.DigitalServo, FADES, 168),
+    "  it warms up": ("dynamixel-xl330-m288", st.DigitalServo, HEAT, 168),
+    "digital, warms up, play: STS3215": ("feetech-sts3215-12v", st.DigitalServo, HEAT, 168)}
 
 
 def assembler() -> str | None:

@@ -16,7 +16,7 @@ import servotwin as st
 from servotwin.errors import InputError
 from servotwin.models.engine.one_lane import BY_ARCS, COMMAND_ANGLE, PULSE_WIDTH, Stand, pulses
 from servotwin.models.state.modes import Vector
-from servotwin.models.terms.dependence import REGULATED
+from servotwin.models.terms.dependence import ON_HEAT, REGULATED
 from servotwin.models.terms.frame import AT_START
 from servotwin.models.terms.friction import Friction
 from servotwin.models.terms.numbers import Numbers
@@ -114,6 +114,19 @@ def creeping(draw):
     return drawn
 
 
+WARM = {"thermal.winding_capacity": 1.5, "thermal.housing_capacity": 40.0, "thermal.winding_to_housing": 6.0,
+        "thermal.housing_to_ambient": 12.0}
+
+
+def warming(draw):
+    """Return the same with windings and housings that warm up within a second or a minute, and magnets that fade."""
+    def drawn(rng, lanes):
+        return draw(rng, lanes) | {f"thermal.{name}": rng.uniform(*bounds, lanes) for name, bounds in {
+            "winding_capacity": (0.3, 5.0), "housing_capacity": (5.0, 50.0), "winding_to_housing": (2.0, 10.0),
+            "housing_to_ambient": (5.0, 20.0), "magnet_coefficient": (-2e-3, 0.0), "ambient": (270.0, 320.0)}.items()}
+    return drawn
+
+
 CASES = {  # servo, what its lanes have, way, how many, and how far they may be off [rad]; play multiplies rounding
     "arcs": (st.PulseServo, PLAIN, plain, PULSES_BY_ARCS, 120, 1e-12),
     "legs": (st.PulseServo, PLAIN, analog, PULSES_BY_LEGS, 240, 1e-11),
@@ -124,14 +137,18 @@ CASES = {  # servo, what its lanes have, way, how many, and how far they may be 
     "goals, limited": (st.DigitalServo, GOALS, limited(goals), TICKS, 200, 1e-11),
     "goals, creeping": (st.DigitalServo, GOALS, creeping(goals), TICKS, 200, 1e-12),
     "pulses, limited": (st.DigitalServo, PULSES, limited(programmed), TICKS, 80, 1e-11),
-    "pulses, creeping": (st.DigitalServo, PULSES, creeping(programmed), TICKS, 80, 1e-11)}
+    "pulses, creeping": (st.DigitalServo, PULSES, creeping(programmed), TICKS, 80, 1e-11),
+    "legs, warming": (st.PulseServo, PLAIN, warming(limited(analog)), PULSES_BY_LEGS, 80, 1e-11),
+    "goals, warming": (st.DigitalServo, GOALS, warming(goals), TICKS, 80, 1e-11),
+    "pulses, warming": (st.DigitalServo, PULSES, warming(limited(programmed)), TICKS, 30, 1e-11)}
 
 
 def made(case, lanes=None, seed=5):
     """Return lanes side by side, bounds of their angles, and a generator."""
     kind, name, draw, _, count, _ = CASES[case]
-    rng, lanes = np.random.default_rng(seed), lanes or count
-    sims = st.VectorSimulator(kind(st.load_servo(name)), lanes, seed=seed, parameters=draw(rng, lanes))
+    rng, lanes, warms = np.random.default_rng(seed), lanes or count, "warming" in case
+    sims = st.VectorSimulator(kind(st.load_servo(name).replace(WARM if warms else {})), lanes, seed=seed,
+                              parameters=draw(rng, lanes), accuracy=1e-11 if warms else 1e-9)
     lower, upper, _ = sims._numbers.now(Stops)
     return sims, max(lower.max(), -1.5), min(upper.min(), 1.5), rng
 
@@ -183,6 +200,11 @@ def advanced(sims, own, low, high, rng, steps=40):
         assert np.array_equal(own.status != 0, sims.status != 0)
         np.testing.assert_allclose(own.time, sims.time, rtol=0.0, atol=1e-6 if own.text.floats else 1e-9)
         worst = np.fmax(worst, np.abs(own.column("stand.y.q") - sims["output_angle"]))
+        if own.text.flags & ON_HEAT:
+            y = sims._store.memories().rows["point"]["y"]
+            for name in ("T_w", "T_h"):
+                np.testing.assert_allclose(own.column(f"stand.y.{name}"), y[name], atol=0.0,
+                                           rtol=1e-6 if own.text.floats else 1e-9)
     return worst, left, met.sum(axis=1)
 
 
@@ -195,9 +217,10 @@ def test_random_servos_are_those_of_lanes(case):
     worst, left, (creep, most, stand) = advanced(sims, own, low, high, rng)
     assert worst.max() <= CASES[case][5], np.argmax(worst)
     assert (left > 0) == (case == "arcs")  # some met a stop
-    assert (most > 20) == ("limited" in case or "creeping" in case)
+    assert (most > 20) == ("limited" in case or "creeping" in case or case in ("legs, warming", "pulses, warming"))
+    assert "warming" not in case or np.ptp(sims["winding_temperature"] - sims["housing_temperature"]) > 5.0  # K
     assert (creep > 40) == ("creeping" in case)
-    assert stand > 0 or case in ("arcs", "goals", "pulses")
+    assert stand > 0 or case in ("arcs", "goals", "pulses", "goals, warming")
 
 
 @pytest.mark.slow
@@ -237,7 +260,8 @@ def test_a_lane_is_the_same_alone_among_others_and_in_any_order(case):
 @pytest.mark.parametrize("case", ["arcs", pytest.param("legs", marks=pytest.mark.slow),
                                   pytest.param("goals", marks=pytest.mark.slow),
                                   pytest.param("legs, creeping", marks=pytest.mark.slow),
-                                  pytest.param("goals, limited", marks=pytest.mark.slow)])
+                                  pytest.param("goals, limited", marks=pytest.mark.slow),
+                                  pytest.param("goals, warming", marks=pytest.mark.slow)])
 def test_lanes_begin_and_show_what_lanes_show(case):
     """They begin by a mask, at an angle or under a command of a kind; angles, speeds and inertias are imposed."""
     sims, low, high, rng = made(case, 60)
@@ -270,7 +294,7 @@ def test_lanes_begin_and_show_what_lanes_show(case):
         seen = dict(zip(SEEN, own.look(), strict=True))
         assert own.column("stand.y.q") == pytest.approx(sims["output_angle"], abs=1e-9)
         for name in ("time", *sims.signals):
-            if name in seen and not name.endswith("temperature"):
+            if name in seen:
                 scale = max(1.0, np.abs(sims[name]).max())
                 assert seen[name] == pytest.approx(sims[name], abs=1e-6 * scale), name
 
@@ -349,6 +373,7 @@ def test_a_lane_that_has_failed_is_nan_until_it_is_put_anew_and_harms_no_other()
     pytest.param(st.PulseServoInductive, PLAIN, {}, "float64", "inductance", marks=pytest.mark.slow),
     (st.BoundedServo, PLAIN, {}, "float64", "follows the error"),
     (st.PulseServo, PLAIN, {"parameters": FADING_BEHIND_PLAY}, "float64", "friction that fades behind play"),
+    (st.PulseServo, PLAIN, {"parameters": FADING_BEHIND_PLAY | WARM}, "float64", "friction that fades beside heat"),
     (st.PulseServo, PLAIN, {"bus": st.Supply(open_circuit_voltage=6.0, internal_resistance=0.2)}, "float64", "supply"),
     pytest.param(st.DigitalServo, PULSES, {}, "float32", "pulses, in float32", marks=pytest.mark.slow)])
 def test_lanes_that_it_does_not_follow_are_refused_by_name(kind, name, more, dtype, words):
@@ -368,7 +393,8 @@ def on_device():
 @pytest.mark.slow
 @pytest.mark.skipif(not on_device(), reason="no clang that makes PTX")
 @pytest.mark.parametrize(("case", "most"), [
-    ("arcs", 3e5), ("goals", 3e5), ("legs, creeping", 4.5e5), ("goals, limited", 6e5), ("goals, creeping", 5e5)])
+    ("arcs", 3e5), ("goals", 3e5), ("legs, creeping", 4.5e5), ("goals, limited", 6e5), ("goals, creeping", 5e5),
+    ("goals, warming", 6e5)])
 def test_ptx_of_floats_calls_nothing_and_has_no_doubles(case, most):
     sims, *_ = made(case, 2)
     text = text_of(sims._numbers, "float32")

@@ -14,7 +14,7 @@ from servotwin.simulation.compile import threads
 from servotwin.simulation.lanes.lane_threads import ThreadedLanes
 from servotwin.simulation.lanes.vector_gpu import VectorSimulatorOnGpu
 from simulation.test_cuda import Guest, built, driver, needs_compilers, shared
-from simulation.test_lane_threads import GOALS, PLAIN
+from simulation.test_lane_threads import GOALS, PLAIN, WARM
 
 __all__ = ["built", "driver", "shared"]  # fixtures
 
@@ -44,7 +44,8 @@ FADING = {"friction.stribeck_speed": 20.0, "friction.breakaway_ratio": 1.4, "sup
 
 @pytest.mark.parametrize("model", [
     None, pytest.param(st.DigitalServo(st.load_servo(GOALS)), marks=pytest.mark.slow),
-    pytest.param(st.PulseServo(st.load_servo(PLAIN).replace(FADING)), marks=pytest.mark.slow)])
+    pytest.param(st.PulseServo(st.load_servo(PLAIN).replace(FADING)), marks=pytest.mark.slow),
+    pytest.param(st.DigitalServo(st.load_servo(GOALS).replace(WARM)), marks=pytest.mark.slow)])
 def test_numbers_that_are_given_are_those_of_the_processor(driver, model):
     here, there = both(driver, model, **({} if model else {"parameters": NUMBERS}))
     assert isinstance(there, VectorSimulatorOnGpu)
@@ -62,9 +63,8 @@ def test_numbers_that_are_given_are_those_of_the_processor(driver, model):
                 each.advance(0.01)  # as told before
         same(here, there, within=within)
     for name in there.signals:
-        if not name.endswith("temperature"):
-            scale = max(1.0, np.abs(here[name]).max())
-            assert there[name].read() == pytest.approx(here[name], abs=1e-6 * scale), name
+        scale = max(1.0, np.abs(here[name]).max())
+        assert there[name].read() == pytest.approx(here[name], abs=1e-6 * scale), name
     assert there.status.read().tolist() == here.status.tolist()
 
 
@@ -128,8 +128,11 @@ def test_numbers_beside_a_mask_of_the_gpu_are_checked(shared):
     assert not there.status.read().any()
 
 
-def test_what_was_saved_continues_there_and_on_the_processor(driver):
-    here, there = both(driver, parameters=NUMBERS)
+@pytest.mark.parametrize(("model", "more"), [
+    (None, {"parameters": NUMBERS}),
+    pytest.param(st.DigitalServo(st.load_servo(GOALS).replace(WARM)), {}, marks=pytest.mark.slow)])
+def test_what_was_saved_continues_there_and_on_the_processor(driver, model, more):
+    here, there = both(driver, model, **more)
     angles = np.linspace(0.3, 1.2, LANES)
     there.advance(0.033, command_angle=angles, external_torque=0.03)
     memory = pickle.loads(pickle.dumps(there.save()))
@@ -137,6 +140,9 @@ def test_what_was_saved_continues_there_and_on_the_processor(driver):
     for each in (here, there):
         each.advance(0.05)
     same(here, there)
+    if model is not None:  # what it remembers is warmer than where it began
+        assert there["winding_temperature"].read() == pytest.approx(here["winding_temperature"], abs=1e-9)
+        assert (there["winding_temperature"].read() - there["housing_temperature"].read()).max() > 0.01
     after = there["output_angle"].read()
     there.restore(memory)
     there.advance(0.05)

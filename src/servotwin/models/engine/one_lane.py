@@ -2,8 +2,8 @@
 
 Between two switches of its bridge a servo moves by legs, or by arcs where it has neither play nor friction by torque.
 Where static friction fades, legs below the speed at which none is left are creeps (`legs.fading_legs`); where windings
-warm up, legs are power series (`legs.warm_legs`). No motion is kept, so a lane is a handful of numbers. Times count from the latest edge or tick, and whole ones are counted, so that
-floats have digits for them however long a servo runs.
+warm up, legs are power series (`legs.warm_legs`). No motion is kept, so a lane is a handful of numbers. Times count
+from the latest edge or tick, and whole ones are counted, so that floats have digits for them however long a servo runs.
 """
 
 from __future__ import annotations

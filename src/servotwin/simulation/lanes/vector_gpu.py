@@ -41,9 +41,10 @@ class VectorSimulatorOnGpu(VectorSimulator):
 
     Signals are arrays on the GPU, in place: their numbers change with the next call.
 
-    Pulse servos and digital ones advance so that neither heat nor inductance, spring, pendulum, recorded torque or
-    shared supply has a part, and no friction that fades behind play of the gear; others are refused by name. `threads`
-    and `accuracy` say nothing here: a thread has one lane, and where friction fades a creep is right to 1e-12 rad in
+    Pulse servos and digital ones advance so that neither inductance nor spring, pendulum, recorded torque or shared
+    supply has a part, and no friction that fades beside heat or behind play of the gear; others are refused by name.
+    A lane in which motor and output part and meet too often within a tick fails (`Status.DIVERGED`). `threads` and
+    `accuracy` say nothing here: a thread has one lane, and where friction fades a creep is right to 1e-12 rad in
     float64, and to rounding in float32; nothing else is integrated.
 
     Raises

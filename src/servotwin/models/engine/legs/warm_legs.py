@@ -19,7 +19,7 @@ from servotwin.models.engine.dynamics import coefficients, currents, guards
 from servotwin.models.engine.dynamics.coefficients import Apart
 from servotwin.models.engine.events import crossings
 from servotwin.models.engine.legs import legs
-from servotwin.models.engine.legs.legs import MOST_LEGS, MOST_SHORT, SHORT, Gone
+from servotwin.models.engine.legs.legs import MOST_SHORT, SHORT, Gone
 from servotwin.models.engine.motions import first_order, warm_exponential
 from servotwin.models.engine.motions.first_order import Course, alike
 from servotwin.models.engine.motions.warm_exponential import Law
@@ -32,6 +32,7 @@ from servotwin.models.terms.sensor import wiper_at
 from servotwin.physics.motor import steady_armature_current
 from servotwin.physics.thermal import heat_flow, warming_rate
 
+_LEGS = 20000  # under one drive: where motor and output chatter, thousands; there is nothing that others are left to
 TERMS = 24  # of a series at most
 IN_FLOATS = {"TERMS": 12, "_ROUNDING": 1e-9, "_INSTANT": 1e-7}
 _ROUNDING = 1e-16  # rad/s of a speed: what a term may be
@@ -76,7 +77,7 @@ def go(numbers: Numbers, torque: float, u: float, y: Vector, mesh: int, wiper: f
     current = [0.0] * TERMS
     fall = [0.0] * TERMS  # of the voltage along the winding
     mode, short = legs.mode_from(warm(numbers, y), torque, u, y, mesh), 0
-    for _ in range(MOST_LEGS):
+    for _ in range(_LEGS):
         now, turns = warm(numbers, y), not at_rest(mode.motor if mode.mesh == INSIDE else mode.contact)
         laws = Apart(0.0, 0.0, 0.0, 0.0)
         if turns or not legs.stands(mode):
@@ -221,17 +222,17 @@ def _root(leg: Leg, speed: Any, winding: Any, housing: Any, what: int, kind: int
     A guard is below zero at the second. By inverse parabolas where they are sure to lead on, else by halves
     (Chandrupatla 1997).
     """
-    if what == _GUARD and f_a <= -guards.BELOW:
+    if what == _GUARD and f_a <= 0.0:
         if f_a < guards.BELOW:  # what another one did has ended this mode too
             return a
         start = a
         for _ in range(_RISES):  # it starts at zero, to rounding: look whether it rises before it falls
             a = start + 0.5 * (b - start)
             f_a = _value(leg, what, kind, state_at(leg, speed, winding, housing, a))
-            if f_a > -guards.BELOW:
+            if f_a > 0.0:
                 break
             b, f_b = a, f_a
-        if f_a <= -guards.BELOW or f_b > 0.0:
+        if f_a <= 0.0:
             return start
     new, f_new, old, f_old = b, f_b, a, f_a
     part = f_b / (f_b - f_a)
