@@ -7,7 +7,7 @@ With d and g how much warmer winding and housing are than where a leg begins, ρ
 
 where i₀ is the current at the temperatures of the beginning. Products of series are all that warming adds. A leg lasts
 as long as the fastest of its rates at most, within which a speed goes one way, and two dozen terms are all that numbers
-can hold. The output inside the play knows nothing of temperatures: it moves in closed form.
+can hold. The output inside the play moves in closed form, whatever the temperatures are.
 """
 
 from __future__ import annotations
