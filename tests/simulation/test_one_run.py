@@ -75,17 +75,17 @@ def test_progress_is_told_of_a_compiled_run():
 def test_without_a_library_nobody_waits_for_it(monkeypatch):
     """The plain text runs while another process makes the kernels, which are taken once they are there."""
     made, there = [], []
-    monkeypatch.setattr(engine, "_ONE", engine._Kernels())
+    monkeypatch.setattr(engine, "_beside", {})
     monkeypatch.setattr(engine, "_LOOKS", 0.0)
     monkeypatch.setattr(engine, "is_compiled", lambda recipe: bool(there))
-    monkeypatch.setattr(engine, "_make_beside", lambda: made.append(1))
+    monkeypatch.setattr(engine, "_make_beside", made.append)
     one = CASES[FEW[0]]
     plain = run(one)
-    assert made == [1]
+    assert made == [engine.ONE]
     assert isinstance(plain.trajectory.segments._parts[0].rows, list)
     there.append(1)
     compiled = run(one)
-    assert made == [1]
+    assert made == [engine.ONE]
     assert isinstance(compiled.trajectory.segments._parts[0].rows, np.ndarray)
     plain_run.is_the_same(compiled, plain)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -32,14 +33,15 @@ from servotwin.models.engine.dynamics import guards
 from servotwin.models.engine.lanes import Lanes, Tables
 from servotwin.models.engine.legs.coupled_units import Coupling, Unit
 from servotwin.models.engine.live import together
-from servotwin.models.engine.live.posts import put_low
-from servotwin.models.engine.live.screen import NEXT, NO_LOW, USED, Looks
+from servotwin.models.engine.live.posts import NOTHING_SAID, Post, put_low, put_said
+from servotwin.models.engine.live.screen import COLUMNS, NEXT, NO_LOW, USED, Lines, Looks
 from servotwin.models.engine.log import Row
 from servotwin.models.engine.memory import Memories, Memory, forgotten, resumed, time_of
 from servotwin.models.engine.step import COMPLETED, DIVERGED
 from servotwin.models.state.modes import Mode
 from servotwin.models.state.records import TILE, numbers_in, object_of, put_fields, record_of, room, rows_of
 from servotwin.models.terms import control
+from servotwin.models.terms.control import Firm
 from servotwin.models.terms.dependence import SPRING
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.frame import NO_CHIP, Chip
@@ -48,7 +50,7 @@ from servotwin.models.terms.source import Source
 from servotwin.physics.pieces import Piece
 from servotwin.simulation.compile import Recipe, is_compiled, is_plain, kernels
 from servotwin.simulation.engine import TRIPS as TRIP_NAMES
-from servotwin.simulation.engine import Event, Part, Plan, State, event_name, failure
+from servotwin.simulation.engine import Event, Part, Plan, State, event_name, failure, kernels_beside
 from servotwin.simulation.lanes.forms import PLAIN
 from servotwin.simulation.lanes.packed import programs_of
 from servotwin.simulation.lanes.whole_runs import nothing_yet
@@ -61,6 +63,8 @@ Array = NDArray[np.float64]
 _ENTRIES = tuple(f"servotwin.models.engine.bus.bus_batch:{name}" for name in ("go_on", "look", "voltages"))
 BUSES = Recipe("buses", _ENTRIES, knows=~SPRING)
 """All servos but those with a spring between two bodies; they take hardly longer for what others lack."""
+TOGETHER = Recipe("together", ("servotwin.models.engine.live.together:advance",), never=("READINGS",))
+"""The same that stop and continue, and are looked at on the way."""
 SHARED, SEAT, MATE, ROW = record_of(Shared), record_of(Seat), record_of(Mate), record_of(Row)
 UNIT, COUPLING = record_of(Unit), record_of(Coupling)
 LOADS_FROM, COMPILES_FROM = 1e2, 1.5e4  # frames of servos in one process: what it takes, and more, in plain Python
@@ -233,10 +237,7 @@ class _Compiled:
 
     def __init__(self, plans: Sequence[Plan], states: Sequence[State], source: Source) -> None:
         count = len(plans)
-        torques = [plan.torque.rows for plan in plans]
-        curves = [np.array(plan.curve, np.float64).reshape(-1, 2) for plan in plans]
-        self._lanes = _lanes_of(plans)
-        self._tables = Tables(np.concatenate(torques), *_places(torques), np.concatenate(curves), *_places(curves))
+        self._lanes, self._tables = _lanes_of(plans), _tables_of(plans)
         self._bus = Buses(np.arange(count), np.array([0, count]), _records_of(list(map(begun, plans, states))),
                           np.full(count, -1), shared_of([source]), np.zeros(count, np.int64), np.zeros(count))
         self._room = (*room_of(count), *units_of(count))
@@ -281,9 +282,16 @@ def _lanes_of(plans: Sequence[Plan]) -> Lanes:
                  _programs_of(plans))
 
 
+def _tables_of(plans: Sequence[Plan]) -> Tables:
+    """Return what servos have besides, as the kernels read it."""
+    torques = [plan.torque.rows for plan in plans]
+    curves = [np.array(plan.curve, np.float64).reshape(-1, 2) for plan in plans]
+    return Tables(np.concatenate(torques), *_places(torques), np.concatenate(curves), *_places(curves))
+
+
 def _programs_of(plans: Sequence[Plan]) -> NDArray[Any]:
-    """Return the records of the programs of servos that all have one, or none."""
-    if not all(plan.digital for plan in plans):
+    """Return the records of the programs of servos, of which some have none; or one for all that have none."""
+    if not any(plan.digital for plan in plans):
         return programs_of(None, 1)
     columns: Any = (np.array(column) for column in zip(*(plan.firmware for plan in plans), strict=True))
     return programs_of(Firmware(*columns), len(plans))
@@ -302,6 +310,14 @@ def _tiles_of(kind: type[Any], values: Sequence[Any]) -> NDArray[Any]:
     columns[:len(values)] = [tuple(numbers_in(one)) for one in values]
     tiles.view(np.float64).reshape(len(tiles), -1, TILE)[:] = columns.reshape(len(tiles), TILE, -1).transpose(0, 2, 1)
     return tiles
+
+
+def _records_in(states: Sequence[State]) -> Memories:
+    """Return what states remember as records."""
+    held = [state.records for state in states]
+    size = record_of(Memory).itemsize
+    return Memories(*(np.frombuffer(bytearray(b"".join(part)), record_of(kind)) for part, kind in (
+        ([one[:size] for one in held], Memory), ([one[size:] for one in held], Firm))))
 
 
 def _records_of(memories: Sequence[Memory]) -> Memories:
@@ -338,43 +354,81 @@ def events_of(plans: Sequence[Plan], rows: Rows) -> list[tuple[Event, ...]]:
     return [tuple(events) for events in found]
 
 
-# --- Servos on one supply that stop and continue, in plain Python, and are looked at on the way -----------------------
+# --- Servos on one supply that stop and continue, and are looked at on the way ----------------------------------------
+
+_ROOM = 16384  # rows, and events, of a servo
+_PART, _REST = 0.1, 1e-9  # s, that servos go at once in compiled code, and that are no part of their own
+
+
+class Endless:
+    """Rows without an end, as kernels fill them in plain Python; `tell` is called with the time [s] now and then."""
+
+    def __init__(self, tell: Callable[[float], object] | None = None) -> None:
+        self.rows: list[list[float]] = []
+        self.tell = tell or float
+
+    def __len__(self) -> int:
+        """Return more than there ever are."""
+        return sys.maxsize
+
+    def __getitem__(self, place: tuple[int, int]) -> float:
+        """Return a number."""
+        return self.rows[place[0]][place[1]]
+
+    def __setitem__(self, place: tuple[int, int], value: float) -> None:
+        """Put a number where it belongs, or behind those of its row."""
+        n, k = place
+        if n == len(self.rows):
+            self.rows.append([])
+        row = self.rows[n]
+        if k == len(row):
+            row.append(value)
+        else:
+            row[k] = value
+
+
+class Shown(NamedTuple):
+    """What shows of a servo: rows of `screen.COLUMNS`, and events (time [s], code)."""
+
+    rows: list[list[float]]
+    events: list[list[float]]
+
 
 class BusSteps:
     """Servos on one supply that stop and continue.
 
-    Splitting an interval into several calls changes nothing beyond rounding.
+    Splitting an interval into several calls changes nothing beyond rounding. They run in compiled code where that is
+    there when they begin, else in plain Python throughout.
 
     Parameters
     ----------
-    posts : sequence
-        Post of each servo, `models.engine.live.posts.Post`: the values that are shown of it.
+    lines : sequence of Lines
+        How the values that are shown of each servo stand for commands.
 
     Examples
     --------
     >>> import servotwin as st
     >>> from servotwin.simulation.bus import on_supply, source_of
-    >>> from servotwin.web.live.station import Endless, post_of
+    >>> from servotwin.web.live.station import lines_of
     >>> supply = st.Supply(open_circuit_voltage=6.0, internal_resistance=0.5)
     >>> sim = st.Simulator(on_supply(st.PulseServo(st.load_servo("hitec-hs-755hb")), supply))
     >>> command = st.signals.step(0.0, 60.0, unit="deg")
-    >>> steps, states = BusSteps([post_of(sim.model), post_of(sim.model)]), [sim.initial(command), sim.initial(command)]
+    >>> steps, states = BusSteps(), [sim.initial(command), sim.initial(command)]
     >>> for until in (0.1, 0.15, 0.2):
-    ...     shown = [Endless() for _ in states], [Endless() for _ in states]
-    ...     states = steps.go_on(source_of(supply), [sim.plan(command)] * 2, states, Looks(1, 1e3, until, 1, 0), *shown)
+    ...     states, shown = steps.go_on(source_of(supply), [sim.plan(command)] * 2, states,
+    ...                                 [lines_of(sim.model)] * 2, Looks(1, 1e3, until, 1, 0))
     >>> fleet = st.simulate_bus({"a": (sim.model, command), "b": (sim.model, command)}, supply=supply, duration=0.2)
     >>> abs(states[1]["output_angle"] - float(fleet["b"]["output_angle"][-1])) < 1e-12
     True
     """
 
-    def __init__(self, posts: Sequence[Any]) -> None:
-        self._posts = posts
-        self._way: Plainly | None = None
+    def __init__(self) -> None:
+        self._way: _ShownPlainly | _ShownCompiled | None = None
         self._source: Source | None = None
 
-    def go_on(self, source: Source, plans: Sequence[Plan], states: Sequence[State], looks: Looks,
-              rows: Sequence[Any], events: Sequence[Any]) -> list[State]:
-        """Advance all servos to the end of the looks; return their states there.
+    def go_on(self, source: Source, plans: Sequence[Plan], states: Sequence[State], lines: Sequence[Lines],
+              looks: Looks, tell: Callable[[float], object] | None = None) -> tuple[list[State], list[Shown]]:
+        """Advance all servos to the end of the looks; return their states there, and what shows of each.
 
         Parameters
         ----------
@@ -382,19 +436,47 @@ class BusSteps:
             That they share.
         plans, states : sequence of Plan, of State
             Of the servos, always in the same order.
+        lines : sequence of Lines
+            How the values that are shown of each stand for commands.
         looks : Looks
-        rows, events : sequence
-            Room for what shows of each.
+        tell : callable, optional
+            Is given the time [s] that they have come to, now and then.
 
         Raises
         ------
         SimulationError
             If the run cannot continue.
         """
-        way = self._begun(source, plans, states)
-        used = np.zeros(USED * len(plans), np.int64)
+        if self._way is None:
+            own = kernels_beside(TOGETHER)
+            self._way = _ShownPlainly(plans, states, source) if own is None else _ShownCompiled(own, len(plans))
+        others = source != self._source or any(
+            plan.numbers != state.numbers for plan, state in zip(plans, states, strict=True))
+        self._source = source
+        return self._way.go_on(source, plans, states, lines, looks, tell or float, others)
+
+
+class _ShownPlainly:
+    """The way in plain Python."""
+
+    def __init__(self, plans: Sequence[Plan], states: Sequence[State], source: Source) -> None:
+        self._way, self._tape = Plainly(plans, states, source), tape_of(len(plans), True)
+        self._posts = [object_of(Post) for _ in plans]
+        for post in self._posts:
+            put_said(post.said, NOTHING_SAID)
+
+    def go_on(self, source: Source, plans: Sequence[Plan], states: Sequence[State], lines: Sequence[Lines],
+              looks: Looks, tell: Callable[[float], object], others: bool) -> tuple[list[State], list[Shown]]:
+        """Advance, as `BusSteps.go_on` does; `others`: numbers of a servo or the source are others."""
+        way, used = self._way, np.zeros(USED * len(plans), np.int64)
+        way.begin(plans, states)
+        if others or any(own.beat != one.memory.beat for own, one in zip(way.memories, states, strict=True)):
+            way.break_up(source)
         used[NEXT] = looks.next
         put_low(self._posts[0].low, NO_LOW)
+        for post, line in zip(self._posts, lines, strict=True):
+            post.lines = line
+        rows, events = [Endless(tell) for _ in plans], [Endless(tell) for _ in plans]
         firms = way.seated()
         try:
             status = together.go_on(way.inputs, self._posts, firms, way.shared, way.seats, way.mates, looks, self._tape,
@@ -403,35 +485,80 @@ class BusSteps:
             raise  # of the function that is called with the time
         except (ArithmeticError, ValueError):  # numbers beyond what a float holds
             status = DIVERGED
-        for j, own in enumerate(rows):
-            own.cut(int(used[USED * j]))
         way.risen(firms)
         if status != COMPLETED:
             raise failure(Status.of_code(status), max(seat.origin + seat.clock for seat in way.seats))
-        return self._states(way, plans, states, looks.until)
+        shown = [Shown(own.rows[:used[USED * j]], one.rows) for j, (own, one) in enumerate(zip(rows, events,
+                                                                                               strict=True))]
+        return self._states(plans, states, looks.until), shown
 
-    def _begun(self, source: Source, plans: Sequence[Plan], states: Sequence[State]) -> Plainly:
-        if self._way is None:
-            self._way, self._tape = Plainly(plans, states, source), tape_of(len(plans), True)
-        else:
-            self._way.begin(plans, states)
-            if source != self._source or self._are_others(self._way, plans, states):
-                self._way.break_up(source)
-        self._source = source
-        return self._way
-
-    @staticmethod
-    def _are_others(way: Plainly, plans: Sequence[Plan], states: Sequence[State]) -> bool:
-        """Tell whether numbers of a servo are others than before, or its clock is."""
-        return any(plan.numbers != state.numbers or memory.beat != state.memory.beat
-                   for plan, state, memory in zip(plans, states, way.memories, strict=True))
-
-    @staticmethod
-    def _states(way: Plainly, plans: Sequence[Plan], states: Sequence[State], until: float) -> list[State]:
+    def _states(self, plans: Sequence[Plan], states: Sequence[State], until: float) -> list[State]:
         found = []
-        for plan, state, memory in zip(plans, states, way.memories, strict=True):
+        for plan, state, memory in zip(plans, states, self._way.memories, strict=True):
             if plan.digital:
                 controller.pause(plan.inputs, controller.of(memory), time_of(memory))
                 memory = memory._replace(firm=(control.frozen(memory.firm[0]),))
             found.append(State(until, state.places, memory, plan.numbers, state.changes))
         return found
+
+
+class _ShownCompiled:
+    """The way in compiled code: what servos are in together stays in seats and mates, the rest in their states."""
+
+    def __init__(self, own: Any, servos: int) -> None:
+        self._advance, self._tape = own.advance, tape_of(servos, False)
+        self._shared, self._posts = np.zeros(1, SHARED), np.zeros(servos, record_of(Post))
+        self._seats, self._mates = room_of(servos)
+        self._seats["joined"] = -1
+        self._rows = np.empty((servos, _ROOM, len(COLUMNS)))
+        self._events = np.empty((servos, _ROOM, 2))
+        for post in self._posts:
+            put_fields(post["said"], NOTHING_SAID)
+        self._put_before: list[dict[str, Any]] = [{} for _ in range(servos)]
+
+    def go_on(self, source: Source, plans: Sequence[Plan], states: Sequence[State], lines: Sequence[Lines],
+              looks: Looks, tell: Callable[[float], object], others: bool) -> tuple[list[State], list[Shown]]:
+        """Advance, as `BusSteps.go_on` does, a part of the way at a time; `others`: see there."""
+        self._put(plans, lines, others)
+        memories = _records_in(states)
+        lanes, tables = _lanes_of(plans), _tables_of(plans)
+        used = np.zeros(USED * len(plans), np.int64)
+        used[NEXT], now, whole = looks.next, states[0].time, looks.until
+        self._posts["low"]["voltage"], self._posts["low"]["pending"] = NO_LOW
+        while now < whole:
+            end = min(whole, now + _PART, now + _ROOM / (8.0 * looks.rate))
+            end = whole if whole - end <= _REST else end
+            status = self._advance(self._posts, memories, lanes, tables, self._shared, self._seats, self._mates,
+                                   looks._replace(next=int(used[NEXT]), until=end,
+                                                  at_end=looks.at_end if end == whole else 0),
+                                   self._tape, self._rows, self._events, used)
+            if status != COMPLETED:
+                raise failure(Status.of_code(status), float(np.max(self._seats["origin"] + self._seats["clock"])))
+            now = end
+            self._make_room(int(used.reshape(-1, USED)[:, :2].max()))
+            tell(now)
+        shown = [Shown(self._rows[k, :rows].tolist(), self._events[k, :events].tolist())
+                 for k, (rows, events) in enumerate(used.reshape(-1, USED)[:, :2])]
+        held = [row.tobytes() + firm.tobytes() for row, firm in zip(*memories, strict=True)]
+        return [State(whole, state.places, own, plan.numbers, state.changes)
+                for plan, state, own in zip(plans, states, held, strict=True)], shown
+
+    def _make_room(self, used: int) -> None:
+        """Let half of the room, more than a part ever takes, be free; a least voltage that waits behind it stays."""
+        whole = self._rows.shape[1]
+        if used >= whole - 1:
+            raise InputError("servos on a supply", got=f"over {_ROOM // 2} switches of bridges in {_PART:g} s",
+                             allowed="fewer")
+        if used > whole // 2:
+            self._rows, self._events = (np.concatenate([own, np.empty_like(own)], axis=1) for own in (
+                self._rows, self._events))
+
+    def _put(self, plans: Sequence[Plan], lines: Sequence[Lines], others: bool) -> None:
+        """Put into posts what is other than before."""
+        for k, (post, plan, line) in enumerate(zip(self._posts, plans, lines, strict=True)):
+            post["changed"] = int(others)
+            present = {"numbers": plan.numbers, "chip": plan.chip, "lines": line}
+            for name, values in present.items():
+                if values != self._put_before[k].get(name):
+                    put_fields(post[name], values)
+            self._put_before[k] = present

@@ -375,35 +375,43 @@ def in_64_bits(seed: int) -> int:
 
 
 def kernels_of_one() -> Any:
-    """Return the kernels of one servo; None where it runs in plain Python.
+    """Return the kernels of one servo; None where it runs in plain Python."""
+    return kernels_beside(ONE)
+
+
+def kernels_beside(recipe: Recipe) -> Any:
+    """Return the kernels of a recipe; None where it runs in plain Python.
 
     Where there are none yet another process makes them, and they are taken by whoever begins later.
     """
     if is_plain():
         return None
-    if not _ONE.found and time.monotonic() >= _ONE.look:
-        if is_compiled(ONE):
-            _ONE.found = kernels(ONE)
-        elif not _ONE.look:
-            _make_beside()
-        _ONE.look = time.monotonic() + _LOOKS
-    return _ONE.found
+    own = _beside.setdefault(recipe.name, _Kernels())
+    if not own.found and time.monotonic() >= own.look:
+        if is_compiled(recipe):
+            own.found = kernels(recipe)
+        elif not own.look:
+            _make_beside(recipe)
+        own.look = time.monotonic() + _LOOKS
+    return own.found
 
 
 @dataclass
 class _Kernels:
-    """The kernels of one servo, once there are any, and when to look for them next [s]."""
+    """The kernels of a recipe, once there are any, and when to look for them next [s]."""
 
     found: Any = None
     look: float = 0.0
 
 
-_ONE, _LOOKS = _Kernels(), 0.5
+_LOOKS = 0.5
+_beside: dict[str, _Kernels] = {}
 
 
-def _make_beside() -> None:
-    """Let another process make the kernels."""
-    text = "from servotwin.simulation.compile import kernels; from servotwin.simulation.engine import ONE; kernels(ONE)"
+def _make_beside(recipe: Recipe) -> None:
+    """Let another process make the kernels of a recipe."""
+    text = ("from servotwin.simulation.compile import kernels; from servotwin.simulation.recipes import all_recipes; "
+            f"kernels(next(each for each in all_recipes() if each.name == {recipe.name!r}))")
     quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     threading.Thread(target=subprocess.run, args=([sys.executable, "-c", text],),
                      kwargs={**quiet, "check": False, "start_new_session": True}, daemon=True).start()

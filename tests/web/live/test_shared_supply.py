@@ -9,6 +9,8 @@ import pytest
 import servotwin as st
 from falling_supplies import BIG, SITUATIONS, STS, XL
 from servotwin.errors import InputError
+from servotwin.simulation import bus_run
+from servotwin.simulation.compile import kernels
 from servotwin.web.live import LiveBench, read_scene
 
 SUPPLY = {"open_circuit_voltage": 6.0, "internal_resistance": 0.5}
@@ -121,6 +123,38 @@ def test_how_time_is_cut_changes_nothing():
         return angles(bench)
 
     np.testing.assert_allclose(run(random.Random(1)), run(random.Random(2)), atol=1e-9)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("servos", "more"), CASES)
+def test_kernels_show_what_plain_python_shows(servos, more, monkeypatch):
+    """Also where the room for rows has to grow."""
+    compiled = bus_run.kernels_beside
+    monkeypatch.setattr(bus_run, "_ROOM", 64)
+    kernels(bus_run.TOGETHER)
+
+    def shown(way):
+        monkeypatch.setattr(bus_run, "kernels_beside", way)
+        bench, told = LiveBench(read_scene(scene_text(servos, SUPPLY | more))), []
+        bench.hurried(lambda: False, told.append)
+        bench.do("command", {"shape": "hold", "unit": "us", "value": 1800.0})
+        seen = [bench.advance(0.5, 150.0)]
+        bench.do("set", {"supply.internal_resistance": 0.8})
+        analog = servos[0][0] == ANALOG
+        bench.do("set", {"electronics.deadband": 2e-5} if analog else {"firmware.deadband_angle": 0.01}, 0)
+        bench.do("push", 0.1)
+        seen.append(bench.advance(0.6, 150.0))
+        assert len(told) > (5 if way is compiled else 0)
+        return type(bench._supply._steps._way), seen
+
+    (way, found), (plainly, expected) = shown(compiled), shown(lambda recipe: None)
+    assert (way, plainly) == (bus_run._ShownCompiled, bus_run._ShownPlainly)
+    for push, plain in zip(found, expected, strict=True):
+        assert [(kind, servo) for _, kind, servo in push.events] == [(kind, servo) for _, kind, servo in plain.events]
+        for one, other in zip(push.servos, plain.servos, strict=True):
+            assert one.pulses == other.pulses
+            peak = np.maximum(np.abs(other.points).max(axis=0), 1e-6)
+            np.testing.assert_allclose(np.array(one.points) / peak, np.array(other.points) / peak, rtol=0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize(("servos", "supply", "what"), [

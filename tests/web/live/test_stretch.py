@@ -9,8 +9,9 @@ from servotwin.models.engine.live.posts import NONE_BEFORE
 from servotwin.models.engine.live.screen import COLUMNS, NO_LOW, USED, Looks, Screen
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.terms import control
+from servotwin.simulation.bus_run import Endless
 from servotwin.simulation.engine import RunLog
-from servotwin.web.live.station import Endless, lines_of, names_of
+from servotwin.web.live.station import lines_of, names_of
 
 ANALOG, DIGITAL, BUS = "hitec-hs-755hb", "towerpro-mg996r", "feetech-sts3215-12v"
 HEAT = {"thermal.winding_capacity": 3.0, "thermal.housing_capacity": 30.0, "thermal.winding_to_housing": 8.0,

@@ -147,14 +147,15 @@ def _of_the_bench() -> Mapping[str, tuple[Kind, ...]]:
             "bench:look": (posts, INT64, told, programs, _MEMORIES, _CUBE, _INDICES),
             "bench:tune": (sender, FLOAT64), "bench:snapped": (sender, FLOAT64), "bench:next_edge": (sender,),
             "bench:advance": (posts, told, programs, _MEMORIES, sender, _LOG, *going),
-            "bench:advance_together": (posts, told, programs, _MEMORIES, sender, *bus, *going)}
+            "bench:advance_together": (posts, told, programs, _MEMORIES, sender, *bus, *going),
+            "together:advance": (posts, _MEMORIES, *bus[:-1], named(Looks), bus[-1], _CUBE, _CUBE, _INDICES)}
 
 
 _OF_BENCH = ("make", "begin", "begin_at", "heed", "change", "take", "count", "draw", "look", "tune", "snapped",
              "next_edge", "advance", "advance_together")
 _ELSEWHERE: Mapping[str, Callable[[], Mapping[str, tuple[Kind, ...]]]] = {  # where kinds take more than lanes have
     "digital_batch:go_on": _of_ticks, "runs:go_on": _of_ticks, **{f"bench:{name}": _of_the_bench for name in _OF_BENCH},
-    "stretch:shown": _of_the_bench,
+    "stretch:shown": _of_the_bench, "together:advance": _of_the_bench,
     "bus_batch:go_on": _of_buses, "bus_batch:look": _of_buses, "bus_batch:voltages": _of_buses,
     "cosim:break_up": _of_buses}
 

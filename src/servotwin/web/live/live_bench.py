@@ -30,7 +30,7 @@ from servotwin.units import is_finite
 from servotwin.web.live.actions import Action, checked
 from servotwin.web.live.rules import LONGEST
 from servotwin.web.live.scene import MOST_ACTIONS, Scene, family_of, with_registers
-from servotwin.web.live.station import Endless, FrameEdge, Row, Seen, Station
+from servotwin.web.live.station import FrameEdge, Row, Seen, Station
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -51,7 +51,7 @@ class SharedSupply:
     """
 
     def __init__(self, stations: Sequence[Station]) -> None:
-        self._stations, self._steps = stations, BusSteps([one.post for one in stations])
+        self._stations, self._steps = stations, BusSteps()
 
     def advance(self, until: float, rate: float, *, switches: bool = True) -> list[Seen]:
         """Advance all to a time [s]; return what shows of each, as `Station.advance` does.
@@ -62,13 +62,13 @@ class SharedSupply:
             If they cannot continue.
         """
         those = self._stations
-        rows, events = [Endless(one.tell) for one in those], [Endless() for _ in those]
         looks = Looks(first_look(those[0].state.time, rate), rate, until, 1, int(switches))
-        states = self._steps.go_on(source_of(those[0].model.servo.supply), [one.plan for one in those],
-                                   [one.state for one in those], looks, rows, events)
+        states, shown = self._steps.go_on(
+            source_of(those[0].model.servo.supply), [one.plan for one in those], [one.state for one in those],
+            [one.lines for one in those], looks, those[0].tell)
         for one, state in zip(those, states, strict=True):
             one.state = state
-        return [one.seen(*shown) for one, *shown in zip(those, rows, events, strict=True)]
+        return [one.seen(own) for one, own in zip(those, shown, strict=True)]
 
 
 def hung(models: Sequence[Model], load: Load, supply: Mapping[str, float]) -> tuple[Model, ...]:

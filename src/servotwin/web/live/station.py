@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -13,7 +12,7 @@ from servotwin.models import DigitalServo
 from servotwin.models.base import KINDS
 from servotwin.models.engine import log
 from servotwin.models.engine.live import stretch
-from servotwin.models.engine.live.posts import NONE_BEFORE, NOTHING_SAID, Post, put_low, put_said
+from servotwin.models.engine.live.posts import NONE_BEFORE
 from servotwin.models.engine.live.screen import (
     COLUMNS,
     NO_LOW,
@@ -26,11 +25,12 @@ from servotwin.models.engine.live.screen import (
     first_look,
     told_of,
 )
-from servotwin.models.state.records import object_of, record_of
+from servotwin.models.state.records import record_of
 from servotwin.models.switched import SwitchedServo
 from servotwin.physics.pieces import Piece, Pieces, piece_value
 from servotwin.signals import Signal
 from servotwin.simulation import Simulator
+from servotwin.simulation.bus_run import Endless, Shown
 from servotwin.simulation.engine import Part, Plan, RunLog, State, kernels_of_one, run
 from servotwin.web.live.actions import ControlCircuit, command_signal
 
@@ -219,46 +219,6 @@ Row = tuple[float, ...]
 _SHOWN = frozenset(SHOWN.values())
 
 
-def post_of(model: Model) -> Any:
-    """Return what kernels keep of a servo between stretches, in plain Python."""
-    post = object_of(Post)
-    post.lines, post.was = lines_of(model), NONE_BEFORE
-    put_said(post.said, NOTHING_SAID)
-    put_low(post.low, NO_LOW)
-    return post
-
-
-class Endless:
-    """Rows without an end, as kernels fill them in plain Python; `tell` is called with the time [s] now and then."""
-
-    def __init__(self, tell: Callable[[float], object] | None = None) -> None:
-        self.rows: list[list[float]] = []
-        self.tell = tell or float
-
-    def __len__(self) -> int:
-        """Return more than there ever are."""
-        return sys.maxsize
-
-    def cut(self, count: int) -> None:
-        """Leave out rows behind so many: they were written, and then not taken up."""
-        del self.rows[count:]
-
-    def __getitem__(self, place: tuple[int, int]) -> float:
-        """Return a number."""
-        return self.rows[place[0]][place[1]]
-
-    def __setitem__(self, place: tuple[int, int], value: float) -> None:
-        """Put a number where it belongs, or behind those of its row."""
-        n, k = place
-        if n == len(self.rows):
-            self.rows.append([])
-        row = self.rows[n]
-        if k == len(row):
-            row.append(value)
-        else:
-            row[k] = value
-
-
 class Seen(NamedTuple):
     """Signals of a stretch of time: rows of (time, signals), and (time, kind) of events."""
 
@@ -292,8 +252,7 @@ class Station:
         self.told = Told(model, command, control)
         self.state = self._simulator.initial(self.told.signal)
         """Everything that it remembers."""
-        self.post = post_of(model)
-        """Its record in kernels."""
+        self._was = NONE_BEFORE  # how its bridge drove at the end of the latest stretch
         self._look_with(model, load)
         self.push = 0.0  # N m, by hand
         self.tell: Callable[[float], object] | None = None
@@ -328,7 +287,7 @@ class Station:
         self._look_with(change.model, self._simulator.of(change.state).load)
 
     def _look_with(self, model: Model, load: Load) -> None:
-        self.post.lines, self._names = lines_of(model), names_of(model, load)
+        self.lines, self._names = lines_of(model), names_of(model, load)
         self._picks = [COLUMNS.index(name) for name in self.columns]
 
     def advance(self, until: float, rate: float, *, switches: bool = True) -> Seen:
@@ -348,34 +307,34 @@ class Station:
 
     def _rows(self, plan: Plan, before: State, parts: list[Part], looks: Looks) -> list[list[float]]:
         """Return what shows of motions, and note how the bridge drives at their end."""
-        post, own = self.post, kernels_of_one()
+        own = kernels_of_one()
         if not parts:
             return []
         if own is None:
             seen, motions = Endless(), [row for part in parts for row in part.rows]
             stood = stretch.Stood(before.memory, told_of(before.memory, plan.digital))
             used = np.zeros(USED, np.int64)
-            _, post.was, _ = stretch.show(plan.numbers, plan.inputs, motions, len(motions), np.zeros(0), stood,
-                                          looks.next, post.was, NO_LOW, looks, post.lines,
+            _, self._was, _ = stretch.show(plan.numbers, plan.inputs, motions, len(motions), np.zeros(0), stood,
+                                          looks.next, self._was, NO_LOW, looks, self.lines,
                                           Screen(seen, Endless(), used), True)
             return seen.rows[:used[0]]
         rows = np.concatenate([np.asarray(part.rows, record_of(log.Row)) for part in parts])
         room = 2 * int(looks.rate * (looks.until - before.time)) + 3 * len(rows) + 4
         found, used = np.empty((room, len(COLUMNS))), np.zeros(USED, np.int64)
-        own.shown(plan.plant, plan.compiled.inputs, plan.compiled.stood(before), rows, np.zeros(0), post.was, looks,
-                  post.lines, found, used)
+        own.shown(plan.plant, plan.compiled.inputs, plan.compiled.stood(before), rows, np.zeros(0), self._was, looks,
+                  self.lines, found, used)
         last = rows[rows["end"] > rows["start"]][-1:]
         if last.size:
             duty = float(last["duty"][0])
-            post.was = Switch(float(last["drive"][0]), duty if abs(duty) > 1.0 else 0.0, int(last["silent"][0]))
+            self._was = Switch(float(last["drive"][0]), duty if abs(duty) > 1.0 else 0.0, int(last["silent"][0]))
         shown: list[list[float]] = found[:used[0]].tolist()
         return shown
 
-    def seen(self, rows: Endless, events: Endless) -> Seen:
-        """Return what shows of rows and events that kernels have written."""
+    def seen(self, shown: Shown) -> Seen:
+        """Return the signals of what shows of it on a shared supply."""
         picks = self._picks
-        return Seen([tuple(row[k] for k in picks) for row in rows.rows],
-                    [(time, SHOWN[int(code)]) for time, code in events.rows if int(code) in SHOWN])
+        return Seen([tuple(row[k] for k in picks) for row in shown.rows],
+                    [(time, SHOWN[int(code)]) for time, code in shown.events if int(code) in SHOWN])
 
     @property
     def plan(self) -> Plan:

@@ -4,22 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from servotwin.models.engine import controller
-from servotwin.models.engine.bus import bus_unit
-from servotwin.models.engine.bus.bus_records import Tape, put_shared
-from servotwin.models.engine.bus.coupled_motion import at_start
-from servotwin.models.engine.lanes import Lanes, Tables, inputs_at
-from servotwin.models.engine.lanes import Told as ToldAll
+from servotwin.models.engine.bus.bus_records import Tape
+from servotwin.models.engine.lanes import Lanes, Tables
 from servotwin.models.engine.live import posts as those
 from servotwin.models.engine.live import stretch, together
 from servotwin.models.engine.live.posts import Told
 from servotwin.models.engine.live.screen import NEXT, NO_LOW, USED, Looks, Screen, first_look
 from servotwin.models.engine.log import Log
-from servotwin.models.engine.memory import Memories, memory_at, put_memory, resumed, time_of
+from servotwin.models.engine.memory import Memories, memory_at, put_memory
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.state.noise import drawn
-from servotwin.models.terms import duty
-from servotwin.models.terms.source import Source
 from servotwin.physics.converter import counted
 
 PAUSED = -1  # as a status: the room for what shows is half full
@@ -135,14 +129,8 @@ def advance_together(posts: Any, told: Told, programs: Any, memories: Memories, 
         end = _end_of_part(now, until, rate, len(rows[0]))
         those.hear(now, posts, told, pulses, used, end)
         looks = Looks(used[NEXT], rate, end, 1 if end == those.snapped(now, until) else 0, switches)
-        _take_seats(posts, told, memories, lanes, ToldAll(lanes, tables), shared[0], seats)
-        status = together.go_on(ToldAll(lanes, tables), posts, memories.firms, shared[0], seats, mates, looks,
-                                tape, rows, events, used)
-        for n in range(len(posts)):
-            memory = bus_unit.memory_in(seats[n], memories.firms)
-            if duty.present(posts[n].numbers.bridge):
-                controller.pause(inputs_at(ToldAll(lanes, tables), seats[n]), controller.of(memory), time_of(memory))
-            put_memory(memories.rows[n], memory)
+        _tell(posts, told, lanes)
+        status = together.advance(posts, memories, lanes, tables, shared, seats, mates, looks, tape, rows, events, used)
         if status == COMPLETED:
             now.time = end
     return status
@@ -170,34 +158,14 @@ def _end_of_part(now: Any, until: float, rate: float, room: int) -> float:
     return whole if until - end <= _REST else end
 
 
-def _take_seats(posts: Any, told: Told, memories: Memories, lanes: Lanes, on_bus: Any, shared: Any, seats: Any) -> None:
-    """Let all servos take their seats on the bus, with their present inputs."""
-    others = False
+def _tell(posts: Any, told: Told, lanes: Lanes) -> None:
+    """Put the present commands, loads and seeds of all servos into lanes."""
     for n in range(len(posts)):
         post = posts[n]
         lanes.piece_first[n], lanes.piece_count[n] = those.pieces_of(post, n, len(posts), told)
         lanes.edge_first[n] = those.train_of(told, len(posts), n)[0]
         lanes.edge_count[n] = post.heard if post.pulsed == 1 else -1
         lanes.torque[n], lanes.seeds[n] = post.torque + post.push, post.seed
-        seats[n].place, seats[n].lane = n, n
-        others = others or post.changed == 1
-    for n in range(len(posts)):
-        post, seat, inputs = posts[n], seats[n], inputs_at(on_bus, seats[n])
-        memory = memory_at(memories, n)
-        if duty.present(post.numbers.bridge):
-            beat = memory.beat
-            memory = resumed(True, inputs, memory, False)
-            controller.resume(inputs, memory)
-            others = others or memory.beat != beat
-        bus_unit.sit(seat, those.numbers_of(post.numbers), those.chip_of(post.chip), inputs)
-        bus_unit.remember(seat, memory)
-        post.changed = 0
-    if others:
-        for n in range(len(posts)):
-            bus_unit.forget(seats[n])
-            seats[n].joined = -1
-        source = posts[0].numbers.source
-        put_shared(shared, at_start(Source(source.V, source.R_b, source.I_max)))
 
 
 def _advance_one(post: Any, k: int, servos: int, told: Told, programs: Any, memories: Memories, looks: Looks,

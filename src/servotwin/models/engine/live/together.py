@@ -5,12 +5,16 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from servotwin.models.engine.bus import bus_records, coupled_step, event_queue
-from servotwin.models.engine.bus.bus_records import Tape, numbers_of, put_numbers, source_of
+from servotwin.models.engine import controller
+from servotwin.models.engine.bus import bus_records, bus_unit, coupled_step, event_queue
+from servotwin.models.engine.bus.bus_records import Tape, numbers_of, put_numbers, put_shared, source_of
+from servotwin.models.engine.bus.coupled_motion import at_start
 from servotwin.models.engine.dynamics import currents
 from servotwin.models.engine.events import crossings
-from servotwin.models.engine.lanes import inputs_at
+from servotwin.models.engine.lanes import Lanes, Tables, Told, inputs_at
+from servotwin.models.engine.live.posts import chip_of as chip_in
 from servotwin.models.engine.live.posts import lines_of, low_of, put_low, put_said, said_of
+from servotwin.models.engine.live.posts import numbers_of as numbers_in
 from servotwin.models.engine.live.screen import (
     LEFT,
     NEXT,
@@ -28,7 +32,7 @@ from servotwin.models.engine.live.screen import (
     write,
 )
 from servotwin.models.engine.log import Row
-from servotwin.models.engine.memory import FLAT, put_vector
+from servotwin.models.engine.memory import FLAT, Memories, memory_at, put_memory, put_vector, resumed, time_of
 from servotwin.models.engine.motions import motion
 from servotwin.models.engine.observe import on_bus
 from servotwin.models.engine.run.at import motion_of, row_at, state_of
@@ -38,11 +42,48 @@ from servotwin.models.state.modes import Mode, Vector
 from servotwin.models.terms import duty, source
 from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.models.terms.sensor import wiper_at
+from servotwin.models.terms.source import Source
 from servotwin.physics.pieces import piece_value
 
 PLAIN = True  # the compiler takes it for False
 _NEAR = 1e-6  # of the time between two looks: to tell whether the voltage falls
 _LATE = 1.0 + 1e-12  # of an instant: so much before a tick it is the tick
+
+
+def advance(posts: Any, memories: Memories, lanes: Lanes, tables: Tables, shared: Any, seats: Any, mates: Any,
+            looks: Looks, written: Tape, rows: Any, events: Any, used: Any) -> int:
+    """Advance to `looks.until` from where servos remember; return a status.
+
+    Each is lane and post of the same place; where a post has `changed`, every motion begins anew.
+    """
+    told, others = Told(lanes, tables), False
+    for n in range(len(posts)):
+        seats[n].place, seats[n].lane = n, n
+        others = others or posts[n].changed == 1
+    for n in range(len(posts)):
+        post, seat, inputs = posts[n], seats[n], inputs_at(told, seats[n])
+        memory = memory_at(memories, n)
+        if duty.present(post.numbers.bridge):
+            beat = memory.beat
+            memory = resumed(True, inputs, memory, False)
+            controller.resume(inputs, memory)
+            others = others or memory.beat != beat
+        bus_unit.sit(seat, numbers_in(post.numbers), chip_in(post.chip), inputs)
+        bus_unit.remember(seat, memory)
+        post.changed = 0
+    if others:
+        for n in range(len(posts)):
+            bus_unit.forget(seats[n])
+            seats[n].joined = -1
+        own = posts[0].numbers.source
+        put_shared(shared[0], at_start(Source(own.V, own.R_b, own.I_max)))
+    status = go_on(told, posts, memories.firms, shared[0], seats, mates, looks, written, rows, events, used)
+    for n in range(len(posts)):
+        memory = bus_unit.memory_in(seats[n], memories.firms)
+        if duty.present(posts[n].numbers.bridge):
+            controller.pause(inputs_at(told, seats[n]), controller.of(memory), time_of(memory))
+        put_memory(memories.rows[n], memory)
+    return status
 
 
 def go_on(told: Any, posts: Any, firms: Any, shared: Any, seats: Any, mates: Any, looks: Looks, written: Tape,
