@@ -17,8 +17,12 @@ settings.register_profile("explore", settings.get_profile("fixed"), derandomize=
 settings.load_profile("fixed")
 
 
+_LONG_FAMILY, _TURNS = 6, 3  # cases, of which one in so many runs
+
+
 def pytest_addoption(parser):
     costs.add_options(parser)
+    parser.addoption("--turn", type=int, metavar="N", help="run one in three cases of long families, by a number which")
     parser.addoption("--seed", type=int, help="run the tests that draw at random alone, from this seed on")
 
 
@@ -46,6 +50,24 @@ def pytest_collection_modifyitems(config, items):
         drawing = [item for item in items if _shifted(item, 1000 * seed)]
         config.hook.pytest_deselected(items=[item for item in items if item not in set(drawing)])
         items[:] = drawing
+
+
+@pytest.hookimpl(specname="pytest_collection_modifyitems", trylast=True)
+def pytest_take_turns(config, items):
+    """With `--turn`: run one in three cases of each family that has many among the tests that were chosen.
+
+    What the documentation says is run whole: a page is to be true at every commit.
+    """
+    turn = config.getoption("--turn")
+    if turn is None:
+        return
+    families = {}
+    for item in items:
+        families.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    drawn = {name for name, cases in families.items() if len(cases) >= _LONG_FAMILY and "tests/docs/" not in name}
+    left = {item for name in drawn for k, item in enumerate(families[name]) if (k + turn) % _TURNS}
+    config.hook.pytest_deselected(items=[item for item in items if item in left])
+    items[:] = [item for item in items if item not in left]
 
 
 def _shifted(item, by):

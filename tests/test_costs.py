@@ -1,10 +1,17 @@
 """What tests cost is booked by folder, calibrated, without what compiling takes; CI fails on folders, on no item."""
 
 import types
+from dataclasses import dataclass
 
 import pytest
 
 import costs
+from conftest import pytest_take_turns
+
+
+@dataclass(frozen=True)
+class Case:
+    nodeid: str
 
 
 def report(name, own, children=0.0, made=(), loop=costs.BUDGETS["loop"]):
@@ -59,3 +66,19 @@ def test_the_case_that_a_family_names_stays_among_the_quick_ones(case, request):
 @pytest.mark.parametrize("seed", [3])
 def test_explore_goes_on_to_other_seeds(seed, request):
     assert seed == 3 + 1000 * (request.config.getoption("--seed") or 0)
+
+
+def test_turns_run_every_case_once_in_three_and_what_has_few_each_time():
+    """Cases of a long family of many; those of a small one, and of the documentation, come at each turn."""
+    names = [*(f"tests/a/test_x.py::many[{k}]" for k in range(20)), *(f"tests/a/test_x.py::few[{k}]" for k in range(5)),
+             *(f"tests/docs/test_y.py::page[{k}]" for k in range(9)), "tests/a/test_x.py::one"]
+    seen, left = [], []
+    for turn in (7, 8, 9):
+        items = [Case(name) for name in names]
+        hook = types.SimpleNamespace(pytest_deselected=lambda items: left.extend(items))
+        pytest_take_turns(types.SimpleNamespace(getoption={"--turn": turn}.get, hook=hook), items)
+        seen.append([item.nodeid for item in items])
+        assert len(seen[-1]) in (21, 22)
+    often = {name: sum(name in run for run in seen) for name in names}
+    assert {name: times for name, times in often.items() if times != (1 if "many" in name else 3)} == {}
+    assert len(left) == 40
