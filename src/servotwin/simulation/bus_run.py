@@ -388,7 +388,7 @@ class Endless:
 
 
 class Shown(NamedTuple):
-    """What shows of a servo: rows of `screen.COLUMNS`, and events (time [s], code)."""
+    """Rows of a servo, each with all of `screen.COLUMNS`, and its events (time [s], code)."""
 
     rows: list[list[float]]
     events: list[list[float]]
@@ -557,7 +557,7 @@ class _ShownCompiled:
         """Put into posts what is other than before."""
         for k, (post, plan, line) in enumerate(zip(self._posts, plans, lines, strict=True)):
             post["changed"] = int(others)
-            present = {"numbers": plan.numbers, "chip": plan.chip, "lines": line}
+            present = dict(zip(Post._fields, (plan.numbers, plan.chip, line), strict=False))
             for name, values in present.items():
                 if values != self._put_before[k].get(name):
                     put_fields(post[name], values)
