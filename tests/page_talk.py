@@ -28,7 +28,7 @@ def come_to_rest(page, servo: int = 0) -> None:
 
 
 def until(page, time: float) -> None:
-    """Wait until the bench has come to a time [s]: two bus servos go at a tenth of it, on a busy machine at less."""
+    """Wait until the bench has come to a time [s], which takes longer than that on a busy machine."""
     for step in range(1, math.ceil(2.0 * time)):
         page.wait_for_function(f"bench.time >= {0.5 * step}", timeout=60000)
     page.wait_for_function(f"bench.time >= {time}", timeout=60000)
