@@ -188,16 +188,21 @@ def test_simulators_that_no_gpu_has(driver):
         st.VectorSimulator(model, 2, load=st.loads.Pendulum(mass=0.1, length=0.1), device="cuda")
 
 
+WARMING = st.DigitalServo(st.load_servo(GOALS).replace(WARM))
 VARIANTS = st.distributions.drawn_parameters(
     {"motor.torque_constant": "normal:5%", "friction.coulomb_torque_forward": "uniform:50%",
      "load.inertia": "uniform:5..40kg cm2", "load.torque": "uniform:-0.02..0.02Nm"},
     st.PulseServo(st.load_servo(PLAIN)), 300, 1)
 
 
-@pytest.mark.parametrize("model", [None, pytest.param(st.DigitalServo(st.load_servo(GOALS)), marks=pytest.mark.slow)])
+@pytest.mark.parametrize("model", [None, pytest.param(st.DigitalServo(st.load_servo(GOALS)), marks=pytest.mark.slow),
+                                   pytest.param(WARMING, marks=pytest.mark.slow)])
 def test_a_reset_gives_a_lane_the_same_servo_there_and_here(shared, model):
     """Inertias and bus voltages that were imposed stay, and what was saved there continues here."""
     variants = {name: values for name, values in VARIANTS.items() if model is None or name.startswith("load.")}
+    if model is WARMING:
+        variants |= {"thermal.winding_capacity": np.linspace(0.3, 3.0, 300),
+                     "thermal.ambient": np.linspace(270.0, 310.0, 300)}
     here, there = both(shared, model, variants=variants, load=None)
     rng, within, every = np.random.default_rng(2), 1e-11 if model is None else 1e-9, np.arange(LANES)
     seen = []
@@ -223,6 +228,8 @@ def test_a_reset_gives_a_lane_the_same_servo_there_and_here(shared, model):
         assert there.variant.read().tolist() == here.variant.tolist()
         seen.append(here.variant)
         same(here, there, within=within)
+        if model is WARMING:
+            assert there["winding_temperature"].read() == pytest.approx(here["winding_temperature"], abs=1e-7)
     assert len(np.unique(seen)) > LANES
     memory = there.save()
     assert np.array_equal(memory.numbers["motor"]["K"], here.save().numbers["motor"]["K"])
