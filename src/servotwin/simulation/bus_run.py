@@ -452,8 +452,10 @@ class BusSteps:
             self._way = _ShownPlainly(plans, states, source) if own is None else _ShownCompiled(own, len(plans))
         others = source != self._source or any(
             plan.numbers != state.numbers for plan, state in zip(plans, states, strict=True))
+        self._source = None  # where `tell` ends it, all begin anew from their states
+        found = self._way.go_on(source, plans, states, lines, looks, tell or float, others)
         self._source = source
-        return self._way.go_on(source, plans, states, lines, looks, tell or float, others)
+        return found
 
 
 class _ShownPlainly:
