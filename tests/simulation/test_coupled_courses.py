@@ -46,6 +46,20 @@ def falls(polynomial):
     return real[0] if len(real) else math.inf
 
 
+@pytest.mark.parametrize("alike", [3e-5, 1e-4, 3.2e-4])  # s
+@pytest.mark.parametrize("closing", [-1e-6, 1e-6])  # rad/s, at first
+def test_teeth_that_would_leave_each_other_again_within_a_leg_meet(alike, closing):
+    """Their accelerations cross, so that the way between them turns twice: at first open, then closed, then open."""
+    unit, b = inside(1), 1e6
+    unit.y.q_m = 1.0 - HALF + 1e-11
+    unit.speed[:TERMS + 1] = [5.0 - closing, -b * alike, 0.5 * b] + [0.0] * (TERMS - 2)
+    unit.output[:TERMS + 1] = [5.0] + [0.0] * TERMS
+    way = np.polynomial.Polynomial([1e-11, -closing, -0.5 * b * alike, b / 6.0])
+    assert first_below(unit, guards.MEET_BACKWARD, TERMS, LENGTH) == pytest.approx(falls(way), rel=1e-9)
+    assert way(LENGTH) > 0.0
+    assert first_below(unit, guards.MEET_FORWARD, TERMS, LENGTH) == math.inf
+
+
 @pytest.mark.parametrize("seed", range(60))
 def test_when_teeth_meet_and_speeds_end_is_a_root_of_their_series(seed):
     unit = inside(seed)

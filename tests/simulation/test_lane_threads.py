@@ -141,9 +141,6 @@ CASES = {  # servo, what its lanes have, way, how many, and how far they may be 
     "legs, warming": (st.PulseServo, PLAIN, warming(limited(analog)), PULSES_BY_LEGS, 80, 1e-11),
     "goals, warming": (st.DigitalServo, GOALS, warming(goals), TICKS, 80, 1e-11),
     "pulses, warming": (st.DigitalServo, PULSES, warming(limited(programmed)), TICKS, 120, 1e-11)}
-# Of a hundred lanes: an output that a motor hammers against a stop bounces between both endlessly often in no time, and
-# what is taken for its end depends on how time is cut
-RARE = {"pulses, warming": 2.0}
 
 
 def made(case, lanes=None, seed=5):
@@ -213,8 +210,7 @@ def test_random_servos_are_those_of_lanes(case):
     own, _ = entered(sims)
     assert own.text.way == CASES[case][3]
     worst, left, (creep, most, stand) = advanced(sims, own, low, high, rng)
-    most_of_them = np.percentile(worst, 100.0 - RARE.get(case, 0.0), method="higher")
-    assert most_of_them <= CASES[case][5], np.argmax(worst)
+    assert worst.max() <= CASES[case][5], np.argmax(worst)
     assert (left > 0) == (case == "arcs")  # some met a stop
     if "warming" in case:
         same, y = worst <= CASES[case][5], sims._store.memories().rows["point"]["y"]

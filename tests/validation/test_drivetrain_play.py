@@ -57,6 +57,32 @@ def test_an_impact_in_closed_form(way):
     assert result.energy.stops == pytest.approx(0.5 * MOTOR * 4.0 - 0.5 * (MOTOR + OUTPUT) * w**2, rel=1e-12)
 
 
+HEAVY = {"thermal.winding_capacity": 1e9, "thermal.housing_capacity": 1e9, "thermal.winding_to_housing": 1.0,
+         "thermal.housing_to_ambient": 1.0}  # as good as constant temperatures, at which the law is solved exactly
+
+
+@pytest.mark.parametrize("alike", [3e-4, 2e-3])  # s
+@pytest.mark.parametrize("more", [{}, HEAVY, HEAVY | {"thermal.magnet_coefficient": -2e-3}],
+                         ids=["arc", "heat", "magnets"])
+def test_flanks_that_would_leave_each_other_again_meet(more, alike):
+    """A braked motor is overtaken by a load that is braked evenly: the way between both opens, closes and opens."""
+    braked = LOOSE | {"electronics.off_state": "brake", "gear.backlash": 1.0}
+    w, gap, opening, t = 4.0, 1e-9, 1e-7, 0.02
+    alone = simulate(undriven(braked, initial={"motor_speed": w * N}, duration=t), np.array([t]))
+    rate = -math.log(alone["motor_speed"][0] / N / w) / t
+    even = rate * w * math.exp(-rate * alike)
+    case = undriven(braked | LOOSE | more, load={"torque": OUTPUT * even}, duration=5.0 * alike, initial={
+        "output_angle": 0.0, "output_speed": w - opening, "motor_angle": (gap - 0.5 * PLAY) * N, "motor_speed": w * N})
+
+    def way(t):
+        return gap - w / rate * math.expm1(-rate * t) - (w - opening) * t + 0.5 * even * t * t
+
+    meets = brentq(way, 1e-7, 2.0 * alike, xtol=1e-16)
+    assert way(5.0 * alike) > 0.0
+    first = simulate(case, np.array([5.0 * alike])).events[0]
+    assert (first.kind, first.time) == ("gear meets", pytest.approx(meets, rel=1e-6))
+
+
 # --- friction behind the play -----------------------------------------------------------------------------------------
 
 SIDED = {"friction.coulomb_torque_forward": 0.24 / N, "friction.coulomb_torque_backward": 0.2 / N}

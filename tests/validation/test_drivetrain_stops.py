@@ -158,26 +158,44 @@ def impacts(way, speed, pull, restitution):
             yield float(t), float(v), float(left + gap)
 
 
+@pytest.mark.parametrize(("pull", "way"), [(1e-6, 5e-3), (0.02, 1e-3), (0.5, 1e-4), (5.0, 1e-5)])
 @pytest.mark.parametrize("restitution", [0.1, 0.395, 0.7])
-def test_an_output_between_motor_and_stop_hits_both_until_they_rest(restitution):
+def test_an_output_between_motor_and_stop_hits_both_until_they_rest(restitution, pull, way):
     """Ever smaller impacts without end, in no time: where they lead is where the engine stops both, on the stop."""
-    pull, stop, half = 1e-6, 1.005, 0.5 * PLAY["gear.backlash"]
+    stop, half = 1.0 + way, 0.5 * PLAY["gear.backlash"]
     case = undriven(PLAY | {"electronics.off_state": "coast", "stops.upper_angle": stop,
                             "stops.restitution": restitution}, load={"torque": -pull}, duration=0.005,
                     initial={"output_angle": 1.0, "output_speed": 1.2, "motor_angle": N * (1.0 + half),
                              "motor_speed": 1.2 * N})
     result = simulate(case, np.array([0.005]))
-    every = list(itertools.takewhile(lambda impact: impact[1] > 1e-12, impacts(stop - 1.0, 1.2, pull, restitution)))
-    first, (last, slowest, left) = every[:2], every[-1]
+    every = list(itertools.takewhile(lambda impact: impact[1] > 1e-12, impacts(way, 1.2, pull, restitution)))
+    _, slowest, left = every[-1]
     assert len(every) > 60
     assert slowest < 2e-12
     assert left < 1e-9  # of the motor's way to the stop, when it has lost all speed
-    assert [event.time for event in result.events[-4:]] == pytest.approx(
-        [first[0][0], first[1][0], last, last], abs=1e-8)
+    events = [event.time for event in result.events if event.kind != "release forward"]
+    assert events == pytest.approx([time for time, _, _ in every[:len(events)]], abs=1e-9)
     assert result["output_angle"][0] == stop
     assert result["motor_angle"][0] / N - half == pytest.approx(stop, abs=1e-15)
     assert result["output_speed"][0] == result["motor_speed"][0] == 0.0
-    assert result.energy.stops == pytest.approx(0.5 * INERTIA * 1.2**2 + 0.005 * pull, rel=1e-12)
+    assert result.energy.stops == pytest.approx(0.5 * INERTIA * 1.2**2 + way * pull, rel=1e-12,
+                                                abs=1e-12 * pull)  # of the way that counts as none
+
+
+@pytest.mark.parametrize("gap", [1e-11, 1e-8])
+def test_a_motor_that_presses_close_behind_its_output_hits_the_stop_with_it(gap):
+    """Output hits, is met, and both hit as one body: however little way there is, this is no bouncing without end."""
+    restitution, stop, half = 0.5, 1.001, 0.5 * PLAY["gear.backlash"]
+    case = undriven(PLAY | {"electronics.off_state": "coast", "stops.upper_angle": stop,
+                            "stops.restitution": restitution}, load={"torque": 0.0}, duration=0.002,
+                    initial={"output_angle": 1.0, "output_speed": 1.2, "motor_angle": N * (1.0 + half - gap),
+                             "motor_speed": 1.2 * N})
+    result = simulate(case, np.array([0.002]))
+    met = 1.2 * (INERTIA - OUTPUT - restitution * OUTPUT) / INERTIA
+    assert result["output_speed"][0] == pytest.approx(-restitution * met, rel=1e-12)
+    assert result["motor_speed"][0] == pytest.approx(-restitution * met * N, rel=1e-12)
+    assert result["output_angle"][0] == pytest.approx(stop - restitution * met * (0.002 - 1e-3 / 1.2),
+                                                      abs=2.0 * gap + 1e-14)
 
 
 @pytest.mark.parametrize(("speed", "after"), [(2e-6, 2e-6), (5e-7, 0.0)])

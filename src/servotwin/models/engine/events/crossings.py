@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from servotwin.models.engine.dynamics import contacts, currents, guards, spring_contact
 from servotwin.models.engine.dynamics.guards import (
     CORE_BACKWARD,
@@ -53,6 +55,10 @@ from servotwin.models.state.modes import (
 from servotwin.models.terms import elastic, heat, play, source
 from servotwin.models.terms.friction import creeping_speed, smoothed
 from servotwin.models.terms.numbers import Numbers, warm
+from servotwin.models.terms.stops import Stops
+
+_NO_WAY = 1e-12  # relative to the angle: what is left of a way to a stop where there is none
+IN_FLOATS = {"_NO_WAY": 2e-6}
 
 # --- The mode after the end of another: how it continues, and where a guard has reached zero --------------------------
 
@@ -107,21 +113,34 @@ def _crossed(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: V
         return contacts.apart(numbers, zone, u, tau, y), y
     q, w, i = y.q, y.w, y.i
     if play.present(numbers.play) and (kind == MEET_FORWARD or kind == MEET_BACKWARD):
-        y = play.met(numbers.play, numbers.shaft, kind == MEET_FORWARD, y)
-        mesh = ON_FORWARD if kind == MEET_FORWARD else ON_BACKWARD
-        upper = q >= numbers.stops.upper and y.w > 0.0
-        hits = upper or (q <= numbers.stops.lower and y.w < 0.0)
-        if hits and w != 0.0:  # it goes to and fro between motor and stop without any way to go: in the end both stand
-            y = moving(y, q, 0.0, 0.0)
+        forward = kind == MEET_FORWARD
+        y = play.met(numbers.play, numbers.shaft, forward, y)
+        mesh = ON_FORWARD if forward else ON_BACKWARD
+        stop = stop_ahead(numbers.stops, forward, q, y.w)
+        if stop < math.inf and w != 0.0:  # it goes to and fro between motor and stop: in the end both stand
+            y = play.with_motor(numbers.play, mesh, moving(y, stop, 0.0, 0.0))
         if source.present(numbers.source):
             zone = currents.zone_of(numbers, u, 0.0, q, y.w_m, i)
-        if hits and w == 0.0:  # it rests on a stop: both hit it at once
-            return contacts.rebound(numbers, Mode(zone, shaft, mesh, motor, 0), upper, u, tau, y)
+        if stop < math.inf and w == 0.0:  # it rests on a stop: both hit it at once
+            return contacts.rebound(numbers, Mode(zone, shaft, mesh, motor, 0), forward, u, tau, y)
     elif kind == MOTOR_SPEED:
         y = moving(y, q, w, 0.0)
     else:
         y = moving(y, q, 0.0, y.w_m if mesh == INSIDE else 0.0)
     return contacts.settled(numbers, zone, u, tau, y, mesh, False), y
+
+
+def stop_ahead(stops: Stops, forward: bool, q: float, w: float) -> float:
+    """Return the stop to which a motor brings an output [rad, rad/s] without any way to go; inf: it does not.
+
+    An output that has come from there goes to and fro between both, each time with less speed and no way at all, until
+    in no time both rest.
+    """
+    if forward and w > 0.0 and q >= stops.upper - _NO_WAY * max(abs(q), 1.0):
+        return stops.upper
+    if not forward and w < 0.0 and q <= stops.lower + _NO_WAY * max(abs(q), 1.0):
+        return stops.lower
+    return math.inf
 
 
 def _cross_spring(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:

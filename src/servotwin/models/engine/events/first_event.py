@@ -18,6 +18,7 @@ from servotwin.models.engine.motions.motion import (
     FIRST_ORDER,
     REST,
     Motion,
+    is_step,
     monotone_until,
     prepared,
     rates,
@@ -25,7 +26,7 @@ from servotwin.models.engine.motions.motion import (
     state_and_rates,
 )
 from servotwin.models.engine.motions.rodas import not_constant
-from servotwin.models.state.modes import FORWARD, RIGID, UNIT, Mode, Vector, moving
+from servotwin.models.state.modes import FORWARD, INSIDE, LOOSE, RIGID, UNIT, Mode, Vector, moving
 from servotwin.models.terms import source
 from servotwin.models.terms.friction import creeping_speed, fades, shared
 from servotwin.models.terms.numbers import Numbers
@@ -97,11 +98,14 @@ def _parts(numbers: Numbers, mode: Mode, u: float, tau: float, laws: Apart, star
            s1: float) -> float:
     """Return when motor and output, in contact and sliding one way, would draw apart; inf where they do not.
 
-    How they press changes with the speed in straight lines, with a bend where the motor's torque turns.
+    How they press changes with the speed in straight lines, with a bend where the motor's torque turns, as far as the
+    zone of its current goes.
     """
-    w, w_end = start.w, after.w
+    per_speed = back_emf(1.0, numbers.motor.K_b)
+    low, high = currents.zone_limits(numbers, mode.zone, u)
+    w, w_end = start.w, min(max(after.w, (u - high) / per_speed), (u - low) / per_speed)
     at_end = _pressing(numbers, mode, u, tau, start, w_end)
-    bend = u / back_emf(1.0, numbers.motor.K_b)
+    bend = u / per_speed
     bends = shared(numbers.friction) and min(w, w_end) < bend < max(w, w_end)
     if at_end >= guards.BELOW and not bends:
         return math.inf
@@ -127,6 +131,7 @@ def _pressing(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, w: 
 # --- When a mode ends: the first time at which one of its guards falls below zero -------------------------------------
 
 _INSTANT = 1e-18  # s: between two times
+_HALVINGS = 20  # of an interval, to where a lead bends the other way
 IN_FLOATS = {"_INSTANT": 1e-9}
 
 
@@ -146,12 +151,32 @@ def first_event(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float
         right = monotone_until(motion, left, s1)
         if right <= left:
             right = s1
+        if is_step(motion) and (motion.mode.mesh == INSIDE or motion.mode.mesh == LOOSE):
+            right = _alike(motion, left, at_left, right)
+            motion = prepared(motion) if right < s1 else motion
         at_right = state(motion, right)
         first, found = _first_of(motion, kinds, left, at_left, right, at_right)
         if found >= 0:
             return first, found, at_right
         left, at_left = right, at_right
     return math.inf, -1, at_left
+
+
+def _alike(motion: Motion, a: float, at_a: Vector, b: float) -> float:
+    """Return where in (a, b) both are accelerated alike, so that their lead bends the other way; b: nowhere."""
+    begin, end = rates(motion, a, at_a), rates(motion, b, state(motion, b))
+    first = begin.w_m - begin.w
+    if not first * (end.w_m - end.w) < 0.0:
+        return b
+    motion = prepared(motion)
+    for _ in range(_HALVINGS):
+        s = 0.5 * (a + b)
+        dy = state_and_rates(motion, s)[1]
+        if (dy.w_m - dy.w) * first > 0.0:
+            a = s
+        else:
+            b = s
+    return b
 
 
 def _outright(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float, int, Vector]:

@@ -154,12 +154,21 @@ def _slope_and_bend(course: Any, terms: int, x: float) -> tuple[float, float]:
 
 
 def _lowest(course: Any, terms: int) -> float:
-    """Return where a guard is least that turns once at most, 0 or 1 where that is at an end: where its slope rises."""
-    a, slope = 0.0, float(course[1])
-    b, end = 1.0, _slope_and_bend(course, terms, 1.0)[0]
+    """Return where a guard is least that turns twice at most, 0 where that is at an end: where its slope rises."""
+    a, slope, bend, b = 0.0, float(course[1]), 2.0 * float(course[2]), 1.0
+    end, end_bend = _slope_and_bend(course, terms, 1.0)
     if slope >= 0.0 or end <= 0.0:
-        return 0.5 if slope > 0.0 and end > 0.0 else 0.0
-    x = slope / (slope - end)
+        if (slope < 0.0) != (end <= 0.0) or bend * end_bend >= 0.0 or (bend > 0.0) != (slope < 0.0):
+            return 0.0
+        x = _straight(course, terms, bend)
+        between = _slope_and_bend(course, terms, x)[0]
+        if (between < 0.0) == (slope < 0.0):
+            return 0.0
+        if slope < 0.0:
+            b, end = x, between
+        else:
+            a, slope = x, between
+    x = a + (b - a) * slope / (slope - end)
     for _ in range(_STEPS):
         slope, bend = _slope_and_bend(course, terms, x)
         if slope < 0.0:
@@ -173,6 +182,18 @@ def _lowest(course: Any, terms: int) -> float:
             return new
         x = new
     return x
+
+
+def _straight(course: Any, terms: int, bend: float) -> float:
+    """Return where the second derivative of a guard, that begins so, gets another sign, by halves of a leg."""
+    a, b = 0.0, 1.0
+    for _ in range(_RISES):
+        x = 0.5 * (a + b)
+        if (_slope_and_bend(course, terms, x)[1] > 0.0) == (bend > 0.0):
+            a = x
+        else:
+            b = x
+    return b
 
 
 def _course_crossing(course: Any, terms: int, b: float, f_b: float, instant: float) -> float:
@@ -224,7 +245,8 @@ class Place(NamedTuple):
 def first_end(unit: Any, common: Any, doubtful: int, length: float, last: bool) -> tuple[int, float]:
     """Return which doubtful guard of a servo falls below zero first along a leg (−1: none), and when [s].
 
-    Where it is the `last` instant it counts as well. A guard turns once at most, about where a parabola does.
+    Where it is the `last` instant it counts as well. A guard that looks at torques turns once at most, about where a
+    parabola does.
     """
     found, first, kinds = -1, length, doubtful
     for kind in range(guards.KINDS):
