@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from reference.drivetrain_cases import Command, random_case
+import servotwin as st
+from reference.drivetrain_cases import Command, random_case, servo_of
 from reference.drivetrain_laws import make_plant
 from servotwin.models.state.modes import INSIDE
 from validation.test_drivetrain_armature import CENTRE, SIMPLE, N, driven, undriven
@@ -58,29 +59,35 @@ def test_an_impact_in_closed_form(way):
 
 
 HEAVY = {"thermal.winding_capacity": 1e9, "thermal.housing_capacity": 1e9, "thermal.winding_to_housing": 1.0,
-         "thermal.housing_to_ambient": 1.0}  # as good as constant temperatures, at which the law is solved exactly
+         "thermal.housing_to_ambient": 1.0}  # nothing warms up, but steps of an integrator are taken
 
 
-@pytest.mark.parametrize("alike", [3e-4, 2e-3])  # s
-@pytest.mark.parametrize("more", [{}, HEAVY, HEAVY | {"thermal.magnet_coefficient": -2e-3}],
-                         ids=["arc", "heat", "magnets"])
+@pytest.mark.parametrize("alike", [1e-3, 3e-3, 1e-2])  # s
+@pytest.mark.parametrize("more", [{}, HEAVY], ids=["arcs", "steps"])
 def test_flanks_that_would_leave_each_other_again_meet(more, alike):
-    """A braked motor is overtaken by a load that is braked evenly: the way between both opens, closes and opens."""
-    braked = LOOSE | {"electronics.off_state": "brake", "gear.backlash": 1.0}
-    w, gap, opening, t = 4.0, 1e-9, 1e-7, 0.02
-    alone = simulate(undriven(braked, initial={"motor_speed": w * N}, duration=t), np.array([t]))
-    rate = -math.log(alone["motor_speed"][0] / N / w) / t
-    even = rate * w * math.exp(-rate * alike)
-    case = undriven(braked | LOOSE | more, load={"torque": OUTPUT * even}, duration=5.0 * alike, initial={
-        "output_angle": 0.0, "output_speed": w - opening, "motor_angle": (gap - 0.5 * PLAY) * N, "motor_speed": w * N})
+    """A braked motor parts from a load that is braked evenly, then braked less: the way opens, closes, opens."""
+    def run(duration, load):
+        case = undriven(LOOSE | {"electronics.off_state": "brake"} | more)
+        late = st.signals.pulse_train([duration + 1.0], [CENTRE], unit="s")
+        return st.simulate(st.PulseServo(servo_of(case)), late, duration=duration, load=load, output_times=[duration],
+                           initial={"output_speed": 8.0, "motor_angle": -0.5 * PLAY * N, "motor_speed": 8.0 * N})
+
+    strong = 2.0 / 3.0  # N m
+    parts = next(event.time for event in run(0.02, st.loads.Constant(strong)).events if event.kind == "gear parts")
+    rate, start = strong / OUTPUT / run(parts, st.loads.Constant(strong))["output_speed"][0], parts + 5e-5
+    then = run(start, st.loads.Constant(strong))
+    q, w = then["output_angle"][0], then["output_speed"][0]
+    q_m, w_m = then["motor_angle"][0] / N, then["motor_speed"][0] / N
+    pull = rate * w_m * math.exp(-rate * alike)
 
     def way(t):
-        return gap - w / rate * math.expm1(-rate * t) - (w - opening) * t + 0.5 * even * t * t
+        return q_m - q + 0.5 * PLAY - w_m / rate * math.expm1(-rate * t) - w * t + 0.5 * pull * t * t
 
-    meets = brentq(way, 1e-7, 2.0 * alike, xtol=1e-16)
+    end = start + 5.0 * alike
+    found = run(end, st.loads.Recorded([0.0, start, start + 1e-12, end], [strong, strong, *[OUTPUT * pull] * 2]))
     assert way(5.0 * alike) > 0.0
-    first = simulate(case, np.array([5.0 * alike])).events[0]
-    assert (first.kind, first.time) == ("gear meets", pytest.approx(meets, rel=1e-6))
+    assert [event.kind for event in found.events][1:3] == ["gear parts", "gear meets"]
+    assert found.events[2].time == pytest.approx(start + brentq(way, 1e-7, 2.0 * alike, xtol=1e-16), abs=1e-10)
 
 
 # --- friction behind the play -----------------------------------------------------------------------------------------
