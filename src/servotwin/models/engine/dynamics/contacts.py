@@ -38,7 +38,7 @@ from servotwin.physics.load_friction import torque_on_gear
 
 REST_SPEED = 1e-6  # rad/s: below this a rebound from a stop comes to rest
 NEXT_TO_NOTHING = 1e-300  # N m: where a current is about to flow
-REST_HEIGHT = 4e-15  # relative to the angle: a rebound this low is rounding
+REST_HEIGHT = 1e-12  # relative to the angle: what is so near to a stop is on it, and a rebound this low is none
 IN_FLOATS = {"NEXT_TO_NOTHING": 1e-30, "REST_HEIGHT": 2e-6}
 CALLED = ("settled",)  # after events alone: with copies all that follows legs takes half as long again to compile
 
@@ -115,8 +115,9 @@ def as_one(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: i
         torque = drive_torque(numbers, zone, u, y)
         against = external_torque(numbers.load, tau, q)
         backward, forward = holding_bounds(numbers, torque, -against)
-        contact = from_rest(torque - against, backward, forward, q >= numbers.stops.upper, q <= numbers.stops.lower,
-                            has_friction(numbers))
+        near = REST_HEIGHT * max(abs(q), 1.0)
+        contact = from_rest(torque - against, backward, forward, q >= numbers.stops.upper - near,
+                            q <= numbers.stops.lower + near, has_friction(numbers))
     else:
         contact = sliding(w > 0.0, has_friction(numbers))
     return Mode(zone, contact, mesh, FREE, share_sign(numbers, zone, contact, mesh, u, tau, y))

@@ -57,9 +57,6 @@ from servotwin.models.terms.friction import creeping_speed, smoothed
 from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.models.terms.stops import Stops
 
-_NO_WAY = 1e-12  # relative to the angle: what is left of a way to a stop where there is none
-IN_FLOATS = {"_NO_WAY": 2e-6}
-
 # --- The mode after the end of another: how it continues, and where a guard has reached zero --------------------------
 
 def cross(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:
@@ -136,11 +133,8 @@ def stop_ahead(stops: Stops, forward: bool, q: float, w: float) -> float:
     An output that has come from there goes to and fro between both, each time with less speed and no way at all, until
     in no time both rest.
     """
-    if forward and w > 0.0 and q >= stops.upper - _NO_WAY * max(abs(q), 1.0):
-        return stops.upper
-    if not forward and w < 0.0 and q <= stops.lower + _NO_WAY * max(abs(q), 1.0):
-        return stops.lower
-    return math.inf
+    stop, ahead = (stops.upper, w) if forward else (stops.lower, -w)
+    return stop if ahead > 0.0 and abs(stop - q) <= contacts.REST_HEIGHT * max(abs(q), 1.0) else math.inf
 
 
 def _cross_spring(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:

@@ -132,6 +132,7 @@ def _pressing(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, w: 
 
 _INSTANT = 1e-18  # s: between two times
 _HALVINGS = 20  # of an interval, to where a lead bends the other way
+_ALIKE = 1e-12  # relative, or rad/s²: accelerations so near to each other are alike from the beginning
 IN_FLOATS = {"_INSTANT": 1e-9}
 
 
@@ -166,7 +167,7 @@ def _alike(motion: Motion, a: float, at_a: Vector, b: float) -> float:
     """Return where in (a, b) both are accelerated alike, so that their lead bends the other way; b: nowhere."""
     begin, end = rates(motion, a, at_a), rates(motion, b, state(motion, b))
     first = begin.w_m - begin.w
-    if not first * (end.w_m - end.w) < 0.0:
+    if not first * (end.w_m - end.w) < 0.0 or abs(first) <= _ALIKE * max(abs(begin.w), 1.0):
         return b
     motion = prepared(motion)
     for _ in range(_HALVINGS):

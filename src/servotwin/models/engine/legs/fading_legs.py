@@ -13,14 +13,13 @@ from servotwin.models.engine.dynamics import guards
 from servotwin.models.engine.dynamics.coefficients import Apart, linear_coefficients
 from servotwin.models.engine.events import crossings
 from servotwin.models.engine.legs import legs
-from servotwin.models.engine.legs.legs import MOST_SHORT, SHORT, Gone
+from servotwin.models.engine.legs.legs import MOST_LEGS, MOST_SHORT, SHORT, Gone
 from servotwin.models.engine.motions import stribeck
 from servotwin.models.state.modes import INSIDE, UNIT, Mode, Vector, one_body
 from servotwin.models.terms import play
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import wiper_at
 
-_LEGS = 4000  # under one drive: more than of `legs`, for there is nothing that those it gives up are left to
 TOLERANCE = 1e-12  # rad, rad/s: of a creep, as of one at the accuracy that is usual
 _TRIES = 200  # of the time at which a creep meets a stop
 IN_FLOATS = {"TOLERANCE": 1e-6}
@@ -38,7 +37,7 @@ class Crept(NamedTuple):
 def go(numbers: Numbers, torque: float, u: float, y: Vector, mode: Mode, wiper: float, time: float) -> Gone:
     """Return where a servo goes within a time [s], as `legs.go` has it; with play in its gear no friction may fade."""
     short = 0
-    for _ in range(_LEGS):
+    for _ in range(MOST_LEGS):
         if legs.stands(mode) or not time > 0.0:
             return Gone(y, mode, wiper, 1.0 if math.isfinite(y.q) else 0.0)
         if stribeck.creeps(numbers, mode, u, torque, y):

@@ -22,7 +22,7 @@ from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.play import with_motor
 from servotwin.models.terms.sensor import wiper_at
 
-MOST_LEGS = 400  # under one drive; a servo that needs more is left to the general engine
+MOST_LEGS = 4000  # under one drive: an output that comes to rest between motor and stop needs hundreds
 MOST_SHORT = 8  # legs within next to no time: then motor and output stay together
 SHORT, _AT_END = 1e-9, 1e-6  # of a time, of the play
 IN_FLOATS = {"SHORT": 1e-4}

@@ -19,7 +19,7 @@ from servotwin.models.engine.dynamics import coefficients, currents, guards
 from servotwin.models.engine.dynamics.coefficients import Apart
 from servotwin.models.engine.events import crossings
 from servotwin.models.engine.legs import legs
-from servotwin.models.engine.legs.legs import MOST_SHORT, SHORT, Gone
+from servotwin.models.engine.legs.legs import MOST_LEGS, MOST_SHORT, SHORT, Gone
 from servotwin.models.engine.motions import first_order, warm_exponential
 from servotwin.models.engine.motions.first_order import Course, alike
 from servotwin.models.engine.motions.warm_exponential import Law
@@ -32,7 +32,6 @@ from servotwin.models.terms.sensor import wiper_at
 from servotwin.physics.motor import steady_armature_current
 from servotwin.physics.thermal import heat_flow, warming_rate
 
-_LEGS = 20000  # under one drive: where motor and output chatter, thousands; there is nothing that others are left to
 TERMS = 24  # of a series at most
 IN_FLOATS = {"TERMS": 12, "_ROUNDING": 1e-9, "_INSTANT": 1e-7}
 _ROUNDING = 1e-16  # rad/s of a speed: what a term may be
@@ -77,7 +76,7 @@ def go(numbers: Numbers, torque: float, u: float, y: Vector, mesh: int, wiper: f
     current = [0.0] * TERMS
     fall = [0.0] * TERMS  # of the voltage along the winding
     mode, short = legs.mode_from(warm(numbers, y), torque, u, y, mesh), 0
-    for _ in range(_LEGS):
+    for _ in range(MOST_LEGS):
         now, turns = warm(numbers, y), not at_rest(mode.motor if mode.mesh == INSIDE else mode.contact)
         laws = Apart(0.0, 0.0, 0.0, 0.0)
         if turns or not legs.stands(mode):
