@@ -149,9 +149,10 @@ def test_slow_motion_and_single_frames(page):
     page.wait_for_timeout(1500)
     went = page.evaluate("bench.time") - before
     assert 0.5e-3 < went < 4e-3
-    assert "ms in a second" in page.locator(".pace").inner_text()
+    paced, unit = re.search(r"(\d+|\d+\.\d+) (ms|µs) in a second", page.locator(".pace").inner_text()).groups()
+    assert 0.5 < float(paced) * {"ms": 1.0, "µs": 1e-3}[unit] < 4.0  # 1, less on a machine that cannot keep up
     assert re.fullmatch(r"\d+\.\d{6} s", page.locator(".time").inner_text())
-    assert page.evaluate("bench.header.behind") is False
+    page.wait_for_function("bench.header.behind === false")
     for _ in range(3):
         page.get_by_role("button", name="One frame").click()
         page.wait_for_timeout(100)
