@@ -69,6 +69,20 @@ def extreme(seed: int) -> Extreme:
                    _goals(d, groups.get("stops", {}), duration), duration)
 
 
+def pressed(seed: int) -> Extreme:
+    """Return a servo as sold, with play and a stop that rebounds, whose load presses it onto that stop."""
+    d = Draw(seed)
+    groups = {"gear.backlash": d.wide(5e-4, 0.03), "gear.output_inertia": d.wide(3e-6, 3e-4),
+              "stops.lower_angle": -1.0, "stops.upper_angle": 1.0,
+              "stops.restitution": d.pick(0.0, d.between(0.1, 0.95)),
+              "supply.internal_resistance": d.pick(0.0, d.between(0.02, 0.4)), "firmware.command_kind": "goal"}
+    groups |= d.some(0.5, **{"supply.current_limit": d.between(0.3, 2.0)})
+    groups |= d.some(0.3, **{"friction.load_friction": d.between(0.0, 0.3)})
+    load = st.loads.Inertia(d.wide(3e-5, 3e-3)) + st.loads.Constant(d.pick(-1.0, 1.0) * d.wide(0.1, 20.0))
+    goals = st.signals.samples([0.0, 0.1], d.rng.uniform(-0.9, 0.9, 2), unit="rad", hold="previous")
+    return Extreme(st.DigitalServo(st.load_servo("dynamixel-xl330-m288").replace(groups)), load, goals, 0.3)
+
+
 def _shares(d: Draw) -> dict[str, Any]:
     """Load friction, often nearly all of the torque."""
     near = 1.0 - d.wide(1e-6, 0.5)

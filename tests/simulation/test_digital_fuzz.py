@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import servotwin as st
-from leg_extremes import Extreme, extreme
+from leg_extremes import Extreme, extreme, pressed
 
 pytestmark = pytest.mark.long
 
-BLOCK, BLOCKS = 50, 40
+BLOCK, BLOCKS, PRESSED = 50, 40, 50
 WORK = 30.0  # s of this process; most take 0.01, those of which a step is integrated a few
 MOST_MOTIONS, MOST_EVENTS = 60_000, 5_000  # of a run of at most 40 ticks; stiff ones are integrated in small steps
 KNOWN = {  # what is not as it should be
@@ -41,8 +41,8 @@ def run(one: Extreme) -> st.Result:
         signal.signal(signal.SIGVTALRM, before)
 
 
-def check(seed: int) -> None:
-    one = extreme(seed)
+def check(seed: int, drawn=extreme) -> None:
+    one = drawn(seed)
     result = run(one)
     assert result.status.ok, (seed, result.status, result.ended)
     assert result.stats.motions <= MOST_MOTIONS, seed
@@ -71,6 +71,12 @@ def test_extreme_servos(block):
     for seed in range(BLOCK * block, BLOCK * (block + 1)):
         if seed not in KNOWN:
             check(seed)
+
+
+def test_servos_pressed_onto_a_stop_rest_there():
+    """A motor too weak to lift its output off a stop bounced between both without end, each time by a rounding."""
+    for seed in range(PRESSED):
+        check(seed, pressed)
 
 
 def test_motor_and_output_that_meet_in_no_time_are_held_together():

@@ -140,7 +140,7 @@ CASES = {  # servo, what its lanes have, way, how many, and how far they may be 
     "pulses, creeping": (st.DigitalServo, PULSES, creeping(programmed), TICKS, 80, 1e-11),
     "legs, warming": (st.PulseServo, PLAIN, warming(limited(analog)), PULSES_BY_LEGS, 80, 1e-11),
     "goals, warming": (st.DigitalServo, GOALS, warming(goals), TICKS, 80, 1e-11),
-    "pulses, warming": (st.DigitalServo, PULSES, warming(limited(programmed)), TICKS, 120, 1e-11)}
+    "pulses, warming": (st.DigitalServo, PULSES, warming(limited(programmed)), TICKS, 120, 1e-10)}
 
 
 def made(case, lanes=None, seed=5):

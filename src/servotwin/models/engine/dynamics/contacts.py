@@ -38,7 +38,7 @@ from servotwin.physics.load_friction import torque_on_gear
 
 REST_SPEED = 1e-6  # rad/s: below this a rebound from a stop comes to rest
 NEXT_TO_NOTHING = 1e-300  # N m: where a current is about to flow
-REST_HEIGHT = 1e-12  # relative to the angle: what is so near to a stop is on it, and a rebound this low is none
+REST_HEIGHT = 1e-12  # relative to the angle: a body this near to a stop is on it, a rebound this low is none
 IN_FLOATS = {"NEXT_TO_NOTHING": 1e-30, "REST_HEIGHT": 2e-6}
 CALLED = ("settled",)  # after events alone: with copies all that follows legs takes half as long again to compile
 
