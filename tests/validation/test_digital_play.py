@@ -24,6 +24,7 @@ TIMES = np.arange(1000) * 1e-3 + 3.7e-4  # s, none at a tick
 RUNS, QUICK = 48, (2, 12)
 GRAZING, TIE = 1e-6, 1e-9  # rad/s: teeth that meet so slowly may miss; counts: so near to its edge a count is another
 AFTER = 1e-6  # rad, what grazes changes
+BOUNCE = 1e-5  # s; the engine ends bounces lower than 1e-12 rad, the reference those slower than 1e-6 rad/s
 KINDS = ("stick", "reversal", "gear meets", "gear parts", "motor speed zero", "upper stop", "lower stop")
 PARTS = ("supply", "winding", "bridge", "brush", "friction", "stops", "load")
 
@@ -85,10 +86,19 @@ def kinds(result: st.Result, trace: digital.Trace) -> tuple[Counter[str], Counte
     """Return how many events of each kind there are here and there; currents count only where there is a drop."""
     drops = result.model.servo.supply.bridge_drop_voltage or result.model.servo.motor.brush_drop_voltage
     counted = (*KINDS, "current starts", "current stops") if drops else KINDS
-    stops = {"stop": "upper stop"}
-    here = Counter(e.kind.replace("lower", "upper") for e in result.events if e.kind in counted)
-    there = Counter(stops.get(kind, kind) for _, kind in trace.events if stops.get(kind, kind) in counted)
-    return here, there
+    here = [(e.time, e.kind.replace("lower stop", "upper stop")) for e in result.events if e.kind in counted]
+    there = [(t, {"stop": "upper stop"}.get(kind, kind)) for t, kind in trace.events]
+    return _counted(here, counted), _counted(there, counted)
+
+
+def _counted(events: list[tuple[float, str]], counted: tuple[str, ...]) -> Counter[str]:
+    """Return how many there are of each kind, without bounces of which the last are too low for one of both."""
+    found, stop = Counter[str](), -1.0
+    for t, kind in events:
+        if kind in counted and not (kind in ("upper stop", "reversal") and t - stop < BOUNCE):
+            found[kind] += 1
+        stop = t if kind == "upper stop" else stop
+    return found
 
 
 def grazing(trace: digital.Trace) -> list[tuple[float, float]]:
