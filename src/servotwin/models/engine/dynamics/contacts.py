@@ -38,7 +38,7 @@ from servotwin.physics.load_friction import torque_on_gear
 
 REST_SPEED = 1e-6  # rad/s: below this a rebound from a stop comes to rest
 NEXT_TO_NOTHING = 1e-300  # N m: where a current is about to flow
-REST_HEIGHT = 1e-12  # relative to the angle: a body this near to a stop is on it, a rebound this low is none
+REST_HEIGHT = 1e-12  # rad (of an angle above 1: relative): a rebound this low is none, a body this near to a stop on it
 IN_FLOATS = {"NEXT_TO_NOTHING": 1e-30, "REST_HEIGHT": 2e-6}
 CALLED = ("settled",)  # after events alone: with copies all that follows legs takes half as long again to compile
 
@@ -115,9 +115,8 @@ def as_one(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: i
         torque = drive_torque(numbers, zone, u, y)
         against = external_torque(numbers.load, tau, q)
         backward, forward = holding_bounds(numbers, torque, -against)
-        near = REST_HEIGHT * max(abs(q), 1.0)
-        contact = from_rest(torque - against, backward, forward, q >= numbers.stops.upper - near,
-                            q <= numbers.stops.lower + near, has_friction(numbers))
+        contact = from_rest(torque - against, backward, forward, numbers.stops.upper - q <= REST_HEIGHT,
+                            q - numbers.stops.lower <= REST_HEIGHT, has_friction(numbers))
     else:
         contact = sliding(w > 0.0, has_friction(numbers))
     return Mode(zone, contact, mesh, FREE, share_sign(numbers, zone, contact, mesh, u, tau, y))
@@ -156,7 +155,8 @@ def apart(numbers: Numbers, zone: int, u: float, tau: float, y: Vector) -> Mode:
     contact, motor = sliding(y.w > 0.0, held), sliding(y.w_m > 0.0, dry)
     if y.w == 0.0:
         hold = output_friction(numbers)
-        contact = from_rest(-against, hold, hold, y.q >= numbers.stops.upper, y.q <= numbers.stops.lower, held)
+        contact = from_rest(-against, hold, hold, numbers.stops.upper - y.q <= REST_HEIGHT,
+                            y.q - numbers.stops.lower <= REST_HEIGHT, held)
     if y.w_m == 0.0:
         motor = from_rest(torque, motor_hold(numbers, False, torque), motor_hold(numbers, True, torque), False, False,
                           dry)
