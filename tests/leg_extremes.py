@@ -15,7 +15,7 @@ N = 300.0
 class Extreme(NamedTuple):
     """A servo, its load, and what it is told for so long."""
 
-    model: st.DigitalServo
+    model: st.DigitalServo | st.PulseServo
     load: st.loads.Load
     command: st.signals.Signal
     duration: float
@@ -69,18 +69,22 @@ def extreme(seed: int) -> Extreme:
                    _goals(d, groups.get("stops", {}), duration), duration)
 
 
-def pressed(seed: int) -> Extreme:
+def pressed(seed: int, analog: bool = False) -> Extreme:
     """Return a servo as sold, with play and a stop that rebounds, whose load presses it onto that stop."""
     d = Draw(seed)
     groups = {"gear.backlash": d.wide(5e-4, 0.03), "gear.output_inertia": d.wide(3e-6, 3e-4),
               "stops.lower_angle": -1.0, "stops.upper_angle": 1.0,
               "stops.restitution": d.pick(0.0, d.between(0.1, 0.95)),
-              "supply.internal_resistance": d.pick(0.0, d.between(0.02, 0.4)), "firmware.command_kind": "goal"}
+              "supply.internal_resistance": d.pick(0.0, d.between(0.02, 0.4))}
     groups |= d.some(0.5, **{"supply.current_limit": d.between(0.3, 2.0)})
     groups |= d.some(0.3, **{"friction.load_friction": d.between(0.0, 0.3)})
     load = st.loads.Inertia(d.wide(3e-5, 3e-3)) + st.loads.Constant(d.pick(-1.0, 1.0) * d.wide(0.1, 20.0))
-    goals = st.signals.samples([0.0, 0.1], d.rng.uniform(-0.9, 0.9, 2), unit="rad", hold="previous")
-    return Extreme(st.DigitalServo(st.load_servo("dynamixel-xl330-m288").replace(groups)), load, goals, 0.3)
+    goals = d.rng.uniform(-0.9, 0.9, 2)
+    if analog:
+        pulses = st.signals.samples([0.0, 0.1], 1500.0 + 600.0 * goals, unit="us", hold="previous")
+        return Extreme(st.PulseServo(st.load_servo("hitec-hs-755hb").replace(groups)), load, pulses, 0.3)
+    told = st.signals.samples([0.0, 0.1], goals, unit="rad", hold="previous")
+    return Extreme(st.DigitalServo(st.load_servo("dynamixel-xl330-m288").replace(groups)), load, told, 0.3)
 
 
 def _shares(d: Draw) -> dict[str, Any]:

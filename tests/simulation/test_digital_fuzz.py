@@ -79,6 +79,16 @@ def test_servos_pressed_onto_a_stop_rest_there():
         check(seed, pressed)
 
 
+def test_servos_pressed_onto_their_stops_on_one_supply_rest_there():
+    for seed in range(0, 5 * PRESSED, 2):
+        servos = {str(k): pressed(k, analog=True) for k in (seed, seed + 1)}
+        fleet = st.simulate_bus({name: (one.model, one.command, one.load) for name, one in servos.items()},
+                                supply=st.Supply(open_circuit_voltage=6.0, internal_resistance=0.2), duration=0.3)
+        for name in servos:
+            assert fleet[name].status.ok, (name, fleet[name].status)
+            assert len(fleet[name].events) <= MOST_EVENTS, name
+
+
 def test_motor_and_output_that_meet_in_no_time_are_held_together():
     """With a load friction of 0.9995 they part and meet at one instant: in `simulate`, in lanes, and it is told."""
     check(HELD)
