@@ -149,6 +149,8 @@ def write(names: list[str]) -> None:
     warnings.simplefilter("ignore")
     began = time.process_time()
     text, places, values = loaded() if names and TEXT.exists() else ({"sets": {}}, {}, {})
+    if text["sets"] and not same_machine(text):
+        sys.exit("record.py: this machine rounds otherwise than the files' one; name no set, so that all are written")
     for name in names or SETS:
         text["sets"][name], places[name], values[name] = recorded(name, SETS[name])
     text["sets"] = {name: text["sets"][name] for name in SETS if name in text["sets"]}
